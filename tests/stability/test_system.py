@@ -22,8 +22,8 @@ from chilopod.stability import (
     multipliers,
     sweep,
 )
-from chilopod.stability.capabilities import spatial_symmetries
-from chilopod.stability.returns import whole_period
+from chilopod.stability.problem.capabilities import spatial_symmetries
+from chilopod.stability.problem.returns import whole_period
 
 
 class Own:

@@ -129,3 +129,14 @@ def test_coefficient_against_the_branch_itself():
         return -side * rate * away / (0.5 * left @ (there - back)) ** 2
 
     assert 2 * estimate(1e-5) - estimate(2e-5) == pytest.approx(point.coefficient, rel=1e-5)
+
+
+def test_bounds_of_an_orbit_far_from_zero():
+    """They are those of the motion, not of the distance."""
+
+    def shifted(distance):
+        return from_rhs(lambda t, x: [x[1], -0.2 * x[1] - (x[0] - distance) ** 3 + 2.5 * np.cos(t)], 2, 2.0 * np.pi)
+
+    near, far = (find_orbit(shifted(distance), [distance + 1.88, 0.64]) for distance in (0.0, 1e4))
+    assert (np.abs(far.state - [1e4, 0.0] - near.state) <= far.error + near.error).all()
+    assert far.error.max() < 1e-6

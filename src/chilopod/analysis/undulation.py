@@ -23,7 +23,7 @@ from chilopod.planar.along import FollowedModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Criticality, Kind
-from chilopod.stability.returns import return_map, whole_period
+from chilopod.stability.problem.returns import return_map, whole_period
 from chilopod.stability.spectrum.eigenvalues import spectrum
 
 Array = NDArray[np.float64]

@@ -45,7 +45,7 @@ Method = Literal["automatic", "taylor", "implicit"]
 
 
 class Flows(NamedTuple):
-    """Flows of a right-hand side; the arguments and results are those of :mod:`chilopod.stability.capabilities`.
+    """Flows of a right-hand side; arguments and results are those of :mod:`chilopod.stability.problem.capabilities`.
 
     Every answer follows from the arguments of its call alone.
     """

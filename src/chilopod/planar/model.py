@@ -41,8 +41,8 @@ class PlanarModel(ReadOnlyArrays):
     """The paper's planar model (eq. 1) of one robot, period by period.
 
     The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). Of what
-    :mod:`chilopod.stability.capabilities` names it knows its orbit, scale, symmetries and switch times, bounds its
-    error, and carries many states or many robots at once; :class:`chilopod.planar.along.FollowedModel` also carries
+    :mod:`chilopod.stability.problem.capabilities` names it knows its orbit, scale, symmetries and switch times, bounds
+    its error, and carries many states or many robots at once; :class:`chilopod.planar.along.FollowedModel` also carries
     each state by its own robot. It has no tangents or frames, for its full derivative is small. It does not change once
     it is made, and its arrays cannot be written into: another robot is another model.
 

@@ -12,8 +12,18 @@ from chilopod.flows.events import Event
 from chilopod.flows.implicit.flow import Stretched
 from chilopod.flows.jumps import UndeclaredSwitch
 from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, proceed, switch
-from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import (
+from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
+from chilopod.stability.codimension_two.switching import switch2
+from chilopod.stability.codimension_two.two_parameters import follow2
+from chilopod.stability.equilibria import Equilibrium, find_equilibrium
+from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
+from chilopod.stability.hopf import locate_hopf
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
+from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.orbits.orbit import Orbit, find_orbit
+from chilopod.stability.points import BifurcationPoint, Criticality, Kind
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.capabilities import (
     Autonomous,
     CyclicallySymmetric,
     ExpandsVelocity,
@@ -27,24 +37,14 @@ from chilopod.stability.capabilities import (
     SpatiallySymmetric,
     SystemLike,
 )
-from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
-from chilopod.stability.codimension_two.switching import switch2
-from chilopod.stability.codimension_two.two_parameters import follow2
-from chilopod.stability.equilibria import Equilibrium, find_equilibrium
-from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
-from chilopod.stability.hopf import locate_hopf
-from chilopod.stability.maps import from_map
-from chilopod.stability.normal_forms.amplitude import NormalFormStatus
-from chilopod.stability.normal_forms.normal_form import NormalForm
-from chilopod.stability.orbits import Orbit, find_orbit
-from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.returns import ReturnMap, Section
+from chilopod.stability.problem.maps import from_map
+from chilopod.stability.problem.returns import ReturnMap, Section
+from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.rhs import from_rhs
 from chilopod.stability.search.locate import locate
 from chilopod.stability.search.located import Located
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
-from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.unit_circle.crossings import SearchStatus
 

@@ -18,12 +18,19 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.budget import UserCode
-from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale, is_autonomous
 from chilopod.stability.normal_forms.extrapolation import radii, series
-from chilopod.stability.orbits import Orbit, find_orbit
+from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality
-from chilopod.stability.returns import section_at
+from chilopod.stability.problem.budget import UserCode
+from chilopod.stability.problem.capabilities import (
+    Autonomous,
+    Family,
+    SystemLike,
+    expands_velocity,
+    given_scale,
+    is_autonomous,
+)
+from chilopod.stability.problem.returns import section_at
 from chilopod.stability.spectrum.errors import SAFETY, disturbed, eigenvalue_errors
 
 Array = NDArray[np.float64]

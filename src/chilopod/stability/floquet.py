@@ -13,17 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.cores import cores
 from chilopod.flows.arguments import checked_count
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
-from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
-from chilopod.stability.returns import return_maps
+from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
+from chilopod.stability.problem.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
+from chilopod.stability.problem.returns import return_maps
+from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
 from chilopod.stability.spectrum.cut import moderate_cut
 from chilopod.stability.spectrum.eigenvalues import phased, spectrum
 from chilopod.stability.spectrum.errors import VERDICTS, stable_within
 from chilopod.stability.spectrum.splitting import split_product
 from chilopod.stability.spectrum.stiff import split_stiff
-from chilopod.stability.system import PeriodicSystem
 
 if TYPE_CHECKING:
     import xarray as xr

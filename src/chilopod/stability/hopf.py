@@ -20,16 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
 from chilopod.stability.branches.fold import Fold
-from chilopod.stability.budget import UserCode
-from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.crossing_points.place import Course, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
+from chilopod.stability.problem.budget import UserCode
+from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
+from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.search.locate import checked_interval
 from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, find_crossings
 from chilopod.stability.unit_circle.spectra import Event

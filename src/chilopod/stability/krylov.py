@@ -23,10 +23,18 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
 from chilopod.stability.convergence import RETURN
-from chilopod.stability.returns import CUTS, REPEATED, Section, carried, return_duration, return_time, section_at
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
+from chilopod.stability.problem.returns import (
+    CUTS,
+    REPEATED,
+    Section,
+    carried,
+    return_duration,
+    return_time,
+    section_at,
+)
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
 
 Array = NDArray[np.float64]
@@ -116,7 +124,7 @@ def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Arr
 
 @dataclass(frozen=True)
 class TangentMap(ReadOnlyArrays):
-    """The return map H at a state (see :mod:`chilopod.stability.returns`), and its derivative H' without the matrix."""
+    """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`) and its derivative H', no matrix."""
 
     system: FlowsTangents
     point: Array  # state at time 0, shape (n,)
@@ -139,8 +147,8 @@ class TangentMap(ReadOnlyArrays):
         """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,): by their sizes
         as a whole, not of every entry.
 
-        As in :func:`chilopod.stability.returns.flow_with_error` they are a multiple of the difference to a second
-        computation which takes the interval in parts.
+        As in :func:`~chilopod.stability.problem.returns.flow_with_error` they are a multiple of the difference to a
+        second computation which takes the interval in parts.
         """
         state, images = self._in_parts(directions, (0.0,))
         other, parts = self._in_parts(directions, CUTS)
@@ -191,7 +199,7 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
 
 
 def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
-    """Sizes of the states, shape (n,), as :func:`chilopod.stability.scales.sizes` says, without the matrix.
+    """Sizes of the states, shape (n,), as :func:`chilopod.stability.problem.scales.sizes` says, without the matrix.
 
     A state is as large as it becomes during a return, or as what the others, disturbed by their own sizes at random,
     make of it within a part of the return. Where the orbit is zero throughout that alone gives the ratios: the

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.capabilities import SystemLike, spatial_symmetries
-from chilopod.stability.orbits import Orbit
+from chilopod.stability.orbits.orbit import Orbit
+from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
-from chilopod.stability.symmetry.isotypic import Block, Type, isotypic
+from chilopod.stability.symmetry.isotypic import Block, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings
 from chilopod.stability.unit_circle.spectra import Matrices
 
@@ -38,34 +38,24 @@ def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[Blocks, tuple[str, .
     return isotypic(group), ()
 
 
-def in_block(block: Block | None, matrices: Array) -> Array:
-    """Blocks of return maps, shape (k, m, m), from the maps, shape (k, n, n): every multiplier of the real type once
-    instead of ``block.dimension`` times."""
-    if block is None:
-        return matrices
-    if block.type is Type.REAL:
-        return np.real(block.reduced(matrices))
-    return np.asarray(block.dual @ matrices @ block.basis)
-
-
 def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matrices], Crossings]) -> Crossings:
     """Crossings that a search finds in a block of return maps; its multiplicities are those in the whole."""
-    found = search(lambda values: _reduced(block, *matrices(values)))
-    times = 1 if block is None or block.type is not Type.REAL else block.dimension
+    if block is None:
+        return search(matrices)
+
+    def reduced(values: Array) -> tuple[Array, Array]:
+        whole, errors = matrices(values)
+        return block.reduced(whole), block.reduced_error(whole, errors) if errors.ndim == 3 else errors
+
+    found, times = search(reduced), block.repeats
     crossings = tuple(
         replace(each, multiplicity=times * each.multiplicity, change=times * each.change) for each in found.crossings
     )
     return replace(found, crossings=crossings)
 
 
-def _reduced(block: Block | None, matrices: Array, errors: Array) -> tuple[Array, Array]:
-    if block is not None and errors.ndim == 3:
-        real = block.type is Type.REAL
-        errors = block.reduced_error(matrices, errors) if real else np.abs(block.dual) @ errors @ np.abs(block.basis)
-    return in_block(block, matrices), errors
-
-
 def block_of(blocks: Blocks, matrix: Array, multiplier: complex) -> Block | None:
     """The block that a simple multiplier of a return map, shape (n, n), belongs to."""
-    away = [float(np.abs(np.linalg.eigvals(in_block(block, matrix[None])[0]) - multiplier).min()) for block in blocks]
+    reduced = [matrix if block is None else block.reduced(matrix) for block in blocks]
+    away = [float(np.abs(np.linalg.eigvals(each) - multiplier).min()) for each in reduced]
     return blocks[int(np.argmin(away))]

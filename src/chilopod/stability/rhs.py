@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.flows.arguments import check_symmetry, checked_duration
 from chilopod.flows.events import Event
 from chilopod.flows.rhs import TOLERANCE, Method, RightHandSide
-from chilopod.stability.capabilities import spatial_symmetries
-from chilopod.stability.system import PeriodicSystem
+from chilopod.stability.problem.capabilities import spatial_symmetries
+from chilopod.stability.problem.system import PeriodicSystem
 
 Array = NDArray[np.float64]
 

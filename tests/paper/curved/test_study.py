@@ -16,7 +16,7 @@ from chilopod.paper.section import Context, Size
 from chilopod.paper.table import OfPlanar, Row
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
-from chilopod.stability.returns import whole_period
+from chilopod.stability.problem.returns import whole_period
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import NONE, Disturbance, Trial, run
 

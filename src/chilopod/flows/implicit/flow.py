@@ -122,7 +122,7 @@ class ImplicitFlow(ReadOnlyArrays):
         return states
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
-        """See :class:`chilopod.stability.capabilities.FlowsFrames`."""
+        """See :class:`chilopod.stability.problem.capabilities.FlowsFrames`."""
         stretches = []
         for stages in (_OTHER_STAGES, _STAGES):
             end, stretch, turned = np.array(frame, order="C"), np.zeros(x.size), np.ones(x.size)

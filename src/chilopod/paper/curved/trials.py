@@ -26,7 +26,7 @@ from chilopod.paper.scatter import Array
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.stability.returns import whole_period
+from chilopod.stability.problem.returns import whole_period
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import AVERAGED, Disturbance, mean_joint_angles
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]

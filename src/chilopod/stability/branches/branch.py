@@ -25,10 +25,10 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
-from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import Family
-from chilopod.stability.orbits import Orbit
+from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum.errors import VERDICTS
 from chilopod.stability.tracing.ending import Ending

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import ReturnMap, Section
+from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.spectrum.errors import stable_within
 from chilopod.stability.tracing.step import Before
 

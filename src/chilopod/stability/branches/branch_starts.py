@@ -14,13 +14,13 @@ from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.budget import UserCode
-from chilopod.stability.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
-from chilopod.stability.orbits import bounded, find_orbit, known_state
+from chilopod.stability.orbits.orbit import bounded, find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import Section, returned_states, whole_period
-from chilopod.stability.scales import sizes
+from chilopod.stability.problem.budget import UserCode
+from chilopod.stability.problem.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
+from chilopod.stability.problem.returns import Section, returned_states, whole_period
+from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
 

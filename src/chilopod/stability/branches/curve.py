@@ -18,11 +18,11 @@ from chilopod.frozen import read_only
 from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.family_returns import FamilyReturns
-from chilopod.stability.budget import SpentError, UserCode
-from chilopod.stability.capabilities import Family, is_autonomous, returns_per_period
 from chilopod.stability.floquet import full_period
-from chilopod.stability.returns import ReturnMap, Section, return_duration, section_at
-from chilopod.stability.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
+from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
+from chilopod.stability.problem.budget import SpentError, UserCode
+from chilopod.stability.problem.capabilities import Family, is_autonomous, returns_per_period
+from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.budget import Budget, UserCode
-from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, returns_per_period
-from chilopod.stability.returns import (
+from chilopod.stability.problem.budget import Budget, UserCode
+from chilopod.stability.problem.capabilities import Family, FlowsEach, SystemLike, returns_per_period
+from chilopod.stability.problem.returns import (
     CUTS,
     ReturnMap,
     Section,
@@ -36,7 +36,7 @@ class FamilyReturns:
     """Return maps of the systems of a family, with the scale of the parameter and the sizes of the states along a curve
     (None: their own units), of orbits that take a number of periods, or have the systems' symmetry in time.
 
-    Where systems flow each (see :class:`chilopod.stability.capabilities.FlowsEach`), the derivative with respect to the
+    Where systems flow each (see :class:`chilopod.stability.FlowsEach`), the derivative with respect to the
     parameter costs next to nothing on two cores. The family is asked for values of an interval at most.
     """
 

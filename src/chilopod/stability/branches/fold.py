@@ -11,9 +11,9 @@ from chilopod.errors import ChilopodError
 from chilopod.stability.branches.branch import Branch, follow, proceed
 from chilopod.stability.branches.branch_points import BranchPoint
 from chilopod.stability.branches.branch_starts import begin
-from chilopod.stability.capabilities import Family, returns_per_period
 from chilopod.stability.points import Kind
-from chilopod.stability.returns import ReturnMap, return_map, section_at
+from chilopod.stability.problem.capabilities import Family, returns_per_period
+from chilopod.stability.problem.returns import ReturnMap, return_map, section_at
 from chilopod.stability.tracing.ending import Ending
 
 Array = NDArray[np.float64]

@@ -23,9 +23,9 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, special_point
 from chilopod.stability.branches.within import Within
-from chilopod.stability.capabilities import flows_with_error
 from chilopod.stability.orbit_blocks import block_of, crossings_in
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.problem.capabilities import flows_with_error
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step

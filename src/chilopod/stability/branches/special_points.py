@@ -15,9 +15,9 @@ from chilopod.stability.crossing_points.description import described
 from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, past_singular, place_error
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
-from chilopod.stability.orbits import Orbit, bounded, find_orbit
+from chilopod.stability.orbits.orbit import Orbit, bounded, find_orbit
 from chilopod.stability.points import Kind
-from chilopod.stability.returns import ReturnMap, returned_states
+from chilopod.stability.problem.returns import ReturnMap, returned_states
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.unit_circle.critical import Crossing

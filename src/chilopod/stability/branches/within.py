@@ -11,7 +11,7 @@ from chilopod.errors import AnalysisError
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.orbit_blocks import Blocks, orbit_blocks
-from chilopod.stability.orbits import Orbit
+from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.tracing.equations import Plane
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.tracing.tolerances import AWAY

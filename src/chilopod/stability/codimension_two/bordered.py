@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.budget import Budget, UserCode
-from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
-from chilopod.stability.orbits import from_known, known_state
-from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
-from chilopod.stability.scales import sizes
+from chilopod.stability.orbits.orbit import from_known, known_state
+from chilopod.stability.problem.budget import Budget, UserCode
+from chilopod.stability.problem.capabilities import KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
 from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step

@@ -24,7 +24,7 @@ from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Retur
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.normal_forms.quintic import Quintic, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
-from chilopod.stability.returns import returned_states
+from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import Spectrum, spectrum
 from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.step import Step

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.stability.budget import Budget, SpentError
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, across, critical
@@ -23,6 +22,7 @@ from chilopod.stability.codimension_two.two_parameters import BUDGET, checked_bo
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
 from chilopod.stability.normal_forms.quintic import Quintic
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.budget import Budget, SpentError
 
 Array = NDArray[np.float64]
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.stability.budget import Budget
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, Station
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import return_duration, whole_period
-from chilopod.stability.scales import sizes
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.returns import return_duration, whole_period
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.tracing.step import Step

@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.capabilities import SystemLike, is_autonomous
 from chilopod.stability.crossing_points.place import critical_multipliers
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm
-from chilopod.stability.orbits import Orbit
+from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import (
     WITHOUT_CRITICALITY,
     BifurcationPoint,
@@ -21,6 +20,7 @@ from chilopod.stability.points import (
     kind_at_plus_one,
     with_coefficients,
 )
+from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
 from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.orbits import Orbit
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.orbits.orbit import Orbit
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum import errors
 from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers, spectrum
 from chilopod.stability.unit_circle.critical import Crossing

@@ -8,9 +8,9 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.branches.fold import Fold, find_fold
-from chilopod.stability.capabilities import SystemLike
 from chilopod.stability.crossing_points.place import Sample
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.problem.capabilities import SystemLike
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.samples import FIRST_STEPS, NEAR_FOLD, Samples
 
 _BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for

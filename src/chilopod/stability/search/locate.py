@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.balance import numerical_balance
 from chilopod.stability.branches.fold import Fold
-from chilopod.stability.capabilities import Family
 from chilopod.stability.crossing_points.description import Formed, described
 from chilopod.stability.crossing_points.place import Course, past_singular, place_error
 from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
-from chilopod.stability.orbits import Orbit, bounded, from_known
+from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import ReturnMap, returned_states
-from chilopod.stability.scales import sizes
+from chilopod.stability.problem.capabilities import Family
+from chilopod.stability.problem.returns import ReturnMap, returned_states
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.shown import bounded as bounded_text

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, overload
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.branches.fold import Fold
-from chilopod.stability.budget import UserCode
 from chilopod.stability.points import BifurcationPoint
+from chilopod.stability.problem.budget import UserCode
 from chilopod.stability.search.extent import extent
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said

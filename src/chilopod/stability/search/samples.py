@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError, in_words
-from chilopod.stability.budget import Budget, SpentError, UserCode, UserError
-from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.crossing_points.place import Sample, through
-from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
-from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
-from chilopod.stability.scales import sizes
+from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.problem.budget import Budget, SpentError, UserCode, UserError
+from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
+from chilopod.stability.problem.returns import ReturnMap, return_map, return_maps, section_at
+from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -328,12 +328,13 @@ class Samples:
             last, guess = path[-1], self._foreseen(path[: -_BEHIND - 1 : -1], target)
             try:
                 found = self._sampled(target, guess, last)
+                # A large jump means that Newton's method has found another orbit.
+                other = self.jumped(found.orbit, guess) or not self._connected(last, guess, found)
             except SpentError:
                 break
             except AnalysisError:
-                found = None
-            # A large jump means that Newton's method has found another orbit.
-            if found is None or self.jumped(found.orbit, guess) or not self._connected(last, guess, found):
+                other = True
+            if other:
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
                     break

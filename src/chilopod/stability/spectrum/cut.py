@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
-from chilopod.stability.capabilities import SystemLike, is_autonomous
-from chilopod.stability.returns import ReturnMap, flow_with_error
-from chilopod.stability.scales import sizes
+from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
+from chilopod.stability.problem.returns import ReturnMap, flow_with_error
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.spectrum.eigenvalues import normal_basis
 
 Array = NDArray[np.float64]

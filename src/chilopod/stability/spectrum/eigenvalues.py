@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
 
 Array = NDArray[np.float64]

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.implicit.flow import Stretched
-from chilopod.stability.capabilities import FlowsFrames, SystemLike, is_autonomous
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.problem.capabilities import FlowsFrames, SystemLike, is_autonomous
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.cut import Cut, equal_cut, section_basis, turn_in_units
 from chilopod.stability.spectrum.errors import SAFETY, disturbed
 from chilopod.stability.spectrum.splitting import intersection, split_leading

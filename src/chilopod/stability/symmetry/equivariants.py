@@ -15,23 +15,16 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
-from chilopod.stability.symmetry.group_closure import Images
+from chilopod.stability.symmetry.groups import Images
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 
-_ALIGNED = 1e-9
-"""Below one by less than this, a cosine is one: an angle of 4e-5 (two elements differ by 6e-4 or more)."""
-
-_NULL = 1e-8
-"""Eigenvalues of elements that differ by less are one; 1 - cos(2 pi / 10 000) is 2e-7."""
-
-_MOST_SPACES = 500
-"""Fixed-point spaces looked at, conjugate ones counted once."""
-
-_MOST_ENTRIES = 2**23
-"""Numbers in the projectors to the fixed-point spaces of single elements: 128 MiB."""
+_ALIGNED = 1e-9  # below one by less than this, a cosine is one: an angle of 4e-5 (two elements differ by 6e-4 or more)
+_NULL = 1e-8  # eigenvalues of elements that differ by less are one; 1 - cos(2 pi / 10 000) is 2e-7
+_MOST_SPACES = 500  # fixed-point spaces looked at, conjugate ones counted once
+_MOST_ENTRIES = 2**23  # numbers in the projectors to the fixed-point spaces of single elements: 64 MiB
 
 
 class SymmetricKind(Labelled):
@@ -112,23 +105,13 @@ class SymmetricCrossing:
 
 
 def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> SymmetricCrossing:
-    """Crossing of the unit circle by an eigenvalue of a block's reduced matrix, simple there.
-
-    Parameters
-    ----------
-    block
-        The block; :func:`chilopod.stability.symmetry.isotypic.isotypic` makes them.
-    critical
-        Event: the place of the circle where it crosses.
-    returns
-        Number of returns in a period. Where it is even, -1 breaks the symmetry in time: the new orbits have the same
-        period, not twice of it.
-    """
+    """Crossing of the unit circle by a simple eigenvalue of a block's reduced matrix. Where the number of returns in a
+    period is even, -1 breaks the symmetry in time: the new orbits have the same period, not twice of it."""
     # At -1 all is odd by the shift by one return.
     quadratic = _quadratics(block.representation) if critical is Event.PLUS else 0
     kind = _kind(block, critical, quadratic, returns)
-    if critical is Event.PAIR:
-        return SymmetricCrossing(kind, 0, (), True)
+    if critical is Event.PAIR or not block.real:  # of the complex type fixed-point spaces have even dimensions
+        return SymmetricCrossing(kind, quadratic, (), True)
     lines, complete = _fixed_lines(block.representation, critical)
     branches = [_branch(line, block, critical) for line in lines]
     branches.sort(key=lambda branch: (-branch.isotropy.size, branch.reversed))
@@ -161,27 +144,32 @@ def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
     Every fixed-point space is an intersection of those of single elements, at -1 with either sign.
     """
     rho = _once(rho)
-    spaces, complete = _eigenspaces(rho, critical)
-    projectors = np.array([space @ space.T for space in spaces])
+    most = _MOST_ENTRIES // rho.shape[1] ** 2
+    signed = np.concatenate([rho, -rho]) if critical is Event.MINUS else rho
+    # Eigenvectors of an orthogonal matrix to the eigenvalue 1 are those of its symmetric part.
+    cosines, vectors = np.linalg.eigh(0.5 * (signed + np.swapaxes(signed, 1, 2)))
+    projectors = _once((vectors * (cosines > 1.0 - _NULL)[:, None]) @ np.swapaxes(vectors, 1, 2))
+    complete, projectors = len(projectors) <= most, projectors[:most]
     seen = Images(rho.shape[1])
     lines: list[Array] = []
     waiting: list[Array] = []
 
-    def take(space: Array) -> None:
+    def take(projector: Array) -> None:
         """Note a space, unless it or a conjugate one was met before."""
-        projector = space @ space.T
-        if seen.number(projector @ seen.probes) is not None:
+        size = round(float(np.trace(projector)))
+        if size == 0 or seen.number(projector @ seen.probes) is not None:
             return
         for image in rho @ projector @ np.swapaxes(rho, 1, 2) @ seen.probes:
             if seen.number(image) is None:
                 seen.add(image)
-        if space.shape[1] == 1:
+        space = np.linalg.eigh(projector)[1][:, -size:]
+        if size == 1:
             lines.append(space[:, 0])
         else:
             waiting.append(space)
 
-    for space in spaces:
-        take(space)
+    for projector in projectors:
+        take(projector)
     for _ in range(_MOST_SPACES):
         if not waiting:
             break
@@ -192,7 +180,7 @@ def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
         for size in range(1, space.shape[1]):
             bases = space @ vectors[sizes == size][:, :, -size:]
             for common in _once(bases @ np.swapaxes(bases, 1, 2)):
-                take(np.linalg.eigh(common)[1][:, -size:])
+                take(common)
     return lines, complete and not waiting
 
 
@@ -204,27 +192,6 @@ def _once(matrices: Array) -> Array:
             images.add(image)
             first.append(number)
     return matrices[first]
-
-
-def _eigenspaces(rho: Array, critical: Event) -> tuple[list[Array], bool]:
-    """Orthonormal bases of the spaces on which single elements act as 1, at -1 also as -1, each once, and whether these
-    are all."""
-    d = rho.shape[1]
-    # Eigenvectors of an orthogonal matrix to the eigenvalue 1 are those of its symmetric part.
-    values, vectors = np.linalg.eigh(0.5 * (rho + np.swapaxes(rho, 1, 2)))
-    spaces = [np.eye(d)]
-    images = Images(d)
-    images.add(images.probes)
-    for cosines, columns in zip(values, vectors, strict=True):
-        for wanted in (1.0, -1.0) if critical is Event.MINUS else (1.0,):
-            space = columns[:, np.abs(cosines - wanted) < _NULL]
-            image = space @ space.T @ images.probes
-            if space.shape[1] and images.number(image) is None:
-                if len(spaces) * d * d > _MOST_ENTRIES:
-                    return spaces, False
-                images.add(image)
-                spaces.append(space)
-    return spaces, True
 
 
 def _branch(line: Array, block: Block, critical: Event) -> AxialBranch:

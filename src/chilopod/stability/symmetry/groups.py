@@ -8,35 +8,31 @@ Springer 1988, proposition XII.1.3).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.csgraph import connected_components
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
+from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays, read_only
-from chilopod.stability.symmetry.group_closure import SAME, factors, generating
-from chilopod.stability.symmetry.group_scales import coordinate_scales
 
 Array = NDArray[np.float64]
 
-LARGEST_ORDER = 10_000
-"""A group of more elements is refused."""
-
+_PROBES = 3  # vectors: one alone may by chance lie close to a mirror plane
+_SAME = 1e-7  # two elements of a cyclic group of ten thousand are 6e-4 apart; round-off of as many products is 1e-11
+_CELL = 8.0 * _SAME
+_LARGEST_ORDER = 10_000  # a group of more elements is refused
 _MOST_GENERATORS = 500
-
-_MOST_ENTRIES = 2**25
-"""Numbers in the matrices of all elements: 256 MiB."""
-
-_RETURNED = 1e-9
-"""So close to one are the diagonal entries of a power that is the identity; a rotation by 2 pi / 10 000 has 1 - 2e-7
-there."""
-
-_MIXED = 1e-11
-"""Coordinates are mixed by elements, of order one, with larger entries than this between them."""
-
+_MOST_ENTRIES = 2**25  # numbers in the matrices of all elements: 256 MiB
+_RETURNED = 1e-9  # of the identity's diagonal from that of a power; a rotation by 2 pi / 10 000 is 2e-7 away
+_MIXED = 1e-11  # coordinates are mixed by elements, of order one, with larger entries than this between them
+_CHANCE = 1e-12  # of what goes from one coordinate to another over a third one: a smaller entry is round-off
+_LEVELLED = 0.125  # exponent that makes a weight of 1e-17 one of 0.7 %
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 
 
@@ -46,19 +42,16 @@ class Group(ReadOnlyArrays):
 
     Attributes
     ----------
-    generators
-        Elements whose products are the group, those given that are needed, shape (generators, n, n).
-    elements
-        All elements, the identity first, shape (order, n, n).
+    generators, elements
+        Elements whose products are the group, and all of them, the identity first, shape (any, n, n) both.
     to_orthogonal, from_orthogonal
         Coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both.
     scales
-        Scales of the coordinates x, as the elements tell them, shape (n,): entry (i, j) of an element is of the order
-        of ``scales[i] / scales[j]`` at most. Between coordinates that no element mixes they say nothing.
+        Scales of the coordinates x, shape (n,): entry (i, j) of an element is of the order of ``scales[i] / scales[j]``
+        at most. Between coordinates that no element mixes they say nothing.
     component
-        Number of the set of coordinates that each one belongs to, shape (n,): elements mix only coordinates of one set,
-        such as one kind of state over all cells of a ring. ``to_orthogonal`` does not mix the sets either, so that
-        their units do not matter to each other.
+        Number of the set of coordinates that each one belongs to, shape (n,), such as one kind of state over all cells
+        of a ring: neither elements nor ``to_orthogonal`` mix the sets, and their units do not matter to each other.
     """
 
     generators: Array
@@ -85,28 +78,17 @@ class Group(ReadOnlyArrays):
 
 
 def finite_group(generators: ArrayLike) -> Group:
-    """The group of all products of some matrices.
-
-    Parameters
-    ----------
-    generators
-        Real matrices, shape (n, n) each, such as the cyclic shift and the reversal of a ring, in any units.
-
-    Raises
-    ------
-    ParameterError
-        The generators are no finite square matrices of one shape, not invertible, or have more products than
-        ``LARGEST_ORDER``, or than fit into 256 MiB.
-    """
+    """The group of all products of some real matrices, shape (n, n) each, such as the cyclic shift and the reversal of
+    a ring, in any units; a ParameterError if they have too many of them, or are no such matrices."""
     given = _checked(generators)
     n = given.shape[1]
-    most = max(1, min(LARGEST_ORDER, _MOST_ENTRIES // n**2))
+    most = max(1, min(_LARGEST_ORDER, _MOST_ENTRIES // n**2))
     returns = [_powers(matrix, most) for matrix in given]
-    scales = coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
+    scales = _coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
     for matrix, (_, residual) in zip(given, returns, strict=True):
-        if np.abs(_scaled(residual, scales)).max() > SAME:
+        if np.abs(_scaled(residual, scales)).max() > _SAME:
             raise _infinite(matrix, most)
-    found = factors(_scaled(given, scales), most)
+    found = _factors(_scaled(given, scales), most)
     if found is None:
         raise ParameterError(
             "generate an infinite group, or too large a one",
@@ -118,82 +100,62 @@ def finite_group(generators: ArrayLike) -> Group:
     elements[0] = np.eye(n)
     for i in range(1, len(by)):
         elements[i] = given[by[i]] @ elements[of[i]]
-    needed = np.unique(by[1:]) if len(by) > 1 else by
-    return _with_metric(given[needed], elements, scales)
+    return _with_metric(given[_needed(by)], elements, scales)
 
 
-def isotropy(group: Group, x: ArrayLike, error: ArrayLike = 0.0) -> Group:
-    """The isotropy subgroup of a state: all P of a group with P x = x.
+def _needed(by: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Numbers of the generators that a group is made by; of the identity alone one."""
+    return np.unique(by[1:]) if len(by) > 1 else by
 
-    Parameters
-    ----------
-    group
-        The symmetries of the system.
-    x
-        State on the orbit, shape (n,). With symmetries that hold at every instant one state decides: by uniqueness of
-        the flow its whole orbit is invariant.
-    error
-        Bound on the absolute error of x, one for all or shape (n,). A coordinate that is zero but for the error of a
-        computation needs it.
+
+def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
+    """The isotropy subgroup of a state, shape (n,), known to a bound on its error: all P of a group with P x = x.
+
+    With symmetries that hold at every instant one state decides: by uniqueness of the flow its whole orbit is
+    invariant.
     """
-    state = finite_array(x, (group.dimension,), "x")
-    bound = _bound(error, (group.dimension,))
-    moved = np.abs(group.elements @ state - state)
-    allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (bound + SAME * np.abs(state))
-    return _subgroup(group, np.all(moved <= allowed, axis=1), "x")
+    moved = np.abs(group.elements @ x - x)
+    allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (error + _SAME * np.abs(x))
+    return _subgroup(group, np.all(moved <= allowed, axis=1), "orbit")
 
 
-def centraliser(group: Group, gamma: ArrayLike) -> Group:
-    """The subgroup of all P that commute with a matrix: what blocks of a return map gamma ∘ flow(T/k) are made from.
+def centraliser(group: Group, gamma: Array) -> Group:
+    """The subgroup of all P that commute with the spatial part of a symmetry in space and time, gamma f(t, x) =
+    f(t + T/k, gamma x): what blocks of a return map M = gamma Phi are made from.
 
-    Where the whole group leaves an orbit invariant, the derivative M = gamma Phi of that map has P M = M P exactly if
-    P gamma = gamma P, because P commutes with the derivative Phi of the flow.
+    Where the whole group leaves an orbit invariant, P commutes with the derivative Phi of the flow, and with M exactly
+    if it does with gamma.
 
-    Parameters
-    ----------
-    group
-        The spatial symmetries of the orbit.
-    gamma
-        Spatial part of a symmetry in space and time, gamma f(t, x) = f(t + T/k, gamma x), shape (n, n); it must
-        normalise the group, that is, gamma P gamma^-1 is an element wherever P is one.
+    It must normalise the group: gamma P gamma^-1 is an element wherever P is one.
     """
-    n = group.dimension
-    matrix = _scaled(finite_array(gamma, (n, n), "gamma"), group.scales)
+    matrix = _scaled(gamma, group.scales)
     own = _scaled(group.elements, group.scales)
     left, right = matrix @ own, own @ matrix
     size = np.abs(matrix).max()
-    if size == 0.0 or np.linalg.matrix_rank(matrix) < n:
-        raise ParameterError("is not invertible", field="gamma")
+    if size == 0.0 or np.linalg.matrix_rank(matrix) < group.dimension:
+        raise ParameterError("is not invertible", field="symmetry")
     for image in matrix @ _scaled(group.generators, group.scales):  # which is P gamma for some element P
-        if not np.abs(right - image).max(axis=(1, 2)).min() <= SAME * size:
+        if not np.abs(right - image).max(axis=(1, 2)).min() <= _SAME * size:
             raise ParameterError(
-                "does not normalise the group", field="gamma", allowed="gamma P gamma^-1 in the group for every P of it"
+                "does not normalise the group of the spatial symmetries",
+                field="symmetry",
+                allowed="S P S^-1 in the group for every P of it",
             )
-    return _subgroup(group, np.all(np.abs(left - right) <= SAME * size, axis=(1, 2)), "gamma")
+    return _subgroup(group, np.all(np.abs(left - right) <= _SAME * size, axis=(1, 2)), "symmetry")
 
 
-def commutes(group: Group, matrix: ArrayLike, error: ArrayLike = 0.0) -> float:
-    """How far a matrix is from commuting with a group, in units of what its error explains: at most 1 if it does.
-
-    Parameters
-    ----------
-    group
-        The symmetries.
-    matrix
-        Derivative M of a return map, shape (n, n).
-    error
-        Bound on the absolute error of the entries of M, one for all or shape (n, n); round-off is added to it.
-    """
+def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
+    """How far the derivative of a return map is from commuting with a group, in units of what a bound on the error of
+    its entries and round-off explain: at most 1 if it does."""
     n = group.dimension
-    m = finite_array(matrix, (n, n), "matrix")
     sizes = group.scales[:, None] / group.scales
     pairs = group.component[:, None], group.component[None, :]
     largest = np.full((n, n), np.finfo(float).tiny)
-    np.maximum.at(largest, pairs, np.abs(m / sizes))
-    bound = _bound(error, (n, n)) + _ROUND_OFF * n * largest[pairs] * sizes
+    np.maximum.at(largest, pairs, np.abs(matrix / sizes))
+    bound = error + _ROUND_OFF * n * largest[pairs] * sizes
     p = group.generators
     explained = np.abs(p) @ bound + bound @ np.abs(p)
-    return float((np.abs(p @ m - m @ p) / explained).max())
+    return float((np.abs(p @ matrix - matrix @ p) / explained).max())
 
 
 def _checked(generators: ArrayLike) -> Array:
@@ -230,6 +192,24 @@ def _powers(matrix: Array, most: int) -> tuple[Array, Array]:
     raise _infinite(matrix, most)
 
 
+def _coordinate_scales(envelope: Array) -> Array:
+    """Scales s, shape (n,), such that the entries of a group, divided by s_i / s_j, are of order one.
+
+    A symmetry in a user's units is S P S^-1 with P well scaled and S diagonal. With P orthogonal, the inverse of one of
+    its powers is its transpose and another power, so that s_i / s_j is the root of the ratio of the entries (i, j) and
+    (j, i) of the envelope: by least squares of the logarithms, where round-off weighs little but tells about the units
+    of coordinates that nothing else connects. Coordinates that act on others but not the other way round (positions
+    relative to a first one) are balanced afterwards.
+    """
+    envelope = np.where(envelope < _CHANCE * (envelope @ envelope), 0.0, envelope)
+    weights = (np.sqrt(envelope) * np.sqrt(envelope.T)) ** _LEVELLED
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.where(weights > 0.0, 0.5 * np.log(envelope / envelope.T), 0.0)
+    laplacian = np.diag(weights.sum(axis=1)) - weights
+    scales = np.exp(np.linalg.lstsq(laplacian, (weights * ratios).sum(axis=1), rcond=None)[0])
+    return np.asarray(scales * numerical_balance(_scaled(envelope, scales)))
+
+
 def _infinite(matrix: Array, most: int) -> ParameterError:
     if np.linalg.slogdet(matrix)[1] < -1.0:  # ±1 in a finite group
         return ParameterError("is not invertible, or shrinks volumes", field="generators", allowed="determinant ±1")
@@ -244,33 +224,21 @@ def _scaled(matrices: Array, scales: Array) -> Array:
     return np.asarray(matrices * (scales / scales[:, None]))
 
 
-def _bound(error: ArrayLike, shape: tuple[int, ...]) -> Array:
-    try:
-        bound = np.broadcast_to(np.asarray(error, dtype=np.float64), shape)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            "must be a number, or one for each", field="error", value=error, allowed=str(shape)
-        ) from None
-    if not (bound >= 0.0).all():
-        raise ParameterError("must not be negative", field="error", value=error)
-    return bound
-
-
 def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
     chosen = np.flatnonzero(members)
-    generators = generating(_scaled(group.elements, group.scales), chosen)
-    if generators is None:
+    found = _factors(_scaled(group.elements[chosen], group.scales), len(chosen))
+    if found is None:
         raise AnalysisError(
             "is kept by elements that form no group: its error is at the edge of what tells them apart", field=field
         )
-    return _with_metric(group.elements[generators], group.elements[chosen], group.scales)
+    return _with_metric(group.elements[chosen[_needed(found[0])]], group.elements[chosen], group.scales)
 
 
 def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
     n = elements.shape[1]
     # In scaled coordinates: in those of the user the entries may differ by more than double precision has.
     scaled = _scaled(elements, scales)
-    component = _components(np.abs(scaled).max(axis=0) > _MIXED)
+    component = connected_components(np.abs(scaled).max(axis=0) > _MIXED)[1]
     stacked = scaled.reshape(-1, n)
     metric = np.where(component[:, None] == component, stacked.T @ stacked / len(elements), 0.0)
     try:
@@ -284,19 +252,61 @@ def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
         ) from None
     group = Group(generators, elements, root / scales, scales[:, None] * inverse, scales, component)
     q = group.orthogonal
-    if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < SAME:
+    if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < _SAME:
         raise AnalysisError(
             "are no exact symmetries, or too oblique", field="generators", allowed="matrices exact to 1e-9 or better"
         )
     return group
 
 
-def _components(linked: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Numbers of the connected sets, shape (n,), of links shape (n, n)."""
-    linked = linked | linked.T
-    number = np.arange(len(linked))
-    while True:  # ends: numbers only fall
-        lowest = np.where(linked, number, len(linked)).min(axis=1)
-        if (lowest == number).all():
-            return np.asarray(np.unique(number, return_inverse=True)[1])
-        number = lowest[lowest]
+class Images:
+    """Images of the probes, each with the number of its element."""
+
+    def __init__(self, dimension: int) -> None:
+        random = np.random.default_rng(0)
+        self.probes: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES))
+        self._weights: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES)) / dimension
+        self.all: list[Array] = []
+        self._cells: dict[int, list[int]] = {}
+
+    def add(self, image: Array) -> None:
+        """Give an image the next number."""
+        self._cells.setdefault(self._cell(image), []).append(len(self.all))
+        self.all.append(image)
+
+    def number(self, image: Array) -> int | None:
+        """Number of an image, shape (n, probes), None if it is not there."""
+        cell = self._cell(image)
+        for near in (cell, cell - 1, cell + 1):
+            for number in self._cells.get(near, ()):
+                if np.abs(self.all[number] - image).max() < _SAME:
+                    return number
+        return None
+
+    def _cell(self, image: Array) -> int:
+        return math.floor(float(np.vdot(self._weights, image)) / _CELL)
+
+
+def _factors(generators: Array, largest: int) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Every element as a generator, with entries of order one, times an earlier element: their numbers, shape (order,)
+    both, without meaning for the identity, which comes first; None if there are more than ``largest`` elements."""
+    images, by, of = Images(generators.shape[1]), [0], [0]
+    images.add(images.probes)
+    needed: list[int] = []
+    for new, image in enumerate(generators @ images.probes):
+        if images.number(image) is not None:
+            continue
+        needed.append(new)  # and the order at least doubles
+        images, by, of = Images(generators.shape[1]), [0], [0]
+        images.add(images.probes)
+        done = 0
+        while done < len(images.all):
+            for number, product in zip(needed, generators[needed] @ images.all[done], strict=True):
+                if images.number(product) is None:
+                    if len(images.all) == largest:
+                        return None
+                    images.add(product)
+                    by.append(number)
+                    of.append(done)
+            done += 1
+    return np.array(by), np.array(of)

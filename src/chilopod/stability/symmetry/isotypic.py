@@ -2,17 +2,15 @@
 representation.
 
 Without tables of characters: the eigenspaces of a generic symmetric matrix that commutes with the group are irreducible
-(a mean over the group of a random one is generic); characters tell which of them are equivalent and of which type
-(quaternionic ones are refused), and
-means of random matrices between two of them, the intertwiners, align their bases. Golubitsky, Stewart & Schaeffer,
-Singularities and Groups in Bifurcation Theory II, Springer 1988, sections XII.2 and XII.3; the types: Serre, Linear
-Representations of Finite Groups, Springer 1977, section 13.2.
+(a mean over the group of a random one is generic). Characters tell which of them are equivalent and of which type
+(Serre, Linear Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections made from one of
+them give all its copies (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer
+1988, sections XII.2 and XII.3).
 """
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,22 +23,9 @@ from chilopod.stability.symmetry.groups import Group
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_TRIES = 8
-"""Random matrices: one in millions is not generic."""
-
-_DISTINCT = 1e-7
-"""Eigenvalues of a random matrix of norm one that lie closer together are one."""
-
-_EXACT = 1e-6
-"""Entries of orthogonal matrices that are told apart from zero, and numbers from whole numbers; the elements are exact
-to about 1e-12."""
-
-
-class Type(enum.Enum):
-    """Type of an irreducible real representation: it commutes with real or complex numbers."""
-
-    REAL = "real"
-    COMPLEX = "complex"
+_TRIES = 8  # random matrices: one in millions is not generic
+_DISTINCT = 1e-7  # eigenvalues of a random matrix of norm one that lie closer together are one
+_EXACT = 1e-6  # entries of orthogonal matrices and numbers are told apart from 0 and from whole numbers
 
 
 @dataclass(frozen=True)
@@ -49,28 +34,25 @@ class Block(ReadOnlyArrays):
 
     Attributes
     ----------
-    type
-        Real or complex.
+    real
+        True for the real type, whose representation commutes with multiples of the identity only; False for the complex
+        type, such as of the turns of a plane.
     basis
-        Symmetry-adapted basis B, one copy after the other, in all of them the same matrices: P B = B (I_m ⊗ rho(P)),
-        shape (n, m d).
+        Symmetry-adapted basis B, shape (n, m d). Of the real type it has one copy after the other, in all of them the
+        same matrices: P B = B (I_m ⊗ rho(P)).
     dual
         Its left inverse, zero on the other blocks, shape (m d, n).
     representation
         rho(P) of each element, orthogonal matrices, shape (order, d, d).
-    units
-        Basis of what commutes with rho: the identity, and with the complex type a matrix J with J^2 = -1; shape
-        (1, d, d) or (2, d, d).
     kernel
         Elements that act as the identity, truth values of shape (order,): new orbits keep these symmetries whatever
         else they break.
     """
 
-    type: Type
+    real: bool
     basis: Array
     dual: Array
     representation: Array
-    units: Array
     kernel: NDArray[np.bool_]
 
     @property
@@ -88,56 +70,36 @@ class Block(ReadOnlyArrays):
         """True if every element acts as the identity: what happens in this block breaks no symmetry."""
         return bool(self.kernel.all())
 
-    def reduced(self, matrices: ArrayLike) -> Array | ComplexArray:
-        """Reduced form of matrices that commute with the group.
+    @property
+    def repeats(self) -> int:
+        """How many eigenvalues of a matrix an eigenvalue of its reduced form stands for."""
+        return self.dimension if self.real else 1
 
-        Parameters
-        ----------
-        matrices
-            M, shape (..., n, n).
+    def reduced(self, matrices: ArrayLike) -> Array:
+        """Reduced form of matrices M, shape (..., n, n), that commute with the group.
 
-        Returns
-        -------
-        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d. Complex type: A + i B, of the same shape, with
-        dual @ M @ basis = A ⊗ 1 + B ⊗ J. Of a matrix that does not commute, the mean of P M P^-1 over the group is
-        taken.
+        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; of a matrix that does not commute, the mean of
+        P M P^-1 over the group is taken. Complex type: dual @ M @ basis, shape (..., m d, m d).
         """
-        given = np.asarray(matrices, dtype=np.float64)
-        m, d = self.multiplicity, self.dimension
-        full = (self.dual @ given @ self.basis).reshape(*given.shape[:-2], m, d, m, d)
-        parts = np.einsum("...iajb,uab->u...ij", full, self.units) / d
-        return np.asarray(parts[0] if self.type is Type.REAL else parts[0] + 1j * parts[1])
+        return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
-        """Bound on the absolute error of the entries of the reduced matrices.
+        """Bound on the absolute error of the reduced matrices, from one on the entries of the matrices (a number or of
+        their shape) and round-off."""
+        round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
+        entries = np.asarray(error, dtype=np.float64) + round_off
+        return self._diagonal(np.abs(self.dual) @ entries @ np.abs(self.basis))
 
-        Parameters
-        ----------
-        matrices
-            M, shape (..., n, n).
-        error
-            Bound on the absolute error of the entries of M: one for all, or anything that fits their shape.
-
-        Returns
-        -------
-        Shape of :meth:`reduced`: what ``error`` and the round-off of the reduction amount to.
-        """
-        given = np.asarray(matrices, dtype=np.float64)
-        m, d, n = self.multiplicity, self.dimension, self.basis.shape[0]
-        entries = np.asarray(error, dtype=np.float64) + 2.0 * n * np.finfo(float).eps * np.abs(given)
-        full = (np.abs(self.dual) @ entries @ np.abs(self.basis)).reshape(*given.shape[:-2], m, d, m, d)
-        return np.asarray(np.einsum("...iajb,uab->...ij", full, np.abs(self.units)) / d)
+    def _diagonal(self, full: Array) -> Array:
+        """Means over the diagonals of the parts between two copies, of the real type; else what is given."""
+        if not self.real:
+            return np.asarray(full)
+        m, d = self.multiplicity, self.dimension
+        return np.asarray(np.einsum("...iaja->...ij", full.reshape(*full.shape[:-2], m, d, m, d)) / d)
 
     def mode(self, eigenvector: ArrayLike, direction: ArrayLike) -> ComplexArray:
-        """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix.
-
-        Parameters
-        ----------
-        eigenvector
-            Eigenvector of the reduced matrix, shape (m,).
-        direction
-            For the real type any vector, for the complex type one with J w = i w, shape (d,).
-        """
+        """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix of real
+        type, shape (m,), and any vector, shape (d,)."""
         a, w = np.asarray(eigenvector, dtype=np.complex128), np.asarray(direction, dtype=np.complex128)
         return np.asarray(self.basis @ np.kron(a, w))
 
@@ -145,21 +107,14 @@ class Block(ReadOnlyArrays):
 def isotypic(group: Group) -> tuple[Block, ...]:
     """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel.
 
-    Raises
-    ------
-    AnalysisError
-        The matrices of the group are not exact enough to tell its representations apart, or one of these is of
-        quaternionic type.
+    An AnalysisError says that the matrices are not exact enough to tell its representations apart, or that one of these
+    is of quaternionic type.
     """
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
-        spaces = _irreducible(group, random)
-        if spaces is None:
-            continue
-        blocks = [_block(group, copies, kind, random) for copies, kind in spaces]
-        blocks.sort(key=_rank)
-        if _verified(group, blocks):
-            return tuple(blocks)
+        blocks = _blocks(group, random)
+        if blocks is not None:
+            return tuple(sorted(blocks, key=_rank))
     raise AnalysisError(
         "no symmetry-adapted basis found: the matrices are no exact symmetries",
         field="group",
@@ -167,61 +122,72 @@ def isotypic(group: Group) -> tuple[Block, ...]:
     )
 
 
-def _mean(left: Array, matrix: Array, right: Array) -> Array:
-    """Mean of L M R^T over all elements, as one product; shapes (order, p, p), (p, q) and (order, q, q)."""
-    order, p, q = len(left), matrix.shape[0], matrix.shape[1]
-    products = np.swapaxes(left @ matrix, 0, 1).reshape(p, order * q)
-    return np.asarray(products @ np.swapaxes(right, 0, 1).reshape(q, order * q).T / order)
-
-
-def _irreducible(group: Group, random: np.random.Generator) -> list[tuple[list[Array], Type]] | None:
-    """Orthonormal bases of irreducible spaces, equivalent ones together, with their types; None after bad luck."""
-    bases = [
-        basis
-        for number in range(group.component.max() + 1)
-        for basis in _invariant(group.orthogonal, np.flatnonzero(group.component == number), random)
-    ]
-    q = group.orthogonal
-    restricted = [basis.T @ q @ basis for basis in bases]
-    characters = np.array([np.trace(rho, axis1=1, axis2=2) for rho in restricted])
-    products = characters @ characters.T / group.order
-    groups: list[tuple[list[Array], Type]] = []
-    firsts: list[int] = []
-    for i, rho in enumerate(restricted):
-        of_squares = float(np.einsum("gab,gba->", rho, rho)) / group.order
-        kind = _type(float(products[i, i]), of_squares)
-        if kind is None:
+def _blocks(group: Group, random: np.random.Generator) -> list[Block] | None:
+    """The blocks of a group; None where a random matrix was not generic, or the group is not exact."""
+    q, n = group.orthogonal, group.dimension
+    sets = [np.flatnonzero(group.component == number) for number in range(group.component.max() + 1)]
+    blocks: list[Block] = []
+    characters: list[Array] = []
+    for space in (each for coordinates in sets for each in _irreducible(q, coordinates, random)):
+        rho = space.T @ q @ space
+        character = np.trace(rho, axis1=1, axis2=2)
+        if any(abs(character @ other) > 0.5 * group.order for other in characters):
+            continue
+        real = _is_real(rho, character)
+        if real is None:
             return None
-        for (copies, _), first in zip(groups, firsts, strict=True):
-            if products[i, first] > 0.5:
-                copies.append(bases[i])
-                break
-        else:
-            groups.append(([bases[i]], kind))
-            firsts.append(i)
-    return groups
+        characters.append(character)
+        d = space.shape[1]
+        # Real type: projection to the first coordinate of all copies, and from there to the others; else to all copies.
+        weights = rho[:, :, 0] if real else 0.5 * character[:, None]
+        transfers = d * np.tensordot(weights, q, (0, 0)) / group.order
+        firsts = np.hstack([_image(transfers[0], coordinates) for coordinates in sets])
+        basis = np.einsum("axy,yi->xia", transfers, firsts).reshape(n, -1)
+        copies = np.kron(np.eye(basis.shape[1] // d), rho) if real else basis.T @ q @ basis
+        if np.abs(q @ basis - basis @ copies).max() > _EXACT:
+            return None
+        kernel = np.abs(rho - np.eye(d)).max(axis=(1, 2)) < _EXACT
+        blocks.append(Block(real, group.from_orthogonal @ basis, basis.T @ group.to_orthogonal, rho, kernel))
+    whole = np.hstack([group.to_orthogonal @ block.basis for block in blocks])
+    return blocks if whole.shape == (n, n) and np.abs(whole.T @ whole - np.eye(n)).max() <= _EXACT else None
 
 
-def _invariant(q: Array, coordinates: NDArray[np.intp], random: np.random.Generator) -> list[Array]:
-    """Orthonormal bases, shape (n, d) each, of invariant subspaces of the space of some of the coordinates."""
+def _irreducible(q: Array, coordinates: NDArray[np.intp], random: np.random.Generator) -> Iterator[Array]:
+    """Orthonormal bases, shape (n, d) each, of irreducible subspaces of the space of some of the coordinates."""
     own = q[:, coordinates[:, None], coordinates]
     k = len(coordinates)
     matrix = random.standard_normal((k, k))
-    values, vectors = np.linalg.eigh(_symmetric(_mean(own, matrix + matrix.T, own)))
+    values, vectors = np.linalg.eigh(_mean(own, matrix + matrix.T))
     border = np.flatnonzero(np.diff(values) > _DISTINCT * np.abs(values).max()) + 1
     # Once more with eigenvalues that lie evenly: eigenvectors are as exact as their eigenvalues are far apart.
     levels = 1.0 + np.searchsorted(border, np.arange(k), side="right")
-    vectors = np.linalg.eigh(_symmetric(_mean(own, (vectors * levels) @ vectors.T, own)))[1]
     embedded = np.zeros((q.shape[1], k))
-    embedded[coordinates] = vectors
-    return np.split(embedded, border, axis=1)
+    embedded[coordinates] = np.linalg.eigh(_mean(own, (vectors * levels) @ vectors.T))[1]
+    yield from np.split(embedded, border, axis=1)
 
 
-def _type(square: float, of_squares: float) -> Type | None:
-    """Type of an irreducible representation by the means of chi(g)^2 and chi(g^2); None if it is reducible."""
-    known = {(1, 1): Type.REAL, (2, 0): Type.COMPLEX}
-    whole = round(square), round(of_squares)
-    if abs(square - whole[0]) > _EXACT or abs(of_squares - whole[1]) > _EXACT:
+def _mean(q: Array, matrix: Array) -> Array:
+    """Mean of Q M Q^T over all elements, symmetric as M, as one product."""
+    order, k = len(q), len(matrix)
+    products = np.swapaxes(q @ matrix, 0, 1).reshape(k, order * k)
+    mean = products @ np.swapaxes(q, 0, 1).reshape(k, order * k).T / order
+    return np.asarray(0.5 * (mean + mean.T))
+
+
+def _image(projector: Array, coordinates: NDArray[np.intp]) -> Array:
+    """Orthonormal basis, shape (n, any), of what a projector leaves of the space of some of the coordinates, which it
+    does not mix with others: these may have other units."""
+    values, vectors = np.linalg.eigh(projector[np.ix_(coordinates, coordinates)])
+    embedded = np.zeros((len(projector), int((values > 0.5).sum())))
+    embedded[coordinates] = vectors[:, values > 0.5]
+    return embedded
+
+
+def _is_real(rho: Array, character: Array) -> bool | None:
+    """True for the real type, by the means of chi(g)^2 and chi(g^2); None if the representation is reducible."""
+    means = np.array([character @ character, np.einsum("gab,gba->", rho, rho)]) / len(rho)
+    whole = tuple(np.round(means).astype(int))
+    if np.abs(means - whole).max() > _EXACT:
         return None
     if whole == (4, -2):
         raise AnalysisError(
@@ -229,70 +195,9 @@ def _type(square: float, of_squares: float) -> Type | None:
             field="group",
             allowed="those of real or complex type",
         )
-    return known.get(whole)
-
-
-def _block(group: Group, copies: list[Array], kind: Type, random: np.random.Generator) -> Block:
-    q = group.orthogonal
-    first = copies[0]
-    if first.shape[1] == 1:
-        first = first * np.sign(first[np.abs(first[:, 0]).argmax(), 0])
-    rho = np.asarray(first.T @ q @ first)
-    d = first.shape[1]
-    aligned = [first]
-    for other in copies[1:]:
-        intertwiner = _mean(other.T @ q @ other, random.standard_normal((d, d)), rho)
-        # By Schur's lemma a multiple of an orthogonal matrix.
-        left, _, right = np.linalg.svd(intertwiner)
-        aligned.append(other @ (left @ right))
-    basis = np.hstack(aligned)
-    return Block(
-        kind,
-        group.from_orthogonal @ basis,
-        basis.T @ group.to_orthogonal,
-        rho,
-        _units(rho, kind, random),
-        np.abs(rho - np.eye(d)).max(axis=(1, 2)) < _EXACT,
-    )
-
-
-def _units(rho: Array, kind: Type, random: np.random.Generator) -> Array:
-    identity = np.eye(rho.shape[1])
-    if kind is Type.REAL:
-        return identity[None]
-    matrix = random.standard_normal(identity.shape)
-    unit = _mean(rho, matrix - matrix.T, rho)
-    unit = 0.5 * (unit - unit.T)
-    unit *= np.sqrt(len(unit)) / np.linalg.norm(unit)
-    # Which of the two square roots of -1: the one with which the first element that tells them apart turns.
-    turns = np.einsum("gab,ab->g", rho, unit)
-    telling = turns[np.abs(turns) > _EXACT]
-    return np.array([identity, -unit if telling.size and telling[0] < 0.0 else unit])
+    return {(1, 1): True, (2, 0): False}.get(whole)
 
 
 def _rank(block: Block) -> tuple[bool, int, int, tuple[float, ...]]:
     characters = np.trace(block.representation, axis1=1, axis2=2)
     return not block.trivial, block.dimension, -int(block.kernel.sum()), tuple(-np.round(characters, 6))
-
-
-def _verified(group: Group, blocks: Sequence[Block]) -> bool:
-    """True if the bases are what they should be: together one basis, in which generators and commutants have their
-    forms."""
-    basis = np.hstack([group.to_orthogonal @ block.basis for block in blocks])
-    n = group.dimension
-    if basis.shape != (n, n) or np.abs(basis.T @ basis - np.eye(n)).max() > _EXACT:
-        return False
-    for block in blocks:
-        own = group.to_orthogonal @ block.basis
-        rho, m, d = block.representation, block.multiplicity, block.dimension
-        moved = (own.T @ group.orthogonal @ own).reshape(-1, m, d, m, d)
-        copies = np.einsum("ij,gab->giajb", np.eye(m), rho)
-        commuting = rho[:, None] @ block.units - block.units @ rho[:, None]
-        squares = block.units[1:] @ block.units[1:] + np.eye(d)
-        if max(np.abs(moved - copies).max(), np.abs(commuting).max(), np.abs(squares).max(initial=0.0)) > _EXACT:
-            return False
-    return True
-
-
-def _symmetric(matrix: Array) -> Array:
-    return np.asarray(0.5 * (matrix + matrix.T))

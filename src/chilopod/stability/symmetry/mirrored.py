@@ -7,7 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.groups import finite_group
 
 Array = NDArray[np.float64]
@@ -16,17 +16,8 @@ _LOOSE = 1e-6  # relative to the size of the states: how well a symmetry holds f
 
 
 def symmetric_states(system: SystemLike, state: Array, size: Array, near: float = _LOOSE) -> Array:
-    """Orthonormal basis, in units of the states' sizes, of the states with the spatial symmetries of one of them.
-
-    Parameters
-    ----------
-    system
-        The system, with its ``spatial_symmetry``.
-    state, size
-        The state and the sizes of the states, shape (n,).
-    near
-        Largest change by a symmetry that the state still has, in sizes.
-    """
+    """Orthonormal basis, in units of the states' sizes, shape (n,), of the states with the spatial symmetries of one of
+    them: of those that change it by no more than ``near``."""
     n = size.size
     conditions = [np.zeros((0, n))]
     generators = spatial_symmetries(system)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.budget import Budget
+from chilopod.stability.problem.budget import Budget
 from chilopod.stability.tracing import tolerances
 from chilopod.stability.tracing.step import A, Guess, S, Step
 

@@ -12,8 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays, in_one_line
-from chilopod.stability.budget import Budget, SpentError
-from chilopod.stability.capabilities import (
+from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
+from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
+from chilopod.stability.orbits.shooting import Nodes, shot
+from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.capabilities import (
     FlowsTangents,
     SystemLike,
     flows_tangents,
@@ -21,12 +24,10 @@ from chilopod.stability.capabilities import (
     is_autonomous,
     is_stiff,
     known_orbit,
+    returns_per_period,
     spatial_symmetries,
 )
-from chilopod.stability.convergence import RETURN
-from chilopod.stability.guesses import nearer_states
-from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
-from chilopod.stability.returns import (
+from chilopod.stability.problem.returns import (
     CUTS,
     REPEATED,
     ReturnMap,
@@ -37,27 +38,21 @@ from chilopod.stability.returns import (
     section_at,
     turned,
 )
-from chilopod.stability.scales import sizes
-from chilopod.stability.shooting import Nodes, nodes_of, shot
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 30
-_NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
 _RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
 _RETURNED = 1e-12  # of a known orbit: it is exact
-_SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
-_MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
+_SINGULAR = 1e-13  # singular values of H - 1 that count as zero, the largest being one
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
-_SHOOTING = 30  # return maps that multiple shooting is counted as
 _MOST_PARTS = 8  # of a return: a guess of the period may be so many times too long
 _CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that closes so nearly is solved for once more
-_FARTHEST = 10.0  # times as large as states so far a correction may be
-_FARTHER = 2.0  # times as large a state may count from one correction to the next
-_CHANCE = 1e-13  # of the sizes of the states: two computations of a stiff motion may agree by chance
+_COARSE = 1e-11  # of the sizes of the states: such an error is estimated by two computations too
+_CHANCE = 1e-13  # of the sizes of the states: two computations may agree by chance
 _SYMMETRIC = 1e-12  # of the sizes of the states: a symmetry that holds so closely is one of the orbit's
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 
@@ -101,13 +96,7 @@ class Orbit(Shown, ReadOnlyArrays):
 
 
 def known_state(system: SystemLike) -> Array:
-    """The state on its orbit that a system knows of itself.
-
-    Raises
-    ------
-    AnalysisError
-        If it knows none.
-    """
+    """The state on its orbit that a system knows of itself; an AnalysisError if it knows none."""
     orbit = known_orbit(system)
     if orbit is None:
         raise AnalysisError(
@@ -150,7 +139,7 @@ def find_orbit(
     settle
         True to let the motion settle where Newton's method fails: up to 330 returns, or 83 guessed periods.
     budget
-        Return maps that may be evaluated, which are taken from it: up to 30 for every start of Newton's method, and 100
+        Return maps that may be evaluated, which are taken from it: up to 60 for every start of Newton's method, and 100
         for letting the motion settle.
     shortest
         True to look for the shortest period, where no section tells how long a return takes.
@@ -164,38 +153,27 @@ def find_orbit(
         raise ParameterError("is no system", field="system", value=system, allowed="what `from_rhs` gives")
     if guess is None:
         return from_known(system, known_state(system), with_error, budget=budget)
-    whole = nodes_of(guess, system)
+    whole = whole_orbit(guess, system)
     if whole is not None:
-        x = whole.states[0]
-        across = section_at(system, x, duration=whole.duration)
-        if budget is not None:
-            budget.take(_SHOOTING)
-        whole = shot(lambda _: system, whole, _sizes_along(whole), across).nodes
-        x, section = whole.states[0], across and replace(across, duration=whole.duration)
-        return _newton(system, x, with_error, section, budget)
+        return _solved(system, whole, with_error, budget)
     x = finite_array(guess, (system.dimension,), "orbit")
     shortened = shortest and section is None
+    duration = return_duration(system) if section is None else section.duration
     try:
-        found = _newton(system, x, with_error, section, budget)
+        found = _solved(system, Nodes(x[None], duration), with_error, budget, section)
         return _shortest(system, found, with_error, budget) if shortened else found
+    except SpentError:
+        raise
     except AnalysisError as failed:
-        if not settle or isinstance(failed, SpentError):
+        if not settle:
             raise
         if budget is not None:
             budget.take(_SETTLING)
-        for nearer, after in nearer_states(system, x):
-            try:
-                found = _newton(system, nearer, with_error, after, budget)
+        for nearer, careful in nearer_orbits(system, x):
+            with contextlib.suppress(AnalysisError):
+                found = _solved(system, nearer, with_error, budget, careful=careful)
                 return _shortest(system, found, with_error, budget) if shortened else found
-            except AnalysisError:
-                continue
         raise failed
-
-
-def _sizes_along(nodes: Nodes) -> Array:
-    """Sizes of the states on a guessed orbit, shape (n,)."""
-    largest = np.abs(nodes.states).max(axis=0)
-    return np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
 
 
 def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
@@ -223,9 +201,8 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
     duration = orbit.period / orbit.image.returns
     while (parts := _parts(system, orbit.state, duration, sizes(system, orbit.state, duration))) > 1:
         duration /= parts
-        section = section_at(system, orbit.state, sizes(system, orbit.state, duration), duration)
         try:
-            orbit = _newton(system, orbit.state, with_error, section, budget)
+            orbit = _solved(system, Nodes(orbit.state[None], duration), with_error, budget)
         except AnalysisError:
             break
         duration = orbit.period / orbit.image.returns
@@ -258,14 +235,7 @@ def from_known(
     budget: Budget | None = None,
 ) -> Orbit:
     """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
-
-    Parameters
-    ----------
-    system, x, with_error, budget
-        As for :func:`find_orbit`.
-    image
-        The return map at ``x``, if it was computed already.
-    """
+    The return map there may have been computed already."""
     if is_autonomous(system):
         return find_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image
@@ -278,7 +248,7 @@ def from_known(
     if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
         return Orbit(x, image, np.zeros(x.size))
     if off <= _KNOWN:
-        return _newton(system, x, with_error, None, budget)
+        return _solved(system, Nodes(x[None], return_duration(system)), with_error, budget)
     raise AnalysisError(
         f"is no periodic orbit: one return later the state is {float(moved.max()):.1e} away",
         field="orbit",
@@ -290,67 +260,48 @@ def _relative(values: Array, size: Array) -> float:
     return float((np.abs(values) / size).max())
 
 
-def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | None, budget: Budget | None) -> Orbit:
-    size = sizes(system, x, return_duration(system) if section is None else section.duration)
-    section = section_at(system, x, size) if section is None else section
-    best = np.inf
-    if system.dimension >= LARGE and flows_tangents(system):
+def _solved(
+    system: SystemLike,
+    start: Nodes,
+    with_error: bool,
+    budget: Budget | None,
+    section: Section | None = None,
+    careful: bool = False,
+) -> Orbit:
+    """The orbit near some nodes, of which the first one stays on the section: by default across the motion there."""
+    x, duration = start.states[0], start.duration
+    size = sizes(system, x, duration)
+    section = section or section_at(system, x, size, duration)
+    if system.dimension >= LARGE and flows_tangents(system) and len(start.states) == 1:
         with contextlib.suppress(AnalysisError):
             closed, _ = closed_orbit(system, x, section, budget=budget)
-            x, best = closed.point, 0.0  # nothing is left to improve
-            section = section and replace(section, duration=closed.duration)
-    before, cutoff, reach, shared = x, _SINGULAR, size, _shared(system, x, size)
-    for rounds in range(_ROUNDS):
-        if budget is not None:
-            budget.take()
-        image = return_map(system, x, with_error=False, section=section)
-        size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
-        residual = image.state - x
-        off = _relative(residual, size)
-        if RETURN.met(off, best):
-            if image.velocity is not None and _relative(image.velocity * image.period / image.returns, size) <= _RESTS:
-                raise AnalysisError(
-                    "the motion rests in an equilibrium near the guess",
-                    field="orbit",
-                    allowed="a guess closer to an orbit",
-                )
-            x, image = _cleared(system, x, image, size, section)
-            return _found(system, x, image, with_error)
-        if rounds > 4 and off > 10.0 * best:
-            break
-        if off > best and best < RETURN.settled and cutoff == _SINGULAR:
-            # The last move followed round-off, along a family of orbits: without that direction it converges.
-            x, cutoff, best = before, _FAMILY, np.inf
-            continue
-        if off < best:  # or all is only getting larger
-            reach = np.minimum(size, _FARTHER * reach)
-        best, before = min(best, off), x
-        move = _solved(image.jacobian - np.eye(x.size), residual, size, cutoff, shared)
-        # Far outside the motion so far a flow may take any number of steps.
-        x = x - move / max(1.0, _relative(move, reach) / _FARTHEST)
-        if not np.isfinite(x).all():
-            break
-        if section is not None:
-            section = replace(section, duration=image.period / image.returns)
-    raise AnalysisError(
-        f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)",
-        field="orbit",
-        allowed="a guess closer to the orbit",
+            return _found(system, closed.point, closed.duration, size, with_error)
+    if len(start.states) > 1:  # which tell the sizes better than the first one
+        largest = np.abs(start.states).max(axis=0)
+        size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
+    found = shot(
+        lambda _: system, start, size, section, shared=_shared(system, x, size), budget=budget, careful=careful
     )
+    x, duration = found.nodes.states[0], found.nodes.duration
+    if with_error or is_autonomous(system):
+        return _found(system, x, duration, found.sizes, with_error)
+    count = returns_per_period(system)
+    image = ReturnMap(found.end, found.jacobian, np.nan, count, count * duration)
+    return Orbit(x, image, np.full(x.size, np.nan))
 
 
-def _cleared(
-    system: SystemLike, x: Array, image: ReturnMap, size: Array, section: Section | None
-) -> tuple[Array, ReturnMap]:
-    """An orbit with the states that are only just not zero at zero, if it is an orbit still: what is left of a guess
-    would pass for the size of the orbit."""
-    small = (x != 0.0) & (np.abs(x) <= _NOTHING * size)
-    if not small.any():
-        return x, image
-    cleared = np.where(small, 0.0, x)
-    there = return_map(system, cleared, with_error=False, section=section)
-    off = _relative(there.state - cleared, size)
-    return (cleared, there) if off <= max(RETURN.round_off, _relative(image.state - x, size)) else (x, image)
+def _found(system: SystemLike, x: Array, duration: float, size: Array, with_error: bool) -> Orbit:
+    """The orbit through a state that is on it, with the section across its own motion; ``size`` is of the states."""
+    if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
+        raise AnalysisError(
+            "the motion rests in an equilibrium near the guess",
+            field="orbit",
+            allowed="a guess closer to an orbit",
+        )
+    if with_error:
+        return _bounded(system, x, duration)
+    image = return_map(system, x, False, section_at(system, x, duration=duration))
+    return Orbit(x, image, np.full(x.size, np.nan))
 
 
 def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
@@ -364,59 +315,29 @@ def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
     return size[:, None] * basis if basis.shape[1] < x.size else None
 
 
-def _solved(matrix: Array, right: Array, size: Array, cutoff: float, shared: Array | None) -> Array:
-    """Solution of a linear system in units of the states' sizes, among the ``shared`` states if there are such; the
-    shortest where orbits come in families."""
-    scaled, right = matrix * size / size[:, None], right / size
-    if shared is not None:
-        basis, one = np.linalg.qr(shared / size[:, None])[0], np.ones(shared.shape[1])
-        return size * (basis @ _solved(basis.T @ scaled @ basis, basis.T @ right, one, cutoff, None))
-    if cutoff == _SINGULAR:
-        with contextlib.suppress(np.linalg.LinAlgError):
-            regular = np.linalg.solve(scaled, right)
-            if np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
-                return np.asarray(regular * size)
-    return np.asarray(np.linalg.lstsq(scaled, right, rcond=cutoff)[0] * size)
-
-
-def _found(system: SystemLike, x: Array, image: ReturnMap, with_error: bool) -> Orbit:
-    if with_error:
-        return bounded(system, x, image)
-    if is_autonomous(system):
-        image = return_map(system, x, False, _across(system, x, image))
-    return Orbit(x, image, np.full(x.size, np.nan))
-
-
-def _across(system: SystemLike, x: Array, image: ReturnMap) -> Section | None:
-    duration = image.period / image.returns
-    return section_at(system, x, sizes(system, x, duration), duration) if is_autonomous(system) else None
-
-
 def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None = None) -> Orbit:
-    """The orbit through a state that is on it, with the section across its own motion and with error bounds.
+    """The orbit through a state that is on it, shape (n,), with the section across its motion and with error bounds;
+    ``image`` is the return map there or near, ``error`` a bound on that of the state, shape (n,), if it is known."""
+    return _bounded(system, x, image.period / image.returns, error)
 
-    Parameters
-    ----------
-    system, x
-        The system and the state, shape (n,).
-    image
-        The return map there, or near.
-    error
-        Bound on the error of the state, shape (n,), if it is known.
-    """
-    size = sizes(system, x, image.period / image.returns)
+
+def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None = None) -> Orbit:
+    size = sizes(system, x, duration)
     shared, given = _shared(system, x, size), x
     basis = np.eye(x.size) if shared is None else shared / size[:, None]
     x = size * (basis @ (basis.T @ (x / size))) if shared is not None else x
-    section = _across(system, x, image)
+    section = section_at(system, x, size, duration)
     image = return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
     if error is None:
-        # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
-        wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
-        duration = image.period / image.returns
-        if is_stiff(system, x, duration):  # its derivative may be nothing, and err by nothing
-            wrong += REPEATED * np.abs(_in_parts(system, x, duration) - image.state) + _CHANCE * size
+        # The state is as uncertain as the flow, of which the derivative's error tells, or where that is coarse two
+        # computations, times what H - 1 makes of it.
+        flow = _matrix(image.error, size) @ size
+        stiff = is_stiff(system, x, duration)  # the derivative may be nothing, and err by nothing
+        if stiff or (flow > _COARSE * size).any():
+            twice = REPEATED * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
+            flow = flow + twice if stiff else np.minimum(flow, twice)
+        wrong = np.abs(image.state - x) + flow
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count, finite_array, numbers
-from chilopod.stability.system import PeriodicSystem
+from chilopod.stability.problem.system import PeriodicSystem
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
-from chilopod.stability.capabilities import SystemLike, given_scale
+from chilopod.stability.problem.capabilities import SystemLike, given_scale
 
 Array = NDArray[np.float64]
 
@@ -16,24 +16,13 @@ _SWEEPS = 3
 
 
 def sizes(system: SystemLike, x: Array, duration: float) -> Array:
-    """Large size of every state, shape (n,): from the system, or from a state on the orbit and the flow there.
+    """Large size of every state, shape (n,): from the system, or from a state on the orbit and the flow over
+    a part of the return.
 
     A state has the size of its value, or of what the others, disturbed by their own sizes, make of it within a part of
     the return, whichever is larger: one that passes through zero just here, or rests there, is as large as its
     coupling makes it. (At the end of the return what is strongly damped would have forgotten the others.) So states in
     other units have sizes in these units. Of an orbit that is zero throughout, only the ratios mean anything.
-
-    Parameters
-    ----------
-    system, x
-        The system and a state at time 0, shape (n,).
-    duration
-        Duration of a return.
-
-    Raises
-    ------
-    AnalysisError
-        If the flow gives anything that is not finite.
     """
     given = given_scale(system)
     if given is not None:

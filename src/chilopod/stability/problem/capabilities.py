@@ -151,8 +151,7 @@ class FlowsTangents(SystemLike, Protocol):
 
 @runtime_checkable
 class FlowsEach(Protocol):
-    """Carries every state by a system of its own: a derivative with respect to a parameter then costs next to
-    nothing."""
+    """Carries every state by a system of its own: derivatives by a parameter then cost next to nothing."""
 
     def flow_each(self, systems: Sequence[Self], states: Array, t0: float, t1: float, /) -> Array:
         """States at t1, each carried by the system in its place, shape (systems, n) as at t0, without derivatives."""
@@ -161,8 +160,7 @@ class FlowsEach(Protocol):
 
 @runtime_checkable
 class FlowsMany(KnowsOrbit, Protocol):
-    """Computes the derivatives along the known orbits of many systems of its class at once: a sweep then uses all
-    cores."""
+    """Computes derivatives along the known orbits of many systems of its class at once, for sweeps."""
 
     def can_flow_with(self, other: Self, /) -> bool:
         """True if :meth:`flow_many` may take the other system along with this one."""

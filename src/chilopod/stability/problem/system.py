@@ -59,7 +59,7 @@ class PeriodicSystem(ReadOnlyArrays):
         About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
         nearer to a multiple of it.
     flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff, velocity_series
-        See :mod:`chilopod.stability.capabilities`.
+        See :mod:`chilopod.stability.problem.capabilities`.
     concurrent
         True if flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
     """

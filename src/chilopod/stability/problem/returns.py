@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import (
+from chilopod.stability.problem.capabilities import (
     Autonomous,
     FlowsMany,
     SystemLike,
@@ -28,7 +28,7 @@ from chilopod.stability.capabilities import (
     returns_per_period,
     spatial_symmetries,
 )
-from chilopod.stability.scales import sizes
+from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
 
@@ -124,23 +124,8 @@ def whole_period(system: SystemLike, periods: int = 1) -> SystemLike:
 def section_at(
     system: SystemLike, x: Array, scale: Array | None = None, duration: float | None = None
 ) -> Section | None:
-    """The section through a state across its motion; None where the period is known and there is no need of one.
-
-    Parameters
-    ----------
-    system, x
-        The system and a state, shape (n,).
-    scale
-        Sizes of the states, shape (n,): across means at right angles in these units. By default
-        :func:`chilopod.stability.scales.sizes`.
-    duration
-        Duration of a return; the system's own guess by default.
-
-    Raises
-    ------
-    AnalysisError
-        If the motion rests in this state.
-    """
+    """The section through a state, shape (n,), across its motion, at right angles in units of the states' sizes; None
+    where the period is known. By default a return takes as long as the system guesses."""
     if not is_autonomous(system):
         return None
     velocity = _velocity(system, x)
@@ -168,12 +153,9 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 
 def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float | Array]:
-    """The flow with an error bound; where the system gives none, one is estimated by taking the interval in parts.
-
-    A step-controlled integrator makes independent errors in the two computations, so a multiple of their difference is
-    a sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
-    its own.
-    """
+    """The flow with an error bound; where the system gives none, one is estimated by taking the interval in parts: a
+    step-controlled integrator makes independent errors in the two computations, and one of fixed steps should bring its
+    own bound."""
     if flows_with_error(system):
         return system.flow_with_error(x, t0, t1)
     state, derivative = system.flow(x, t0, t1)
@@ -192,6 +174,13 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     return state, derivative, (REPEATED * off + 1e-15 * largest) * units
 
 
+def checked_flow(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
+    """The flow and its derivative, of the right shapes."""
+    state, derivative = system.flow(np.array(x), t0, t1)  # a system may write into what it is given
+    _check_shapes(state, derivative, x.size)
+    return state, derivative
+
+
 def _check_shapes(state: Array, derivative: Array, n: int) -> None:
     if np.shape(state) != (n,) or np.shape(derivative) != (n, n):
         raise AnalysisError(
@@ -200,21 +189,10 @@ def _check_shapes(state: Array, derivative: Array, n: int) -> None:
 
 
 def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, section: Section | None = None) -> ReturnMap:
-    """Evaluate the return map H and its derivative at a state.
+    """The return map H and its derivative at a state, shape (n,), with a bound on the error if wanted, which may cost a
+    second computation.
 
-    Parameters
-    ----------
-    system, x
-        The system and a state at time 0, shape (n,).
-    with_error
-        True to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
-    section
-        Section on which a return ends, if the system does not depend on time; by default across the motion in ``x``.
-
-    Raises
-    ------
-    AnalysisError
-        If the flow gives anything that is not finite, or does not come back to the section.
+    Of a system that does not depend on time a return ends on the section: by default that across the motion in ``x``.
     """
     x = np.array(x, dtype=np.float64)  # a system may write into what it is given
     n = system.dimension
@@ -255,7 +233,7 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
     assert section is not None
     count = returns_per_period(system)
     turn = np.eye(x.size) if system.symmetry is None else system.symmetry
-    start, rest, first = _crossing(system, x, section, system.flow)
+    start, rest, first = crossing(system, x, section, system.flow)
     error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, start + rest)
@@ -275,19 +253,13 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
 
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:
-    """How long a motion takes from a state, shape (n,), to where it is back at the section.
-
-    Raises
-    ------
-    AnalysisError
-        If it does not come back.
-    """
+    """How long a motion takes from a state, shape (n,), to where it is back at the section."""
     nothing = np.broadcast_to(0.0, (x.size, x.size))
-    start, rest, _ = _crossing(system, x, section, lambda x, t0, t1: (carried(system, x[None], t0, t1)[0], nothing))
+    start, rest, _ = crossing(system, x, section, lambda x, t0, t1: (carried(system, x[None], t0, t1)[0], nothing))
     return start + rest
 
 
-def _crossing(
+def crossing(
     system: Autonomous, x: Array, section: Section, flow: Callable[[Array, float, float], tuple[Array, Array]]
 ) -> tuple[float, float, tuple[Array, Array]]:
     """When a motion is back at the section: a time shortly before, the rest of it, and the flow up to that time."""
@@ -341,15 +313,7 @@ def turned(system: SystemLike, states: Array) -> Array:
 
 
 def returned_states(system: SystemLike, states: Array, section: Section | None = None) -> Array:
-    """H of many states at once, shape (states, n).
-
-    Parameters
-    ----------
-    system, states
-        The system, and states at time 0, shape (states, n).
-    section
-        As for :func:`return_map`; must be given for a system that does not depend on time.
-    """
+    """H of many states at once, shape (states, n) both; with the section where the system does not depend on time."""
     states = np.array(states)  # a system may write into what it is given
     if section is None:
         return turned(system, carried(system, states, 0.0, return_duration(system)))
@@ -360,7 +324,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     result = np.empty_like(states)
     for i, rest in enumerate(rests):
         if rest is None:
-            _, rest, (state, _) = _crossing(system, states[i], section, system.flow)
+            _, rest, (state, _) = crossing(system, states[i], section, system.flow)
         else:
             state = before[i]
         result[i] = turned(system, carried(system, state[None], 0.0, rest))[0]

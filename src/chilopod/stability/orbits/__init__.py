@@ -1,0 +1,1 @@
+"""Periodic orbits as equations, and where their solution starts."""

@@ -1,0 +1,131 @@
+"""Guesses of periodic orbits: whole ones, and where Newton's method starts from once it has failed at a state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.arguments import finite_array
+from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
+from chilopod.stability.problem.capabilities import Autonomous, SystemLike, is_autonomous, returns_per_period
+from chilopod.stability.problem.returns import carried, checked_flow, return_duration, returned_states
+from chilopod.stability.problem.scales import sizes
+
+Array = NDArray[np.float64]
+
+_OF_GUESS = 16  # nodes of an orbit that was given
+_FEWEST_ROWS = 5
+_FEWEST_NODES = 3
+_SAME_PERIOD = 1e-6
+_ONWARD = 0.382  # of the guessed return, where a guess is of no use
+_LONGEST_SETTLING = 300  # returns
+_MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
+_COMES_BACK = 0.1  # of its size
+_STILL = 1e-3  # of how much the others move
+
+
+def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
+    """Nodes of a guess that is a whole orbit, in the forms that :func:`~chilopod.stability.find_orbit` takes; None for
+    one that is a single state."""
+    if hasattr(guess, "coords") and "time" in guess.coords:
+        guess = guess.coords["time"].values, guess.values
+    n, whole = system.dimension, return_duration(system) * returns_per_period(system)
+    if isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[1]) == 2:
+        states = finite_array(guess[1], (len(guess[1]), n), "orbit")
+        times = finite_array(guess[0], (len(states),), "orbit")
+    elif np.ndim(guess) == 2:
+        states = finite_array(guess, (np.shape(guess)[0], n), "orbit")
+        states = np.vstack([states, states[:1]])
+        times = np.linspace(0.0, whole, len(states))
+    else:
+        return None
+    if len(states) < _FEWEST_ROWS:
+        raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
+    if not (np.diff(times) > 0.0).all():
+        raise ParameterError("has times that do not rise", field="orbit")
+    lasts = float(times[-1] - times[0])
+    if not is_autonomous(system) and not abs(lasts - whole) <= _SAME_PERIOD * whole:
+        raise ParameterError("is not of one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
+    duration = lasts / returns_per_period(system)
+    return Nodes(CubicSpline(times - times[0], states)(np.arange(_OF_GUESS) * duration / _OF_GUESS), duration)
+
+
+def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
+    """Where to start from once Newton's method has failed at a guessed state, and whether to step carefully: the guess
+    itself first, where the period belongs to the orbit, since of an orbit with a strongly stable direction only guesses
+    on its stable manifold come back to a section."""
+    if is_autonomous(system):
+        yield Nodes(x[None], return_duration(system)), True
+    for start in (_magnified, _onward, _settled):
+        for nodes in start(system, x):
+            yield nodes, False
+
+
+def _magnified(system: SystemLike, x: Array) -> list[Nodes]:
+    """Several nodes on the motion from a state, where a return magnifies deviations too much for one."""
+    duration = return_duration(system)
+    try:
+        count = node_count(checked_flow(system, x, 0.0, duration)[1], sizes(system, x, duration))
+        return [nodes_along(system, x, duration, count)] if count >= _FEWEST_NODES else []
+    except (AnalysisError, np.linalg.LinAlgError):
+        return []
+
+
+def _onward(system: SystemLike, x: Array) -> list[Nodes]:
+    """A state further along the motion, where every state may be time 0: in the guess itself something may just have
+    happened, such as an impact, and a motion that ends there ends before it or after it by round-off."""
+    if not is_autonomous(system):
+        return []
+    duration = return_duration(system)
+    try:
+        return [Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration)]
+    except AnalysisError:
+        return []
+
+
+def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:
+    """States on the orbit that attracts the motion from a state, if one does."""
+    if is_autonomous(system):
+        yield from _settled_autonomous(system, x)
+        return
+    for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):
+        try:
+            for _ in range(count):
+                x = returned_states(system, x[None])[0]
+        except AnalysisError:
+            return
+        if not np.isfinite(x).all():
+            return
+        yield Nodes(x[None], return_duration(system))
+
+
+def _settled_autonomous(system: Autonomous, x: Array) -> list[Nodes]:
+    """As :func:`_settled`, with a new guess of the period: when the motion first comes close to where it was."""
+    step = system.guess_period / _MARCHED
+    try:
+        for _ in range(_LONGEST_SETTLING // 4):
+            x = carried(system, x[None], 0.0, system.guess_period)[0]
+        path = [x]
+        for _ in range(_MARCHES * _MARCHED):
+            path.append(carried(system, path[-1][None], 0.0, step)[0])
+    except AnalysisError:
+        return []
+    states = np.array(path)
+    if not np.isfinite(states).all():
+        return []
+    # A state that hardly moves, for its size, tells nothing.
+    size = sizes(system, x, system.guess_period)
+    moves = np.ptp(states, axis=0) / size
+    size = size * np.maximum(moves, _STILL * moves.max())
+    if not size.all():
+        return []
+    away = (np.abs(states - x) / size).max(axis=1)
+    turned = np.flatnonzero((away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)) + 1
+    if not turned.size:
+        return []
+    return [Nodes(x[None], float(turned[0]) * step / returns_per_period(system))]

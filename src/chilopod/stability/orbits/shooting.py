@@ -1,0 +1,382 @@
+"""The equations of a periodic orbit: states at instants that divide a return evenly, each carried to the next one.
+
+One node is single shooting. Over a whole return a motion may magnify a deviation by thousands, and a correction that is
+as far off is none; over a part of it a deviation grows by a root of that. The linear equations are condensed to the
+first state, the time of a return and the parameter (Ascher, Mattheij & Russell, *Numerical Solution of Boundary Value
+Problems*, section 4.3), the time to that at which the return ends on the section.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.convergence import NODES, RETURN
+from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.capabilities import Autonomous, SystemLike, is_autonomous
+from chilopod.stability.problem.returns import Section, carried, checked_flow, crossing, section_at
+
+Array = NDArray[np.float64]
+
+_EVALUATIONS, FEW_ROUNDS = 60, 12  # where corrections are damped, and on a curve, whose points are near
+_LONGEST = 4.0  # times the time of a return that was guessed
+_STRAYS = 20  # evaluations where the motion does not come back to the section
+_SHORTEST = 2.0**-6  # of a correction
+_DIFFERENCE = 1e-7  # of the parameter's scale
+_QUICKEST = 0.3  # of the time of a return: its largest correction
+_FARTHEST, _FARTHER = 10.0, 2.0  # of the sizes of the states: the largest correction, and how much it grows by the next
+_NEAR = 1e-2  # of the sizes of the states: a motion that closes so nearly comes back to a section
+_CAREFUL = 0.3  # likewise, where the motion does not come back to the section
+_CUTOFF, _SINGULAR, _FAMILY = 1e-15, 1e-13, 1e-8  # singular values that count as zero, the largest being one
+_MAGNIFIED = 1e9  # correction over residual beyond which the equations may be singular
+_NOTHING = 1e-13  # of the sizes of the states: a state that small may be zero
+_GROWTH = 4.0  # of a deviation from one node to the next, about
+_MOST = 32
+
+
+@dataclass(frozen=True)
+class Nodes(ReadOnlyArrays):
+    """States at instants that divide a return evenly, shape (m, n), the first at time 0, the time of the return,
+    and the value of the parameter."""
+
+    states: Array
+    duration: float
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class Closed(ReadOnlyArrays):
+    """An orbit that was solved for: its nodes, the sizes of the states, shape (n,), and where the last node returns to.
+
+    The derivatives of a return, with respect to the state, shape (n, n), and to the parameter, shape (n,), are without
+    the change of its time: products of those between nodes, which no rounding of a whole return disturbs.
+    """
+
+    nodes: Nodes
+    sizes: Array
+    end: Array
+    jacobian: Array
+    by_value: Array
+
+
+@dataclass(frozen=True)
+class Free:
+    """The parameter as an unknown, in units of ``scale``, with the equation that it takes: ``row . moved = target`` for
+    the displacement of first state and parameter from ``start``, shape (n+1,), in units."""
+
+    row: Array
+    target: float
+    start: Array
+    scale: float
+
+
+def node_count(jacobian: Array, sizes: Array) -> int:
+    """Number of nodes over which deviations grow little, from the derivative of a return."""
+    growth = float(np.linalg.norm(jacobian * sizes / sizes[:, None], 2))
+    return int(np.clip(np.ceil(np.log(max(growth, 1.0)) / np.log(_GROWTH)), 1, _MOST))
+
+
+def nodes_along(system: SystemLike, x: Array, duration: float, count: int, value: float = 0.0) -> Nodes:
+    """Nodes on the motion from a state."""
+    states, part = [x], duration / count
+    for i in range(count - 1):
+        states.append(carried(system, states[-1][None], i * part, (i + 1) * part)[0])
+    return Nodes(np.array(states), duration, value)
+
+
+def shot(
+    system_at: Callable[[float], SystemLike],
+    start: Nodes,
+    sizes: Array,
+    section: Section | None,
+    free: Free | None = None,
+    shared: Array | None = None,
+    budget: Budget | None = None,
+    careful: bool = False,
+) -> Closed:
+    """The orbit near some nodes, by Newton's method, damped while the parameter is given.
+
+    Parameters
+    ----------
+    system_at, start
+        The system at a value of the parameter, and the guess.
+    sizes
+        Sizes of the states, shape (n,); they grow with the states while the parameter is given.
+    section
+        Section that holds the first state, of a system without a period of its own; else None.
+    free
+        Equation for the parameter; None where it is given.
+    shared
+        Basis of the states among which the first one is corrected, shape (n, k); None for all.
+    budget
+        Budget that every evaluation takes a return from.
+    careful
+        True to take short steps and any time of a return until the motion about closes: a single node's motion need not
+        come back to the section then.
+    """
+    equations = _Equations(
+        _Problem(system_at, free, shared, budget, careful), start, _Frame(sizes, sizes, section, careful)
+    )
+    rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
+    correction: _Correction | None = None
+    whole = True
+    cutoff = _CUTOFF if free is not None else _SINGULAR if len(start.states) == 1 else _FAMILY
+    for _ in range(_EVALUATIONS if free is None else FEW_ROUNDS):
+        if correction is None:
+            # Halved steps may lead to where the motion jumps, and the residual falls as they do.
+            if rule.met(equations.residual, best if whole else np.inf):
+                return (equations if free is not None else equations.cleared()).closed()
+            if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
+                break
+            strays += equations.astray
+            if strays > _STRAYS:
+                break
+            best = min(best, equations.residual)
+            correction = equations.correction(equations, cutoff)
+        there = equations.after(correction, part)
+        if there is not None and (free is not None or equations.is_nearer(there, correction, part, cutoff, best)):
+            equations, part, correction, whole = there, min(1.0, 2.0 * part), None, part == 1.0
+        elif part > _SHORTEST:
+            part *= 0.5
+        elif cutoff == _SINGULAR:
+            # It followed round-off, along a family of orbits: without that direction it converges.
+            cutoff, part = _FAMILY, 1.0
+            correction = equations.correction(equations, cutoff)
+        else:
+            break
+    raise AnalysisError(
+        f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)",
+        field="orbit",
+        allowed="a guess closer to the orbit",
+    )
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Arguments of :func:`shot` that hold for all corrections."""
+
+    system_at: Callable[[float], SystemLike]
+    free: Free | None
+    shared: Array | None
+    budget: Budget | None
+    careful: bool
+
+    def beside(self, value: float) -> tuple[SystemLike, float] | None:
+        """The system at a value of the parameter beside another one, and how far; None where the parameter is given."""
+        if self.free is None:
+            return None
+        step = _DIFFERENCE * self.free.scale
+        try:
+            return self.system_at(value + step), step
+        except AnalysisError:  # the end of what there is
+            return self.system_at(value - step), -step
+
+
+class _Correction(NamedTuple):
+    """Changes of the nodes, shape (m, n), of the time of a return and of the parameter."""
+
+    states: Array
+    duration: float
+    value: float
+
+
+class _Frame(NamedTuple):
+    """Frame of a correction: sizes of the states, and of those where it may lead, shape (n,) both, the section that
+    holds the first one, and whether the motion does not come back to it."""
+
+    sizes: Array
+    reach: Array
+    section: Section | None
+    astray: bool = False
+
+
+class _Equations:
+    """The equations at some nodes and their derivatives."""
+
+    def __init__(self, problem: _Problem, nodes: Nodes, frame: _Frame) -> None:
+        if problem.budget is not None:
+            problem.budget.take()
+        self._problem, self.nodes, free = problem, nodes, problem.free
+        system = problem.system_at(nodes.value)
+        # Flows between the nodes, and derivatives by the time of a return and by the parameter.
+        m, n = nodes.states.shape
+        self._ends, self._factors = np.empty((m, n)), np.empty((m, n, n))
+        self._by_time, self._by_value = np.zeros((m, n)), np.zeros((m, n))
+        self._returned = False
+        if free is None and m == 1 and frame.section is not None and is_autonomous(system):
+            frame = self._to_section(system, frame)
+        else:
+            self._to_nodes(system)
+        if is_autonomous(system):
+            self._by_time = np.array([system.velocity(np.array(end)) for end in self._ends]) / m
+        if system.symmetry is not None:
+            for last in (self._ends, self._factors, self._by_time, self._by_value):
+                last[-1] = system.symmetry @ last[-1]
+        self._off = self._ends - np.roll(self.nodes.states, -1, axis=0)
+        sizes, x = frame.sizes, nodes.states[0]
+        if free is None and x.any():
+            sizes = np.maximum(sizes, np.maximum(np.abs(nodes.states), np.abs(self._ends)).max(axis=0))
+        self._across = 0.0 if frame.section is None else float(frame.section.normal @ (x - frame.section.point))
+        self._missing = 0.0
+        if free is not None:
+            moved = (np.append(x, nodes.value) - free.start) / np.append(sizes, free.scale)
+            self._missing = float(free.row @ moved - free.target)
+        self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
+        self._frame = frame._replace(sizes=sizes, reach=np.minimum(sizes, frame.reach))
+        if not np.isfinite(self.residual):
+            raise AnalysisError("the motion is not finite between two nodes", field="orbit")
+
+    @property
+    def astray(self) -> bool:
+        """True if the motion does not come back to the section."""
+        return self._frame.astray
+
+    def _to_nodes(self, system: SystemLike) -> None:
+        """Carry every node to the next one."""
+        m, value = len(self.nodes.states), self.nodes.value
+        part, beside = self.nodes.duration / m, self._problem.beside(value)
+        for i, x in enumerate(self.nodes.states):
+            a, b = (0.0, part) if is_autonomous(system) else (i * part, (i + 1) * part)
+            try:
+                self._ends[i], self._factors[i] = checked_flow(system, x, a, b)
+                if beside is not None:
+                    with np.errstate(all="ignore"):  # what is not finite is refused later
+                        self._by_value[i] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
+            except AnalysisError as error:
+                if m == 1 or isinstance(error, SpentError):
+                    raise
+                raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
+
+    def _to_section(self, system: Autonomous, frame: _Frame) -> _Frame:
+        """Carry a single node to where its motion is back at the section; where it does not come back, over the time
+        that was guessed, with a section of its own."""
+        x, duration = self.nodes.states[0], self.nodes.duration
+        assert frame.section is not None
+        if not frame.astray:
+            try:
+                near = replace(frame.section, duration=duration)
+                start, rest, (before, first) = crossing(system, x, near, system.flow)
+                self._ends[0], second = checked_flow(system, before, 0.0, rest)
+                self._factors[0] = second @ first
+                self.nodes, self._returned = replace(self.nodes, duration=start + rest), True
+                return frame
+            except AnalysisError as error:
+                if not self._problem.careful or isinstance(error, SpentError):
+                    raise
+        self._ends[0], self._factors[0] = checked_flow(system, x, 0.0, duration)
+        return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
+
+    def _totals(self, off: Array) -> list[Array]:
+        """Each later node as a linear function of first state, time, parameter, and 1, shape (n, n+3)."""
+        n = off.shape[1]
+        total = np.eye(n, n + 3)
+        totals = [total]
+        for factor, by_time, by_value, each in zip(self._factors, self._by_time, self._by_value, off, strict=True):
+            total = factor @ total
+            total[:, n:] += np.stack([by_time, by_value, each], axis=1)
+            totals.append(total)
+        return totals
+
+    def closed(self) -> Closed:
+        """The nodes as a solution."""
+        total, n = self._totals(self._off)[-1], self._off.shape[1]
+        return Closed(self.nodes, self._frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
+
+    def correction(self, other: _Equations, cutoff: float) -> _Correction:
+        """Correction that these linear equations make of what is off here or at other nodes."""
+        section, free, sizes = self._frame.section, self._problem.free, self._frame.sizes
+        n, totals = sizes.size, self._totals(other._off)
+        last, time = totals[-1], np.zeros(n + 3)
+        if section is not None:  # the time at which the return ends on it
+            speed = float(section.normal @ last[:, n])
+            if speed == 0.0:
+                raise AnalysisError("the motion does not cross the section", field="orbit")
+            time = -(section.normal @ last) / speed
+            time[n] = 0.0
+            time[n + 2] -= other._across / speed
+            last = last + np.outer(last[:, n], time)
+        matrix, right = (last[:, :n] - np.eye(n)) * sizes / sizes[:, None], -last[:, n + 2] / sizes
+        if free is not None:
+            by_value = last[:, n + 1] * free.scale / sizes
+            matrix = np.block([[matrix, by_value[:, None]], [free.row[None]]])
+            right = np.append(right, -other._missing)
+        move = _solution(matrix, right, cutoff, self._problem.shared, sizes)
+        value = 0.0 if free is None else float(move[n]) * free.scale
+        every = np.concatenate([sizes * move[:n], [0.0, value, 1.0]])
+        if not self._returned:  # else it is solved for at the next node
+            every[n] = time @ every
+        return _Correction(np.array([total @ every for total in totals[:-1]]), float(every[n]), value)
+
+    def after(self, correction: _Correction, part: float) -> _Equations | None:
+        """The equations after that part of a correction, or less of it where states or the time would change much; None
+        where the motion ends before, while the parameter is given."""
+        here = self.nodes
+        part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
+        frame = self._frame
+        farthest = _FARTHEST
+        if frame.astray:
+            farthest = _CAREFUL * min(1.0, float(np.linalg.norm(self._by_time[0] * here.duration / frame.sizes)))
+        part = min(part, farthest / max(float(np.abs(correction.states / frame.reach).max()), 1e-300))
+        there = Nodes(
+            here.states + part * correction.states,
+            here.duration + part * correction.duration,
+            here.value + part * correction.value,
+        )
+        # All may only be getting larger.
+        astray, reach = frame.astray and self.residual > _NEAR, frame.reach * (1.0 if frame.astray else _FARTHER)
+        try:
+            return _Equations(self._problem, there, frame._replace(reach=reach, astray=astray))
+        except AnalysisError as error:
+            if self._problem.free is not None or isinstance(error, SpentError):
+                raise
+            return None
+
+    def is_nearer(self, there: _Equations, correction: _Correction, part: float, cutoff: float, best: float) -> bool:
+        """True if other equations, after part of a correction, are off by half as much, or have less to correct by the
+        linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3); astray, where steps are
+        short, if they are not off by much more than the best ones."""
+        if self.astray:
+            return there.residual <= 2.0 * best
+        if float(np.abs(there._off / self._frame.sizes).max()) <= 0.5 * self.residual:
+            return True
+        before, left = self._length(correction), self._length(self.correction(there, cutoff))
+        return left <= max((1.0 - 0.25 * part) * before, NODES.settled)
+
+    def _length(self, correction: _Correction) -> float:
+        states = float(np.abs(correction.states / self._frame.sizes).max())
+        return max(states, abs(correction.duration) / self.nodes.duration)
+
+    def cleared(self) -> _Equations:
+        """The orbit with the states of its first node that are only just not zero at zero, if it is an orbit still:
+        what is left of a guess would pass for the size of the orbit."""
+        x = self.nodes.states[0]
+        small = (x != 0.0) & (np.abs(x) <= _NOTHING * self._frame.sizes)
+        if not small.any():
+            return self
+        states = np.vstack([np.where(small, 0.0, x), self.nodes.states[1:]])
+        there = _Equations(self._problem, replace(self.nodes, states=states), self._frame)
+        return there if there.residual <= max(RETURN.round_off, self.residual) else self
+
+
+def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, sizes: Array) -> Array:
+    """Solution of linear equations in units, among the ``shared`` states if there are such; the shortest where orbits
+    come in families."""
+    if shared is not None:
+        basis = np.linalg.qr(shared / sizes[:, None])[0]
+        return np.asarray(basis @ _solution(basis.T @ matrix @ basis, basis.T @ right, cutoff, None, sizes))
+    try:
+        if cutoff == _SINGULAR:
+            with contextlib.suppress(np.linalg.LinAlgError):
+                regular = np.linalg.solve(matrix, right)
+                if np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
+                    return np.asarray(regular)
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=cutoff)[0])
+    except np.linalg.LinAlgError:
+        raise AnalysisError("the equations of the orbit's nodes have no solution", field="orbit") from None
