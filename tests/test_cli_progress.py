@@ -74,3 +74,8 @@ def test_compiling_is_said_once(capsys, hasty, monkeypatch):
     with progress.progress_bar("work"):
         time.sleep(0.1)
     assert "compiling" not in capsys.readouterr().err
+
+
+def test_a_module_that_is_being_loaded_compiles_nothing(monkeypatch):
+    monkeypatch.setitem(progress.sys.modules, "chilopod.numba_internals", SimpleNamespace(NOTICED=1.0))
+    assert not progress._compiling()

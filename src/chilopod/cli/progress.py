@@ -60,7 +60,8 @@ def _lines(doing: str, told: _Told, over: threading.Event) -> None:
 def _compiling() -> bool:
     """True if compiling has taken a while; asked of what is loaded, since a command may need no compiled code."""
     numba = sys.modules.get("chilopod.numba_internals")
-    return numba is not None and numba.COMPILING.seconds() > numba.NOTICED
+    clock = getattr(numba, "COMPILING", None)  # another thread may be loading the module
+    return numba is not None and clock is not None and bool(clock.seconds() > numba.NOTICED)
 
 
 def _bars(doing: str, told: _Told, over: threading.Event) -> None:
