@@ -108,9 +108,11 @@ def test_a_branch_prints_what_is_on_it():
         "  stable    1.5 to 3",
         "  unstable  3 to 3.6",
     ]
-    lost = replace(doubling(), ending=Ending.LOST, reason="the step went astray", remarks=("word " * 60,) * 9)
+    lost = replace(doubling(), ending=Ending.LOST, reason="the step went astray", remarks=("word",) * 9)
     assert "could not be followed further (the step went astray)" in str(lost)
     assert str(lost).endswith("and 3 more remarks")
+    long = str(replace(lost, remarks=("word " * 60,) * 9))
+    assert (long.count("\n") + 1, long.endswith("and 12 more lines")) == (15, True)
     assert max(map(len, str(lost).splitlines())) <= 110
 
 

@@ -37,7 +37,7 @@ _MOSTLY = 0.25  # of the first places may disagree on what vanishes everywhere: 
 _MANY = 800  # pairs of multipliers; beyond that the bialternate product has too many zeros that mean nothing
 _PROBES = 65
 _FINEST_PROBE = 1e-6  # of the interval
-_OF_ERROR = 0.01  # of what a root may be wrong by: how closely it is enclosed
+_OF_ERROR = 1e-4  # of what a root may be wrong by, which sums the errors of all entries: how closely it is enclosed
 _NARROW = 1e-13  # of the value: nearer than that no root is known before it is looked for
 _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
 
