@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Final, NamedTuple
 
 from chilopod.engine import Controller
@@ -141,16 +141,6 @@ class TorqueOnTheWay(Strategy):
         return ActuatedAxis.of(robot, law), ()
 
 
-@dataclass(frozen=True)
-class GentleSpring(SpringOnTheWay):
-    """Strategy that sets the first spring during the walk and accepts twice the difference of bends."""
-
-    def controller(self, robot: Robot, law: RadiusLaw | None) -> tuple[Controller | None, tuple[str, ...]]:
-        """Law of the first spring with a band of a half."""
-        assert law is not None
-        return replace(SpringLaw.of(robot, law), band=0.5), ()
-
-
 VARIABLE: Final = SpringOnTheWay(
     "variable", "the first spring is set anew in every gait cycle, leg yaw chooses the side"
 )
@@ -167,7 +157,6 @@ _ALL = (
         "open-loop", "a soft first spring bends the walk, to whichever side it falls", "springs.stiffness[0]", False
     ),
     ACTUATED,
-    GentleSpring("gentle", "the first spring is set in every gait cycle, with a band of a half"),
 )
 
 STRATEGIES: Mapping[str, Strategy] = {each.name: each for each in _ALL if not each.needs_law}
