@@ -95,15 +95,6 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
             keys=(("F", "Shorter steps"), ("G", "Longer steps")),
             shift=True,
         ),
-        _of_robot(
-            "body.mass",
-            label="mass",
-            hint="Mass of the robot, kg",
-            unit="kg",
-            si="kg",
-            limits=(0.2 * file.body.mass, 3.0 * file.body.mass),
-            step=0.1,
-        ),
         Slider(
             name="speed",
             label="speed",
