@@ -135,20 +135,10 @@ class OneTarget(Task):
         return Course((Goal(x, y, relative=False),), patience)
 
 
-@dataclass(frozen=True)
-class Sprint(OneTarget):
-    """One target; the reward is the distance that it comes nearer, and nothing else."""
-
-    def reward(self, look: Look) -> Array:
-        """Distance by which the target has come nearer, m."""
-        return np.nan_to_num(look.nearer)
-
-
 TASKS: Final[Mapping[str, Task]] = {
     "Turn": RandomTargets(),
     "Course": RandomTargets(targets=5),
     "TaskA": OneTarget(target=Target.parse("45 deg, 1.3 m")),
-    "Sprint": Sprint(target=Target.parse("0 deg, 2 m")),
     "TaskB": OneTarget(target=Target.parse("40 deg, 1.5 m")),
 }
 """Tasks by name: random targets, and the two turning tasks of Aoi et al. (2022)."""
