@@ -20,7 +20,7 @@ from chilopod.numba_internals import keep
 if numba.config.DISABLE_JIT:
     # As plain Python, what is compiled here would take hours, and its overloads do not run.
     raise ParameterError(
-        "chilopod does not run without compiling", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
+        "must be 0: chilopod needs the compiler of Numba", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
     )
 
 _LAYERS = {

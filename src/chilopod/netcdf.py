@@ -68,10 +68,10 @@ def sealed_file(path: Path) -> Iterator[IO[bytes]]:
             yield file
     except FileNotFoundError:
         if path.is_symlink():
-            raise UnsoundError("leads nowhere") from None
+            raise UnsoundError("is a link to a missing file") from None
         raise
     except MemoryError:
-        raise OutputError("cannot be read for want of memory", source=str(path)) from None
+        raise OutputError("cannot be read: not enough memory", source=str(path)) from None
     except OSError as error:
         if error.errno in _OUR_FAULT:
             raise OutputError(f"cannot be read ({error.strerror})", source=str(path)) from None

@@ -108,7 +108,7 @@ def axes_for(axes: Axes | None) -> Axes:
 
         return pyplot.figure(layout="constrained").add_subplot()
     if not isinstance(axes, Axes):
-        raise ParameterError("is not what is drawn on", field="axes", value=axes, allowed="axes of matplotlib, or None")
+        raise ParameterError("must be axes to draw on", field="axes", value=axes, allowed="axes of matplotlib, or None")
     return axes
 
 

@@ -120,7 +120,7 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
             kept += _kept(path, content)
     if failure is None:
         return written
-    where = f"kept instead: {', '.join(map(str, kept))}" if kept else "and no other place could be written"
+    where = f"kept instead: {', '.join(map(str, kept))}" if kept else "no other place could be written"
     raise OutputError(f"{failure.problem}; {where}", source=failure.source)
 
 
@@ -178,7 +178,7 @@ def _check_replaceable(path: Path, replace: bool) -> None:
     if stat.S_ISDIR(mode):
         raise OutputError("is a folder, not a file", source=str(path))
     if not stat.S_ISREG(mode):
-        what = "a link, no regular file," if stat.S_ISLNK(mode) else "no regular file"
+        what = "a link, not a regular file," if stat.S_ISLNK(mode) else "not a regular file"
         raise OutputError(f"is {what} and is not replaced, even with --force", source=str(path))
     if not replace:
         raise OutputError("exists and is only replaced with --force", source=str(path))

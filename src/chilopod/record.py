@@ -88,7 +88,9 @@ class Recording:
             object.__setattr__(self, "rate", rate)
         for name in ("forces", "poses"):
             if not isinstance(getattr(self, name), bool | np.bool_):
-                raise ParameterError("is neither", field=name, value=getattr(self, name), allowed="True or False")
+                raise ParameterError(
+                    "must be a truth value", field=name, value=getattr(self, name), allowed="True or False"
+                )
             object.__setattr__(self, name, bool(getattr(self, name)))
 
     def samples(self, until: float) -> Array:
@@ -109,7 +111,7 @@ def as_number(name: str, value: object) -> float:
             raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError("is no number", field=name, value=value) from None
+        raise ParameterError("must be a number", field=name, value=value) from None
 
 
 def in_range(name: str, value: object, most: float, unit: str = "") -> float:
@@ -126,10 +128,13 @@ def in_range(name: str, value: object, most: float, unit: str = "") -> float:
 def check_size(record: Recording | None, until: float, numbers: int) -> None:
     """Refuse a record that nobody can hold, of ``numbers`` at every sample, and what is no time."""
     if not (isinstance(until, Real) and until >= 0.0):
-        raise ParameterError("is no time", field="expected", value=until, allowed="0 s or more")
+        raise ParameterError("must be a duration in s", field="expected", value=until, allowed="0 s or more")
     if record is not None and (until * record.rate + 1.0) * numbers > MOST_NUMBERS:
         raise ParameterError(
-            "the record would be too large", field="rate", value=record.rate, allowed="fewer robots, samples or seconds"
+            "must be lower: the record would be too large",
+            field="rate",
+            value=record.rate,
+            allowed="fewer robots, samples or seconds",
         )
 
 

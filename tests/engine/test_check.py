@@ -230,7 +230,7 @@ def _halts_for_a_moment(original):
         (_obeys_before_it_refuses, "refuses what is no command"),
         (_ignores_its_limits, "keeps springs within"),
         (_ignores_torques, "turns joints"),
-        (_has_no_halt, "sees in the units.*it has no halt"),
+        (_has_no_halt, "sees in the units.*missing: halt"),
         (_is_changed_by_a_look_at_its_pose, "says where robots are"),
         (_goes_where_it_is_aimed, "shows targets that are moved"),
         (_aims_all_alike, "shows targets that are moved"),

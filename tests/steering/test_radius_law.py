@@ -42,11 +42,11 @@ def test_the_ends():
 
 def test_outside_it_says_so():
     found = law()
-    with pytest.raises(AnalysisError, match="no spring turns so tightly"):
+    with pytest.raises(AnalysisError, match="must be at least the tightest radius"):
         found.value(0.9 * found.tightest)
     with pytest.raises(AnalysisError, match="no spring"):
         found.value(math.nan)
-    with pytest.raises(ParameterError, match="below the radius law"):
+    with pytest.raises(ParameterError, match="at least the smallest value of the radius law"):
         found.radius(0.39)
 
 

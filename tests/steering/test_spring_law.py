@@ -104,7 +104,7 @@ def test_what_the_actuator_keeps_from_it_is_said():
     assert "bends no straight walk" in said
     (said,) = SpringLaw.of(ROBOT.override("springs.stiffest", 0.65), LAW).remarks(LAW)
     assert "holds no straight walk" in said
-    with pytest.raises(ParameterError, match="no range"):
+    with pytest.raises(ParameterError, match="a range to steer"):
         SpringLaw.of(ROBOT.override("springs.softest", 3.0), LAW)
 
 

@@ -47,7 +47,7 @@ def test_targets_that_there_is_no_circle_to(bearing, distance, match):
 
 
 def test_texts_that_are_no_targets():
-    with pytest.raises(ParameterError, match=r"is no target.*45 deg, 1\.3 m"):
+    with pytest.raises(ParameterError, match=r"must be a target.*45 deg, 1\.3 m"):
         Target.parse("45 deg")
     for text in ("45 deg, 1.3 s", "45 m, 1.3 m", "here, there"):
         with pytest.raises(UnitError, match="target"):

@@ -125,7 +125,13 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
 @pytest.mark.parametrize(
     ("changed", "strategy", "spring", "error", "words"),
     [
-        (["springs.adjustable=false"], "variable", None, ParameterError, "the first spring has no actuator"),
+        (
+            ["springs.adjustable=false"],
+            "variable",
+            None,
+            ParameterError,
+            "must be true: strategy variable sets the first spring",
+        ),
         (
             ["legs.half_width=0.3 m"],
             "variable",
@@ -177,7 +183,7 @@ def test_a_strategy_of_ones_own_is_a_class(ready):
     assert mine.remarks == ("a softer second spring", f"circles of {ready.law.tightest:.1f} m")
     (record,) = drive(mine, NEAR).records
     assert 0.0 < np.abs(record.leg_yaw).max() <= 0.5 * LegYawController().limit
-    with pytest.raises(ParameterError, match="strategy mine needs the robot's radius law"):
+    with pytest.raises(ParameterError, match="must be the radius law of the robot for strategy mine"):
         mine.strategy.prepare(ROBOT)
     own = mine.strategy.prepare(ROBOT, controller=LegYawController())
     assert own.controller == LegYawController()

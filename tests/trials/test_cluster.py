@@ -232,9 +232,9 @@ def test_records_are_the_same_to_the_bit_wherever_they_walk(cluster, tmp_path):
 def test_a_stranger_on_this_machine_is_refused(cluster):
     address = cluster._client.cluster.scheduler_address
     assert address.startswith("tls://127.0.0.1:")
-    with pytest.raises(ClusterError, match=r"does not answer|is none"):
+    with pytest.raises(ClusterError, match=r"does not answer|must be a dask scheduler"):
         Cluster(address)
-    with pytest.raises(ClusterError, match=r"does not answer|is none"):
+    with pytest.raises(ClusterError, match=r"does not answer|must be a dask scheduler"):
         Cluster(address.replace("tls:", "tcp:"))
     with pytest.raises((OSError, RuntimeError)):
         distributed.Client(address, security=distributed.Security.temporary(), timeout=2)
@@ -332,7 +332,7 @@ def waited_for_workers(address):
         try:
             return Cluster(address)
         except ClusterError as error:
-            if "has no workers" not in str(error):
+            if "must have at least one worker" not in str(error):
                 raise
             return None
 

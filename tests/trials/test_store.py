@@ -172,7 +172,7 @@ def test_a_link_is_followed_and_itself_moved_aside(store, record, tmp_path):
     assert elsewhere.read_bytes() == b"mine"
     path.symlink_to(tmp_path / "nowhere")
     assert store.read(BASE) is None
-    assert "leads nowhere" in store.told[-1]
+    assert "is a link to a missing file" in store.told[-1]
     assert names(store) == [f"{path.name}.aside", f"{path.name}.aside2"]
 
 

@@ -154,7 +154,10 @@ def resumed(
     saved = Robot(**tomllib.loads(data.attrs["robot_toml"]))
     if data.attrs["varied"] != parameter:
         raise ParameterError(
-            "is not what the saved branch varies", field="parameter", value=parameter, allowed=data.attrs["varied"]
+            "must be the parameter that the saved branch varies",
+            field="parameter",
+            value=parameter,
+            allowed=data.attrs["varied"],
         )
     value = float(data.parameter_si[0])
     here, there = robot.with_value(parameter, value), saved.with_value(parameter, value)
@@ -164,17 +167,17 @@ def resumed(
                 f"the saved branch belongs to another robot: {name} differs", field="robot", value=robot.name
             )
     if side is not None and side != data.attrs["side"]:
-        raise ParameterError("the saved branch turns to the other side", field="side")
+        raise ParameterError("must be the side to which the saved branch turns", field="side")
     between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
     (low, high), end = sorted(between), float(data.parameter_si[-1])
     ended = data.attrs["ending"] == Ending.LEFT_INTERVAL.label and end in (low, high)
     if ended or not low <= end <= high:
         unit = robot.unit_of(parameter)
         raise ParameterError(
-            "does not hold the saved branch's last point, beyond which nothing is left to follow",
+            "must contain the last point of the saved branch",
             field="between",
             value=interval_text(robot, parameter, (low, high)),
-            allowed=f"an interval with {units.format(end, unit, digits=6)} in it",
+            allowed=f"an interval that contains {units.format(end, unit, digits=6)}",
         )
     branch = proceed(
         _followed(saved, parameter),
@@ -206,7 +209,7 @@ def read_walks(path: str | Path) -> xr.Dataset:
     except UnsoundError as error:
         raise ParameterError(str(error), source=str(path)) from None
     if data.attrs.get("version") != VERSION:
-        raise ParameterError("holds no branch of curved walks, or that of another version", source=str(path))
+        raise ParameterError("must hold a branch of curved walks of this version of chilopod", source=str(path))
     return data
 
 

@@ -75,18 +75,20 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
     """
     x, y = np.asarray(inverse, dtype=np.float64), np.abs(np.asarray(angle, dtype=np.float64))
     if x.ndim != 1 or x.shape != y.shape:
-        raise ParameterError("must be one for each spring", field="angle", value=y.shape, allowed=f"{x.shape}")
+        raise ParameterError("must have one value for each spring", field="angle", value=y.shape, allowed=f"{x.shape}")
     if not (np.isfinite(y).all() and (x > 0.0).all() and np.isfinite(x).all()):
-        raise ParameterError("must be finite, and the springs positive", field="angle")
+        raise ParameterError("must be finite, and every spring must be positive", field="angle")
     bent = np.unique(x[y > 0.0])
     if x.size < 3 or bent.size < 2:
-        raise AnalysisError("two springs that bend and three trials are the least", field="angle", value=bent.size)
+        raise AnalysisError(
+            "must come from at least two springs that bend the robot and three trials", field="angle", value=bent.size
+        )
     # Given 1/kc the amplitude follows, so only 1/kc is searched: at least two springs have to lie beyond it.
     grid = bent[-2] - np.geomspace(_CLOSEST * (bent[-1] - bent[-2]), _FARTHEST * bent[-2], _GRID)
     basis = _root(x, grid[:, None])
     best = int(_lost(basis, y[:, None])[:, 0].argmin())
     if best in (0, len(grid) - 1):
-        raise AnalysisError("the angles do not fall to zero as a square root: they determine no point", field="angle")
+        raise AnalysisError("must fall to zero as a square root of the distance to the pitchfork", field="angle")
     found = minimize_scalar(
         lambda at: _lost(_root(x, at)[None], y[:, None])[0, 0],
         bounds=(grid[best + 1], grid[best - 1]),

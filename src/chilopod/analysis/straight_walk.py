@@ -200,7 +200,7 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
             f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
             f"out {contraction:.3g} e-folds a period or more"
         )
-        allowed = f"what takes about {_duration(longest)}: fewer modules, or longer and heavier ones"
+        allowed = f"a search of about {_duration(longest)}: fewer modules, or longer and heavier ones"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules, allowed=allowed)
     found = stability.exponents(model)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
@@ -223,7 +223,7 @@ def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
     """
     robot.unit_of(parameter)  # refuses what is no parameter
     if parameter == "body.modules":
-        raise ParameterError("is a whole number, not a continuous parameter", field="parameter", value=parameter)
+        raise ParameterError("must be a continuous parameter, not a whole number", field="parameter", value=parameter)
     # Where the symmetry of the gait itself changes, only the full period means the same on both sides.
     symmetric = parameter != "gait.side_phase"
     return lambda value: PlanarModel(robot.with_value(parameter, value), use_symmetry=symmetric)

@@ -80,11 +80,13 @@ def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float
         If one does not vary continuously, or both are the same.
     """
     if parameters[0] == parameters[1]:
-        raise ParameterError("must be two", field="parameters", value=parameters)
+        raise ParameterError("must be two parameters", field="parameters", value=parameters)
     for parameter in parameters:
         robot.unit_of(parameter)  # refuses what is no parameter
         if parameter == "body.modules":
-            raise ParameterError("is a whole number, not a continuous parameter", field="parameters", value=parameter)
+            raise ParameterError(
+                "must be a continuous parameter, not a whole number", field="parameters", value=parameter
+            )
     symmetric = "gait.side_phase" not in parameters
     first, second = parameters
     return lambda p, q: PlanarModel(robot.with_value(first, p).with_value(second, q), use_symmetry=symmetric)

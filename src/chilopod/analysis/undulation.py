@@ -68,11 +68,13 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     """
     for distance in distances:
         if not 0.0 < distance < 1.0:
-            raise ParameterError("must be above 0 and below 1", field="distances", value=distance)
+            raise ParameterError("must be more than 0 and less than 1", field="distances", value=distance)
     loss = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER)
     point = loss.point
     if point.criticality is not Criticality.SUPERCRITICAL:
-        raise AnalysisError("is not supercritical: no small undulation grows from it", field="Neimark-Sacker point")
+        raise AnalysisError(
+            "must be supercritical for a small undulation to grow from it", field="Neimark-Sacker point"
+        )
     ks = [point.value * (1.0 - distance) for distance in distances]
     models = [FollowedModel(robot.with_value(ALL, k), TOLERANCE) for k in ks]
     expected = [_expected(model, point) for model in models]
@@ -142,7 +144,7 @@ def _expected(model: FollowedModel, point: BifurcationPoint) -> _Expected:
     mu = complex(spec.values[index])
     square = (1.0 - abs(mu)) / point.coefficient
     if not square > 0.0:
-        raise AnalysisError("the straight walk is stable here", field=ALL)
+        raise AnalysisError("the straight walk must be unstable for an undulation to grow", field=ALL)
     turn = float(np.angle(mu)) + point.rotation * square
     return _Expected(orbit, mu, spec.right[:, index], spec.left[:, index], float(np.sqrt(square)), turn)
 
@@ -156,7 +158,9 @@ def _settled(models: list[FollowedModel], expected: list[_Expected], progress: P
     slowest = min(2.0 * np.log(abs(each.multiplier)) for each in expected)
     settling = int(np.ceil(_SETTLING / slowest))
     if settling > _LONGEST:
-        raise AnalysisError("too close to the point: the undulation takes too long to settle", field="distances")
+        raise AnalysisError(
+            "must be larger: so close to the point the undulation settles too slowly", field="distances"
+        )
     recorded = np.empty((len(models), _MEASURED, models[0].dimension))
     for count in range(-settling, _MEASURED):
         if count >= 0:

@@ -108,17 +108,21 @@ class Actuators:
             Shape (robots,).
         """
         if not isinstance(command, Command):
-            raise ParameterError("is no chilopod.engine.Command", field="command", value=type(command).__name__)
+            raise ParameterError("must be a chilopod.engine.Command", field="command", value=type(command).__name__)
         within = as_number("command.within", command.within)
         if not 0.0 <= within <= LONGEST:
-            raise ParameterError("is no time", field="command.within", value=within, allowed=f"0 to {LONGEST:g} s")
+            raise ParameterError(
+                "must be a duration in s", field="command.within", value=within, allowed=f"0 to {LONGEST:g} s"
+            )
         within = within if within >= _SAME_INSTANT else 0.0
         yaw = self._rows("leg_yaw", command.leg_yaw, 2, walking)
         stiffness = self._rows("stiffness", command.stiffness, self.lag.shape[1], walking)
         torque = self._rows("joint_torque", command.joint_torque, self.lag.shape[1], walking)
         if yaw is not None and (np.abs(yaw[walking]) > _MOST_YAW).any():
             worst = float(np.abs(yaw[walking]).max())
-            raise ParameterError("is too far", field="command.leg_yaw", value=worst, allowed="up to a right angle, rad")
+            raise ParameterError(
+                "must be at most a right angle", field="command.leg_yaw", value=worst, allowed="-pi/2 to pi/2 rad"
+            )
         if stiffness is not None:
             self._check(stiffness, walking)
             self._soften(time, stiffness, walking, within)
@@ -213,7 +217,9 @@ class Actuators:
             raise ParameterError("has the wrong shape", field=f"command.{name}", value=array.shape, allowed=str(shape))
         rows = np.array(np.broadcast_to(array, shape))
         if not np.isfinite(rows[walking]).all():
-            raise ParameterError("must be finite", field=f"command.{name}", allowed="numbers for all that still walk")
+            raise ParameterError(
+                "must be finite", field=f"command.{name}", allowed="finite numbers for every robot that still walks"
+            )
         return rows
 
     def _check(self, stiffness: Array, walking: NDArray[np.bool_]) -> None:

@@ -27,7 +27,7 @@ def as_array(name: str, value: object) -> Array:
             raise TypeError
         return array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError("is no array of numbers", field=name, value=value) from None
+        raise ParameterError("must be an array of numbers", field=name, value=value) from None
 
 
 def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
@@ -39,7 +39,7 @@ def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
     except TypeError:
         whole = []
     if not whole or min(whole) < 0:
-        raise ParameterError("must be whole numbers, one a walk", field=name, value=seeds, allowed="0 or more")
+        raise ParameterError("must be whole numbers, one for each walk", field=name, value=seeds, allowed="0 or more")
     return whole
 
 
@@ -50,7 +50,9 @@ def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
     except (TypeError, ValueError):
         marks = np.empty(0)
     if marks.dtype != np.bool_ or marks.shape != (count,):
-        raise ParameterError("marks nothing", field=name, value=value, allowed=f"True or False, {count} of them")
+        raise ParameterError(
+            "must be truth values", field=name, value=value, allowed=f"{count} values, each True or False"
+        )
     return marks
 
 
@@ -58,26 +60,28 @@ def as_robots(robots: object) -> list[Robot]:
     """One robot or several as a list."""
     given = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(each, Robot) for each in given):
-        raise ParameterError("is no robot, nor several of them", field="robots", value=type(robots).__name__)
+        raise ParameterError("must be a Robot or a sequence of Robots", field="robots", value=type(robots).__name__)
     if not given:
-        raise ParameterError("there are none", field="robots", allowed="at least one")
+        raise ParameterError("must not be empty", field="robots", allowed="at least one robot")
     return list(given)
 
 
 def as_robot(robot: object) -> Robot:
     """One robot."""
     if not isinstance(robot, Robot):
-        raise ParameterError("is no robot", field="robot", value=type(robot).__name__, allowed="a chilopod Robot")
+        raise ParameterError("must be a Robot", field="robot", value=type(robot).__name__, allowed="a chilopod Robot")
     return robot
 
 
 def check_wishes(record: object, expected: object) -> float:
     """Duration of a walk, s, checked together with what an engine is to record."""
     if not isinstance(record, Recording | None):
-        raise ParameterError("is none", field="record", value=record, allowed="a chilopod.record.Recording, or None")
+        raise ParameterError(
+            "must be a Recording or None", field="record", value=record, allowed="a chilopod.record.Recording, or None"
+        )
     seconds = as_number("expected", expected)
     if not 0.0 <= seconds <= LONGEST:
-        raise ParameterError("is no time", field="expected", value=expected, allowed=f"0 to {LONGEST:g} s")
+        raise ParameterError("must be a duration in s", field="expected", value=expected, allowed=f"0 to {LONGEST:g} s")
     return seconds
 
 
@@ -95,7 +99,7 @@ def standing(
     ):
         if not fits:
             raise ParameterError(
-                "has the wrong shape", field=name, value=array.shape, allowed=f"{allowed}, or one each"
+                "has the wrong shape", field=name, value=array.shape, allowed=f"{allowed}, or one for each walk"
             )
         if not (np.abs(array) <= LARGEST).all():
             raise ParameterError("must be finite", field=name, allowed=f"numbers up to {LARGEST:g}")
@@ -104,7 +108,7 @@ def standing(
     try:
         (count,) = np.broadcast_shapes(angles.shape[:1], headings.shape, places.shape[:1])
     except ValueError:
-        raise ParameterError("do not agree in number", field="joint_angles, heading, position") from None
+        raise ParameterError("must have the same number of walks", field="joint_angles, heading, position") from None
     return (
         np.array(np.broadcast_to(angles, (count, joints))),
         np.array(np.broadcast_to(headings, (count,))),
@@ -185,11 +189,15 @@ def rows_anew(
     marked, cycles = as_marks("which", which, len(robots)), time / robots[0].gait.period
     if record is not None:
         raise ParameterError(
-            "a record is of one walk", field="restart", allowed="a walk that was started with record=None"
+            "must be False for a walk that is recorded: a record covers one walk",
+            field="restart",
+            allowed="a walk that was started with record=None",
         )
     if abs(cycles - round(cycles)) > BEGINNING:
         allowed = f"a whole multiple of the period, {robots[0].gait.period:g} s"
-        raise ParameterError("is in the middle of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
+        raise ParameterError(
+            "must fall on the end of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed
+        )
     count, own = int(marked.sum()), as_seeds(seeds)
     if own is not None and len(own) != count:
         raise ParameterError("has the wrong length", field="seeds", value=len(own), allowed=str(count))
@@ -205,7 +213,7 @@ def check_time(until: float, now: float) -> float:
     """The time to walk on to, s; refuses to walk back, and beyond all reason."""
     until = as_number("until", until)
     if not now <= until <= LONGEST:
-        problem = "has passed" if until < now else "is no time"
+        problem = "must not lie before the time of the walk" if until < now else "must be a time in s"
         raise ParameterError(
             problem, field="until", value=f"{until:g} s", allowed=f"{now:g} s or later, at most {LONGEST:g} s"
         )

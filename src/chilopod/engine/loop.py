@@ -88,14 +88,17 @@ def _numbered(controller: Controller, gait: Gait, since: float, until: float) ->
     events = _asked(controller, "events", lambda: list(islice(controller.events(gait), _MOST_EVENTS + 1)))
     if len(events) > _MOST_EVENTS:
         raise ParameterError(
-            "are too many", field=_of(controller, "events"), allowed=f"at most {_MOST_EVENTS} in a gait cycle"
+            "must be fewer", field=_of(controller, "events"), allowed=f"at most {_MOST_EVENTS} in a gait cycle"
         )
     for event in events:
         if not isinstance(event, Event):
-            raise ParameterError("is no chilopod.engine.Event", field=_of(controller, "events"), value=event)
+            raise ParameterError("must be a chilopod.engine.Event", field=_of(controller, "events"), value=event)
         if not 0.0 <= as_number(_of(controller, "events"), event.phase) < 1.0:
             raise ParameterError(
-                "is no phase", field=_of(controller, "events"), value=event.phase, allowed="0 to less than 1"
+                "must be a phase of the gait cycle",
+                field=_of(controller, "events"),
+                value=event.phase,
+                allowed="0 to less than 1",
             )
     events.sort(key=lambda event: event.phase)
     first = _whole(since, gait.period)
@@ -145,7 +148,9 @@ def steer(
     gait, begun = walk.robots[0].gait, walk.time
     until = check_time(until, begun)
     if not callable(progress):
-        raise ParameterError("cannot be called", field="progress", value=progress, allowed="a function of two")
+        raise ParameterError(
+            "must be a function", field="progress", value=progress, allowed="a function of two arguments"
+        )
     noise = None
     if controller is not None and bearing_noise is not None:
         walks, events = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))

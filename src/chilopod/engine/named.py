@@ -36,7 +36,7 @@ def engine_named(name: str) -> Engine:
         engine = import_module(_MODULES[name])  # a module is an engine
         return engine
     if ":" not in name:
-        problem = "there is no such engine"
+        problem = "must be one of the engines"
         allowed = f"{', '.join(ENGINES)}, or package.module:object"
         raise ParameterError(problem, field="engine", value=name, allowed=allowed, nearest=nearest_name(name, ENGINES))
     return _Own(name, _imported("engine", name))
@@ -48,13 +48,15 @@ class _Own:
     def __init__(self, name: str, engine: Any) -> None:
         if isinstance(engine, type):
             raise ParameterError(
-                "is a class", field="engine", value=name, allowed="an object, such as one of that class"
+                "must be an object, not a class", field="engine", value=name, allowed="an instance of that class"
             )
         missing = [each for each in _PARTS if not hasattr(engine, each)]
         if missing:
-            raise ParameterError(f"is no engine: it has no {missing[0]}", field="engine", value=name)
+            raise ParameterError(f"must be an engine: attribute {missing[0]} is missing", field="engine", value=name)
         if not isinstance(engine.traits, Traits):
-            raise ParameterError("is no engine: its traits are no chilopod.engine.Traits", field="engine", value=name)
+            raise ParameterError(
+                "must be an engine: its traits must be a chilopod.engine.Traits", field="engine", value=name
+            )
         self._name, self._engine = f"engine {name}", engine
         self.traits: Traits = engine.traits
 
@@ -63,7 +65,7 @@ class _Own:
         try:
             hash(shared)
         except TypeError:
-            raise AnalysisError("common gave what has no hash", field=self._name) from None
+            raise AnalysisError("common must return a hashable value", field=self._name) from None
         return shared
 
     def initial_states(self, *arguments: Any, **named: Any) -> Array:
@@ -79,7 +81,9 @@ class _Own:
         walk: Any = _theirs(self._name, how, getattr(self._engine, how), *arguments, **named)
         missing = _theirs(self._name, how, missing_parts, walk)
         if missing:
-            raise AnalysisError(f"{how} gave no chilopod.engine.Walk: it has no {', '.join(missing)}", field=self._name)
+            raise AnalysisError(
+                f"{how} must return a chilopod.engine.Walk; missing: {', '.join(missing)}", field=self._name
+            )
         wrapped: Any = _OwnWalk(self._name, walk)
         return wrapped
 
@@ -105,7 +109,7 @@ class _OwnWalk:
     def advance(self, until: float) -> None:
         _theirs(self._name, "advance", self._walk.advance, until)
         if not abs(self.time - until) <= _SAME_TIME:
-            raise AnalysisError(f"advance({until:g}) went to {self.time} s", field=self._name)
+            raise AnalysisError(f"advance({until:g}) must end at that time, not at {self.time} s", field=self._name)
 
 
 def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Any:
@@ -123,7 +127,7 @@ def controller_named(path: str) -> Controller:
     ParameterError if it cannot be imported or is no controller, see :func:`check_controller`."""
     made = _imported("controller", path)
     if not isinstance(made, type):
-        raise ParameterError("is no class", field="controller", value=path, allowed="package.module:Class")
+        raise ParameterError("must name a class", field="controller", value=path, allowed="package.module:Class")
     try:
         controller: Controller = made()
     except (ParameterError, KeyboardInterrupt):
@@ -142,10 +146,12 @@ def check_controller(controller: Controller) -> None:
     kind = type(controller)
     for name in ("events", "act"):
         if not callable(getattr(controller, name, None)):
-            raise ParameterError(f"has no {name}", field="controller", value=kind.__name__, allowed="events and act")
+            raise ParameterError(
+                f"must have a method {name}", field="controller", value=kind.__name__, allowed="events and act"
+            )
     frozen = dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen
     if not frozen:
-        problem = "can change, so nobody could tell trials apart"
+        problem = "must be immutable, because its fields name the trial"
         allowed = "a frozen dataclass: @dataclass(frozen=True)"
         raise ParameterError(problem, field="controller", value=kind.__name__, allowed=allowed)
 
@@ -158,7 +164,9 @@ def path_of(kind: type) -> str:
 def _imported(field: str, path: str) -> Any:
     if not _PATH.fullmatch(path):
         kind = "Class" if field == "controller" else "object"
-        raise ParameterError("names nothing", field=field, value=path, allowed=f"package.module:{kind}")
+        raise ParameterError(
+            "must name an object of a module", field=field, value=path, allowed=f"package.module:{kind}"
+        )
     module_name, _, name = path.partition(":")
     try:
         found: Any = import_module(module_name)

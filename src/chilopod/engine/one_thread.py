@@ -36,8 +36,10 @@ def _alone(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
             return verb(self, *arguments, **named)
         # One step for the interpreter, so that of two threads one is first.
         if state.setdefault(_INSIDE, me) != me:
-            allowed = "one thread at a time: a walk each, or a lock"
-            raise ThreadError("another thread is within a verb of this walk", field=f"walk.{name}", allowed=allowed)
+            allowed = "one thread at a time: give each thread its own walk, or use a lock"
+            raise ThreadError(
+                "must not run while another thread uses the same walk", field=f"walk.{name}", allowed=allowed
+            )
         try:
             return verb(self, *arguments, **named)
         finally:

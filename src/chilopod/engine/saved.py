@@ -40,13 +40,13 @@ def unpack(traits: Traits, saved: object) -> tuple[list[Robot], dict[str, Any], 
     """Robots, settings and arrays of a walk that :func:`pack` made; ParameterError if it is no such thing, damaged, or
     another engine's or version's."""
     if not isinstance(saved, bytes | bytearray | memoryview):
-        raise ParameterError("is no saved walk", field="saved", value=type(saved).__name__, allowed="bytes")
+        raise ParameterError("must be a saved walk", field="saved", value=type(saved).__name__, allowed="bytes")
     saved = bytes(saved)
     content = saved[len(_MAGIC) + _DIGEST :]
     if saved[: len(_MAGIC)] != _MAGIC:
-        raise ParameterError("is no saved walk", field="saved", allowed="what save() gave")
+        raise ParameterError("must be a saved walk", field="saved", allowed="bytes that save() returned")
     if hashlib.sha256(content).digest() != saved[len(_MAGIC) : len(_MAGIC) + _DIGEST]:
-        raise ParameterError("is damaged", field="saved", allowed="what save() gave, every byte of it")
+        raise ParameterError("is damaged", field="saved", allowed="all bytes that save() returned")
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as read:
             arrays: dict[str, Any] = dict(read)
@@ -61,7 +61,7 @@ def unpack(traits: Traits, saved: object) -> tuple[list[Robot], dict[str, Any], 
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError, zipfile.BadZipFile) as error:
         if isinstance(error, ParameterError):
             raise
-        raise ParameterError(f"cannot be read ({error})", field="saved", allowed="what save() gave") from None
+        raise ParameterError(f"cannot be read ({error})", field="saved", allowed="bytes that save() returned") from None
 
 
 def part(arrays: Mapping[str, Any], prefix: str) -> dict[str, Any]:
@@ -78,7 +78,9 @@ def read_back() -> Iterator[None]:
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, ParameterError):
             raise
-        raise ParameterError(f"does not fit together ({error})", field="saved", allowed="what save() gave") from None
+        raise ParameterError(
+            f"does not fit together ({error})", field="saved", allowed="bytes that save() returned"
+        ) from None
 
 
 @cache

@@ -57,7 +57,11 @@ class Targets:
             raise ParameterError("has the wrong shape", field="target", value=given.shape, allowed=f"(2,) or {shape}")
         none = np.isnan(given)
         if np.isinf(given).any() or (none.any(axis=-1) != none.all(axis=-1)).any():
-            raise ParameterError("is no place", field="target", allowed="x and y in m, or NaN for both: no target")
+            raise ParameterError(
+                "must be a finite position",
+                field="target",
+                allowed="x and y in m, or NaN for both without a target",
+            )
         places = np.array(np.broadcast_to(given, shape))
         if np.array_equal(places, self.present, equal_nan=True):
             return

@@ -59,7 +59,9 @@ class Actions:
         range.
         """
         if springs not in SPRINGS:
-            raise ParameterError("are no springs", field="springs", value=springs, allowed=" or ".join(SPRINGS))
+            raise ParameterError(
+                "must be one of the sets of springs", field="springs", value=springs, allowed=" or ".join(SPRINGS)
+            )
         own = robot.springs
         if own.adjustable is None:
             every = springs == "all"
@@ -67,14 +69,19 @@ class Actions:
         can = robot.springs.adjustable or ()
         joints = (0,) if springs == "first" else tuple(joint for joint, each in enumerate(can) if each)
         if not any(can) or not all(can[joint] for joint in joints):
-            raise ParameterError("has no actuator", field="springs.adjustable[0]", value=False, allowed="true")
+            raise ParameterError(
+                "must be true: the action sets the first spring",
+                field="springs.adjustable[0]",
+                value=False,
+                allowed="true",
+            )
         most = max(own.stiffness)
         softest = tuple(own.softest[joint] if own.softest else _SOFTEST * most for joint in joints)
         stiffest = tuple(own.stiffest[joint] if own.stiffest else most for joint in joints)
         for low, high in zip(softest, stiffest, strict=True):
             if not low < high:
                 given, names = f"{low:g}, {high:g} N*m/rad", "springs.softest, springs.stiffest"
-                raise ParameterError("leave a spring no range", field=names, value=given)
+                raise ParameterError("must leave each spring a range", field=names, value=given)
         return cls(robot, joints, softest, stiffest)
 
     @property

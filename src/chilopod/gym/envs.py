@@ -144,7 +144,9 @@ class RobotEnv(gymnasium.Env[Row, Row]):
     def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
         """Walk for a gait cycle."""
         if self._over:
-            raise ParameterError("the episode is over", field="step", allowed="reset() first")
+            raise ParameterError(
+                "must not be called after the end of an episode", field="step", allowed="reset() first"
+            )
         step = self.episodes.step(np.asarray(action)[None])
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         self._over = terminated or truncated
@@ -161,7 +163,7 @@ def _episodes(
 ) -> Episodes:
     if render_mode not in (None, *_RENDER_MODES):
         allowed = ", ".join(_RENDER_MODES)
-        raise ParameterError("there is no such render mode", field="render_mode", value=render_mode, allowed=allowed)
+        raise ParameterError("must be one of the render modes", field="render_mode", value=render_mode, allowed=allowed)
     engine_named(engine)
     if robot is None:
         robot = _PRESETS.get(engine, _PRESETS["planar"])

@@ -118,14 +118,14 @@ class Episodes:
         self.sight = Sight(self.actions, common.range)
         gait, least = robot.gait, self.task.farthest / robot.gait.speed
         if self._patience < least:
-            problem, allowed = "is too short for the farthest target", f"{least:g} s or more"
+            problem, allowed = "must be long enough to reach the farthest target", f"{least:g} s or more"
             raise ParameterError(problem, field="patience", value=f"{self._patience:g} s", allowed=allowed)
         self.period = gait.period
         self._looks = int(np.ceil(common.duration / gait.period)) + len(common.goals) + 1
         needed = _A_LOOK * self._looks * self.count
         if needed > memory.available():
             problem, asked = f"would take {memory.in_words(needed)} of memory", f"{self.count} * {common.duration:g} s"
-            allowed = f"less, {memory.in_words(memory.available())} are free"
+            allowed = f"fewer or shorter episodes: {memory.in_words(memory.available())} are free"
             raise ParameterError(problem, field="num_envs * targets * patience", value=asked, allowed=allowed)
         self.moments: deque[Moment] | None = deque(maxlen=self._looks) if remember else None
         self._walk: Walk | None = None
@@ -160,7 +160,7 @@ class Episodes:
         those of robots whose episode was over are not used. Raises ParameterError, and changes nothing, before the
         first episode, or if an action is none."""
         if self._walk is None:
-            raise ParameterError("there is no episode yet", field="step", allowed="reset() first")
+            raise ParameterError("must not be called before the first reset", field="step", allowed="reset() first")
         told, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk
         if waiting.all():
             return self._begin([None] * self.count)

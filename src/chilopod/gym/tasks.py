@@ -150,9 +150,9 @@ def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
     found = TASKS.get(task) if isinstance(task, str) else task
     if not isinstance(found, Task):
         nearest, allowed = nearest_name(str(task), TASKS), f"{', '.join(TASKS)}, or a chilopod.gym.Task"
-        raise ParameterError("there is no such task", field="task", value=task, allowed=allowed, nearest=nearest)
+        raise ParameterError("must be one of the tasks", field="task", value=task, allowed=allowed, nearest=nearest)
     names = [each.name for each in fields(found)]
     for name in chosen.keys() - names:
-        problem = f"is no attribute of a {type(found).__name__}"
+        problem = f"must be a field of {type(found).__name__}"
         raise ParameterError(problem, field=name, value=chosen[name], allowed=", ".join(names))
     return replace(found, **chosen)

@@ -137,7 +137,7 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
 
 def _check_one_each(models: Sequence[PlanarModel], states: Array, name: str) -> None:
     if states.ndim != 2 or not 0 < len(models) == len(states):
-        raise ParameterError("must be one for each model", field=name, value=states.shape, allowed="at least one")
+        raise ParameterError("must have one row for each model", field=name, value=states.shape, allowed="at least one")
 
 
 def _alike(models: Sequence[PlanarModel]) -> bool:

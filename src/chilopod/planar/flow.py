@@ -49,7 +49,9 @@ def pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array
     belongs to.
     """
     if not (np.isfinite(t0) and np.isfinite(t1) and t0 <= t1):
-        raise ParameterError("times must be finite and in order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
+        raise ParameterError(
+            "must be finite and in ascending order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1"
+        )
     period = gait.period
     times = gait.schedule(modules).times
     first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))

@@ -20,7 +20,7 @@ def check_steps(robot: Robot, seconds: float) -> None:
     steps = robot.body.modules * seconds * sum(rates.values()) / _REACH
     if steps > MOST_STEPS:
         problem = f"the motion is too fast to follow for {seconds:g} s: about {steps:.0e} steps of modules"
-        allowed = f"what takes at most {MOST_STEPS:.0e}"
+        allowed = f"at most {MOST_STEPS:.0e} steps of modules"
         raise ParameterError(problem, field=max(rates, key=rates.__getitem__), allowed=allowed)
 
 

@@ -312,6 +312,8 @@ def propagate(
     """
     n, intervals = len(matrix), widths.size
     if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):
-        raise ParameterError("has the wrong shape", field="upper", value=upper.shape, allowed="see propagate()")
+        raise ParameterError(
+            "has the wrong shape", field="upper", value=upper.shape, allowed="the shapes that propagate() documents"
+        )
     error, orders = _propagate_all(widths, upper, decay, frequency, clock, matrix)
     return float(error), int(orders)

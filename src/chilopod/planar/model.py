@@ -240,7 +240,9 @@ class PlanarModel(ReadOnlyArrays):
         robot = self.robot
         n, intervals = self.modules, len(self.schedule.times) - 1
         if 3 * intervals * (n + 2) * (2 * n + 1) > _MOST_NUMBERS:
-            problem = f"its equations are too many: {intervals} intervals between touch-downs and lift-offs in a period"
+            problem = (
+                f"the periodic walk takes too many equations: a period has {intervals} intervals of constant contact"
+            )
             allowed = "fewer modules, or phases with which many legs touch down at once"
             raise AnalysisError(problem, field="body.modules", value=n, allowed=allowed)
         passive, joint, rates, decay = _passive_matrices(
@@ -301,7 +303,7 @@ def carry(
     starts, widths, interval = models[0]._pieces(t0, t1)
     recorded = advance(starts, widths, _chains(models, interval), states, tolerance, nodes)
     if recorded is None:
-        raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
+        raise AnalysisError(f"the motion must stay finite, but it diverges between {t0:g} s and {t1:g} s", field="x")
     return recorded
 
 

@@ -375,7 +375,12 @@ def carry(
     else:
         fits = walk_alone(*what)
     if not fits:
-        raise ParameterError("do not fit together", field="states", value=states.shape, allowed="see carry()")
+        raise ParameterError(
+            "must fit the number of modules and walks",
+            field="states",
+            value=states.shape,
+            allowed="the shapes that carry() documents",
+        )
 
 
 def _work(rows: Any, pieces: Pieces, step: Any) -> float:

@@ -54,7 +54,12 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     it is no TOML.
     """
     if not isinstance(robot, str | Path):
-        raise RobotFileError("is no robot", field="robot", value=robot, allowed="a preset or the path of a file")
+        raise RobotFileError(
+            "must be a preset or the path of a robot file",
+            field="robot",
+            value=robot,
+            allowed="a preset or the path of a file",
+        )
     source, path = str(robot), Path(robot)
     names = presets()
     if source in names:
@@ -67,7 +72,7 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
         raise RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
     if missing:
         allowed, nearest = f"a robot file or one of the presets {', '.join(names)}", nearest_name(source, names)
-        raise RobotFileError("no such preset or file", value=source, allowed=allowed, nearest=nearest)
+        raise RobotFileError("must be a preset or an existing file", value=source, allowed=allowed, nearest=nearest)
     text = read_text(path, "robot file", RobotFileError)
     try:
         return parsed(text), source

@@ -32,7 +32,7 @@ def _printable(text: object, longest: int) -> str:
     if not isinstance(text, str):
         raise ParameterError("must be text", value=text)
     if not (text.strip() and text.isprintable() and len(text) <= longest):
-        raise ParameterError("is no plain text", value=text, allowed=f"1 to {longest} printable characters")
+        raise ParameterError("must be plain text", value=text, allowed=f"1 to {longest} printable characters")
     return text
 
 
@@ -126,7 +126,9 @@ class Robot(Description):
             values = getattr(self.springs, key)
             if values is not None and len(values) != joints:
                 allowed = f"{joints}, one fewer than body.modules, or a single value for all"
-                raise ParameterError(f"has {len(values)} values", field=f"springs.{key}", allowed=allowed)
+                raise ParameterError(
+                    f"must have one value for each joint, not {len(values)}", field=f"springs.{key}", allowed=allowed
+                )
         for path in self.provenance:
             try:
                 self._locate(path)
@@ -181,11 +183,13 @@ class Robot(Description):
             return self.module_yaw_inertia
         value = getattr(getattr(self, place.section), place.key)
         if value is None:
-            raise ParameterError("this robot has none", field=path)
+            raise ParameterError("must be a parameter that this robot has", field=path)
         if not place.quantity.each:
             return float(value)
         if place.index is None and any(item != value[0] for item in value):
-            raise ParameterError("its values differ", field=path, allowed=f"one of them, such as {path}[0]")
+            raise ParameterError(
+                "must be a single value, but its values differ", field=path, allowed=f"a single one, such as {path}[0]"
+            )
         return float(value[place.index or 0])
 
     def unit_of(self, path: str) -> str:
@@ -229,7 +233,7 @@ class Robot(Description):
         for assignment in assignments:
             path, equals, value = assignment.partition("=")
             if not equals:
-                raise ParameterError("is not an override", value=assignment, allowed="PATH=VALUE")
+                raise ParameterError("must be an override", value=assignment, allowed="PATH=VALUE")
             robot = robot.override(path.strip(), value)
         return robot
 
@@ -294,9 +298,9 @@ class Robot(Description):
     def _locate(self, path: str) -> Place:
         place = place_of(path)
         if place.section == "twin" and self.twin is None:
-            raise ParameterError("this robot has no [twin], only the planar model knows it", field=path)
+            raise ParameterError("needs a table [twin], which this robot lacks", field=path)
         if place.index is not None and place.index >= self.body.modules - 1:
-            raise ParameterError("there is no such spring", field=path, allowed=f"0 to {self.body.modules - 2}")
+            raise ParameterError("must be the index of a spring", field=path, allowed=f"0 to {self.body.modules - 2}")
         return place
 
     def _replaced(self, path: str, place: Place, value: float) -> Self:
@@ -307,7 +311,9 @@ class Robot(Description):
         if place.quantity.each:
             if old is None:
                 if place.index is not None and not isinstance(place.quantity, Flag):
-                    raise ParameterError("this robot has none", allowed=f"{path.partition('[')[0]} for all of them")
+                    raise ParameterError(
+                        "must be a parameter that this robot has", allowed=f"{path.partition('[')[0]} for all of them"
+                    )
                 old = (False,) * (self.body.modules - 1)
             new = tuple(value if place.index in (None, index) else item for index, item in enumerate(old))
         if new == getattr(section, place.key):

@@ -50,18 +50,20 @@ def place_of(path: str) -> Place:
     stem, index = match.groups() if match else (path, None)
     if stem not in known:
         if stem.partition(".")[0] in ("name", "provenance"):
-            raise ParameterError("is text, not a parameter", field=path, allowed=", ".join(known))
+            raise ParameterError("must be the path of a parameter, not of a text", field=path, allowed=", ".join(known))
         bare, _, rest = path.partition("[")
         # "stiffness" alone, or under a wrong section, is nearer to what was meant than spelling can tell.
         same_key = (name for name in known if name.partition(".")[2] == bare.rpartition(".")[2])
         nearest = next(same_key, None) or nearest_name(bare, known)
         if nearest is None:
-            raise ParameterError("names no parameter", field=path, allowed=", ".join(known))
+            raise ParameterError("must be the path of a parameter", field=path, allowed=", ".join(known))
         meant = _INDEX.fullmatch(rest) if known[nearest].each else None
-        raise ParameterError("names no parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest)
+        raise ParameterError(
+            "must be the path of a parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest
+        )
     quantity = known[stem]
     if index is not None and not quantity.each:
-        raise ParameterError("has no index", field=path, allowed=stem)
+        raise ParameterError("must be written without an index", field=path, allowed=stem)
     section, key = stem.split(".")
     return Place(section, key, None if index is None else int(index), quantity)
 

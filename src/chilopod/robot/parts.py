@@ -81,7 +81,7 @@ class Springs(Description):
         if self.softest is not None and self.stiffest is not None:
             for joint, (low, high) in enumerate(zip(self.softest, self.stiffest, strict=False)):
                 if low > high:
-                    problem = f"of joint {joint + 1}, softest is above stiffest"
+                    problem = f"softest must be at most stiffest at joint {joint + 1}"
                     raise ParameterError(problem, value=f"{low:g} N*m/rad", allowed=f"at most {high:g} N*m/rad")
         return self
 
@@ -176,8 +176,8 @@ class Twin(Description):
     def _whole_steps(self) -> Self:
         steps = self.control_interval / self.timestep
         if not (steps > 0.5 and abs(steps - round(steps)) < 1e-6):
-            problem = "does not go into twin.control_interval a whole number of times"
-            allowed = f"{self.control_interval:g} s over a whole number"
+            problem = "must divide twin.control_interval"
+            allowed = f"{self.control_interval:g} s divided by a whole number"
             raise ParameterError(problem, field="timestep", value=f"{self.timestep:g} s", allowed=allowed)
         return self
 

@@ -60,7 +60,12 @@ class Goal:
         if not (ARRIVAL_RADIUS if self.relative else -1.0) < distance <= FARTHEST:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
             allowed = f"{near}at most {FARTHEST:g} m"
-            raise ParameterError("is no way to go", field="target distance", value=f"{distance:g} m", allowed=allowed)
+            raise ParameterError(
+                "must be a distance that a robot can walk",
+                field="target distance",
+                value=f"{distance:g} m",
+                allowed=allowed,
+            )
 
     @classmethod
     def parse(cls, text: str) -> Goal:
@@ -77,7 +82,7 @@ class Goal:
         fits = [unit for unit in ("rad", "m") if _is_quantity(first, unit)]
         if not comma or len(fits) != 1:
             # Of a bare number nobody could tell whether it is an angle or a length.
-            problem = "needs a unit behind its first number" if comma and fits else "is no target"
+            problem = "must have a unit behind its first number" if comma and fits else "must be a target"
             raise ParameterError(problem, field="target", value=text.strip(), allowed=_FORM)
         value = units.parse(first, fits[0])
         try:
@@ -89,7 +94,9 @@ class Goal:
             return cls(value, other, relative=False)
         if not abs(value) <= math.pi or other < 0.0:
             allowed = "-180 to 180 deg, a positive distance"
-            raise ParameterError("is no direction and distance", field="target", value=text.strip(), allowed=allowed)
+            raise ParameterError(
+                "must be a bearing and a distance", field="target", value=text.strip(), allowed=allowed
+            )
         return cls(other * math.cos(value), other * math.sin(value), relative=True)
 
     def __str__(self) -> str:
@@ -142,7 +149,7 @@ class Course:
         in_range("range", self.range, FARTHEST, "m")
         if not 0.0 <= self.tightest <= FARTHEST:
             allowed = f"0 to {FARTHEST:g} m"
-            raise ParameterError("is no radius", field="tightest", value=f"{self.tightest:g} m", allowed=allowed)
+            raise ParameterError("must be a radius", field="tightest", value=f"{self.tightest:g} m", allowed=allowed)
         if not 1 <= len(self.goals) <= MOST_GOALS:
             raise _wrong_count(len(self.goals))
         before, where = Goal(0.0, 0.0, relative=False), "where the robot starts"
@@ -217,7 +224,7 @@ def course_named(text: str, patience: float) -> Course:
     if "," in text or ";" in text:
         return Course(_goals(text.split(";")), patience)
     raise ParameterError(
-        "there is no such course or file",
+        "must be targets, a named course or an existing file",
         field="targets",
         value=text,
         allowed=f'targets such as "45 deg, 1.3 m; -60 deg, 1.5 m", a file, {", ".join(COURSES)}, {_RANDOM}SEED',
@@ -252,12 +259,12 @@ def _seed(text: str) -> int:
     digits = text.removeprefix(_RANDOM)
     if not (digits.isascii() and digits.isdigit() and len(digits) <= _LONGEST_SEED):
         allowed = f"a whole number from 0, at most {_LONGEST_SEED} digits, such as {_RANDOM}1"
-        raise ParameterError("has no seed", field="targets", value=text, allowed=allowed)
+        raise ParameterError("must end with a seed", field="targets", value=text, allowed=allowed)
     return int(digits)
 
 
 def _wrong_count(count: int) -> ParameterError:
-    return ParameterError("is no number of targets", field="targets", value=count, allowed=f"1 to {MOST_GOALS}")
+    return ParameterError("must be a number of targets", field="targets", value=count, allowed=f"1 to {MOST_GOALS}")
 
 
 def _is_quantity(text: str, unit: str) -> bool:

@@ -44,7 +44,7 @@ class LegYawController:
                 raise ParameterError("is out of range", field=name, value=value, allowed="0 to a right angle, rad")
         if not 0.0 <= self.start <= self.end <= 1.0:
             raise ParameterError(
-                "must be parts of the swing, in order", field="start, end", value=(self.start, self.end)
+                "must be fractions of the swing in ascending order", field="start, end", value=(self.start, self.end)
             )
 
     def events(self, gait: Gait) -> Sequence[Event]:

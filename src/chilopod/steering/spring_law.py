@@ -91,7 +91,7 @@ class SpringLaw(ReadOnlyArrays):
         stiffest = min(max(own.stiffness), own.stiffest[0] if own.stiffest else np.inf)
         if not softest < stiffest:
             low, high = (units.format(each, law.unit, digits=4) for each in (softest, stiffest))
-            problem, names = "leaves the first spring no range to steer with", "springs.softest, springs.stiffest"
+            problem, names = "must leave the first spring a range to steer with", "springs.softest, springs.stiffest"
             allowed = "the softest below the stiffest, and below the stiffest spring of the axis"
             raise ParameterError(problem, field=names, value=f"{low} to {high}", allowed=allowed)
         curvatures = np.where(np.isfinite(law.radii), 1.0 / law.radii, 0.0)

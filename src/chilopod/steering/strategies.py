@@ -60,7 +60,9 @@ class Strategy:
         if self.springs is not None and spring is None:
             raise ParameterError(f"strategy {self.name} needs one stiffness", field="k1", allowed="a stiffness")
         if self.springs is None and spring is not None:
-            raise ParameterError(f"strategy {self.name} has no spring to choose", field="k1", value=spring)
+            raise ParameterError(
+                f"must not be given: strategy {self.name} sets its own springs", field="k1", value=spring
+            )
 
     def fitted(self, robot: Robot, spring: float | None = None) -> tuple[Robot, tuple[str, ...]]:
         """Robot with the strategy's springs and actuators, and remarks on it."""
@@ -98,7 +100,9 @@ class Strategy:
         if controller is not None:
             return Prepared(walker, controller, remarks)
         if self.needs_law and law is None:
-            raise ParameterError(f"strategy {self.name} needs the robot's radius law", field="law", value=None)
+            raise ParameterError(
+                f"must be the radius law of the robot for strategy {self.name}", field="law", value=None
+            )
         own, more = self.controller(walker, law)
         return Prepared(walker, own, (*remarks, *more))
 
@@ -117,7 +121,7 @@ class SpringOnTheWay(Strategy):
             said = "the robot file names no actuator: the first spring is taken to change as fast as it is told to"
             return robot.override("springs.adjustable[0]", True), (said,)
         if not adjustable[0]:
-            problem = f"the first spring has no actuator, and the strategy {self.name} sets it on the way"
+            problem = f"must be true: strategy {self.name} sets the first spring while the robot walks"
             raise ParameterError(problem, field="springs.adjustable[0]", value=False, allowed="true")
         return robot, ()
 
@@ -180,6 +184,6 @@ def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Str
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
         raise ParameterError(
-            "there is no such strategy", field="strategy", value=name, allowed=allowed, nearest=nearest
+            "must be one of the strategies", field="strategy", value=name, allowed=allowed, nearest=nearest
         )
     return among[name]

@@ -43,11 +43,14 @@ class Target:
     def __post_init__(self) -> None:
         if not abs(self.bearing) <= 0.5 * math.pi:
             value, allowed = f"{math.degrees(self.bearing):g} deg", "-90 to 90 deg"
-            raise ParameterError("lies behind the robot", field="target bearing", value=value, allowed=allowed)
+            raise ParameterError("must lie in front of the robot", field="target bearing", value=value, allowed=allowed)
         if not ARRIVAL_RADIUS < self.distance <= FARTHEST:
             allowed = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, at most {FARTHEST:g} m"
             raise ParameterError(
-                "is no way to go", field="target distance", value=f"{self.distance:g} m", allowed=allowed
+                "must be a distance that a robot can walk",
+                field="target distance",
+                value=f"{self.distance:g} m",
+                allowed=allowed,
             )
 
     @classmethod
@@ -61,7 +64,7 @@ class Target:
         """
         bearing, comma, distance = text.partition(",")
         if not comma:
-            raise ParameterError("is no target", field="target", value=text, allowed=_FORM)
+            raise ParameterError("must be a target", field="target", value=text, allowed=_FORM)
         try:
             return cls(units.parse(bearing, "rad"), units.parse(distance, "m"))
         except UnitError as error:

@@ -231,7 +231,7 @@ def driver(
         law = law or radius_law(robot, engine, folder, progress)
     except AnalysisError as error:
         if strategy.needs_law and controller is None:
-            problem = f"the strategy {strategy.name} stands on how tightly the first spring turns the robot"
+            problem = f"strategy {strategy.name} needs a radius law of the first spring"
             allowed = "a robot that bends (narrower, softer behind, with a longer stride), or the strategy leg-yaw"
             raise AnalysisError(f"{problem}: {error.problem}", allowed=allowed) from error
         unknown = (f"how tightly the robot turns is not known, so shortest paths are straight lines: {error.problem}",)

@@ -66,7 +66,7 @@ def radius_law(
     ends = xr.concat([end_of_walk(each, robot) for each in run(asked, folder, progress)], "spring")
     curved = is_curved(ends)
     if curved.sum() < 3:
-        raise AnalysisError("the walks at fewer than three springs curve: there is no radius law", field="springs")
+        raise AnalysisError("must give at least three curved walks for a radius law", field="springs")
     inverse = 1.0 / np.array(springs)
     fit = square_root_fit(inverse[curved], ends.bend.values[curved], resampled=0)
     stiff_first = np.flatnonzero(curved)[::-1]

@@ -151,9 +151,11 @@ def turn(
         If no spring turns tightly enough.
     """
     if spring not in ("auto", "law") and isinstance(spring, str):
-        raise ParameterError("is no spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
+        raise ParameterError(
+            "must be a spring setting", field="spring", value=spring, allowed="auto, law, or a stiffness"
+        )
     if strategy.springs is None and spring != "auto":
-        problem = f"is of no use to {strategy.name}, which leaves the springs alone"
+        problem = f"must be auto: strategy {strategy.name} does not set the springs"
         raise ParameterError(problem, field="spring", value=spring, allowed="auto")
     traits = engine_named(engine).traits
     time = duration if duration is not None else _time_for(robot, target, traits.haste)
@@ -170,7 +172,7 @@ def turn(
         stiffness = spring
     elif spring == "law" or not (strategy.leg_yaw or controller):
         if by_law is None:
-            raise AnalysisError("only the first spring has a radius law", field="spring", value=spring)
+            raise AnalysisError("must be the first spring for a radius law", field="spring", value=spring)
         stiffness = by_law
     else:
         stiffest = max(robot.springs.stiffness)

@@ -54,7 +54,7 @@ def check_finite(values: Mapping[str, Any], engine: str) -> None:
 
 
 def _refused(wrong: str, engine: str) -> AnalysisError:
-    return AnalysisError(f"gave what was not asked for: {wrong}", field=f"engine {engine}")
+    return AnalysisError(f"must return the records of the trials it received: {wrong}", field=f"engine {engine}")
 
 
 def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:

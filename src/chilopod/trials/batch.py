@@ -56,7 +56,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     walk, drawn, referee = _steered(trials, first.duration)
     name = type(first.controller).__name__
     if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
-        raise AnalysisError("changed its own fields while it steered, so its trials are not what they say", field=name)
+        raise AnalysisError("must not change its own fields while it steers: they name the trial", field=name)
     if not doubts and _is_own(first) and first.as_now().code != first.code:
         doubts = _KNOWN[_who(first)] = _CHANGES
     data = check_asked(walk.to_dataset(), walk, trials, drawn)
@@ -84,7 +84,7 @@ def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], 
         **conditions(engine, first.robot, drawn, first.target is not None and first.disturbance.bearing > 0.0),
     )
     if len(walk.robots) != len(trials):
-        problem = f"start gave a walk of {len(walk.robots)} robots instead of {len(trials)}"
+        problem = f"start must return a walk of {len(trials)} robots, not {len(walk.robots)}"
         raise AnalysisError(problem, field=f"engine {first.engine}")
     noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])

@@ -226,7 +226,7 @@ def _named(batch: Sequence[Trial]) -> str:
 def _connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
     """A ``distributed.Client`` of a cluster; leaving the stack closes all that was opened for it."""
     if isinstance(where, int) and not 1 <= where <= _MOST:
-        raise ParameterError("is no number of workers", field="cluster", value=where, allowed=f"1 to {_MOST}")
+        raise ParameterError("must be a number of workers", field="cluster", value=where, allowed=f"1 to {_MOST}")
     needs("distributed", extra="cluster")
     import dask
     import distributed
@@ -254,7 +254,7 @@ def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
         secrets = distributed.Security().get_connection_args("client")
         async with distributed.rpc(address, connection_args=secrets, timeout=_CONNECT) as scheduler:
             if (await asyncio.wait_for(scheduler.identity(), _CONNECT))["type"] != "Scheduler":
-                raise ValueError("is a worker, no scheduler")
+                raise ValueError("is a worker, not a scheduler")
 
     try:
         # A client that cannot be made leaves a loop, a thread and a traceback behind, so somebody else knocks first; in
@@ -262,14 +262,18 @@ def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
         with ThreadPoolExecutor(1) as knocking:
             knocking.submit(asyncio.run, asked()).result()
     except Exception as error:  # OSError, ValueError of an address, whatever comes of bytes that are not dask's
-        reason = "does not answer" if isinstance(error, OSError) else f"is none ({type(error).__name__}: {error})"
+        reason = (
+            "does not answer"
+            if isinstance(error, OSError)
+            else f"must be a dask scheduler ({type(error).__name__}: {error})"
+        )
         allowed = "the address of a dask scheduler"
         raise ClusterError(one_line(reason), field="cluster", value=address, allowed=allowed) from None
     client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
     stack.callback(_closed, client)
     try:
         if not client.nthreads():
-            raise ClusterError("has no workers", field="cluster", value=address)
+            raise ClusterError("must have at least one worker", field="cluster", value=address)
         for place, there in client.run(versions, PACKAGES).items():
             check_versions(versions(PACKAGES), there, f"{address}, {place}")
     except ClusterError:
@@ -313,7 +317,7 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
     try:
         client.wait_for_workers(workers, timeout=_START)
     except TimeoutError:
-        problem = "worker processes do not start; a script has to make its cluster under `if __name__ == '__main__':`"
+        problem = "worker processes do not start; a script must create its cluster under `if __name__ == '__main__':`"
         raise ClusterError(problem, field="cluster", value=workers) from None
     return client
 

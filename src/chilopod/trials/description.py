@@ -46,7 +46,7 @@ def plain(value: object, field: str) -> Any:
             "fields": {name: plain(getattr(value, name), f"{field}.{name}") for name in _counted(value)},
         }
     raise ParameterError(
-        "is no plain data, so nobody could tell trials apart",
+        "must be plain data, because its value names the trial",
         field=field,
         value=kind.__name__,
         allowed="numbers, text, None, enums, arrays, and tuples or frozen dataclasses of these",

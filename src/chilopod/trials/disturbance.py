@@ -57,7 +57,7 @@ class Disturbance:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.missed <= 1.0:
-            raise ParameterError("is no part", field="missed", value=self.missed, allowed="0 to 1")
+            raise ParameterError("must be a fraction", field="missed", value=self.missed, allowed="0 to 1")
         for name in _DEVIATIONS:
             value = getattr(self, name)
             if not 0.0 <= value < 10.0:

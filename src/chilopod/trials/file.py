@@ -32,7 +32,7 @@ def content_of(record: xr.Dataset) -> bytes:
     of 32 bits, truth values and text, or has a dimension of length 0."""
     if not all(record.sizes.values()):
         sizes = {str(name): size for name, size in record.sizes.items()}
-        raise OutputError("has a dimension of length 0 and cannot be kept", field="record", value=sizes)
+        raise OutputError("must not have a dimension of length 0", field="record", value=sizes)
     buffer = io.BytesIO()
     # Directly, for xarray takes ten times as long as the walk of a short trial.
     file = netcdf_file(buffer, "w", version=2)
@@ -65,13 +65,13 @@ def _as_stored(field: str, values: NDArray[Any]) -> tuple[NDArray[Any], dict[str
         encoded = np.char.encode(values.astype(str), "utf-8")
         encoded = encoded.astype(f"S{max(1, encoded.dtype.itemsize)}")
         return encoded[..., None].view("S1"), {"_Encoding": "utf-8"}
-    raise OutputError("cannot be kept in a file", field=field, value=str(values.dtype))
+    raise OutputError("must be of a type that netCDF can hold", field=field, value=str(values.dtype))
 
 
 def _describe(target: Any, field: str, attributes: Mapping[Any, Any]) -> None:
     for name, value in attributes.items():
         if not isinstance(value, str | bool | int | float | np.number):
-            raise OutputError("cannot be kept in a file", field=f"{field}.attrs[{name!r}]", value=value)
+            raise OutputError("must be of a type that netCDF can hold", field=f"{field}.attrs[{name!r}]", value=value)
         setattr(target, str(name), value.encode() if isinstance(value, str) else np.float64(value))
 
 

@@ -66,7 +66,9 @@ def contents(folder: Path) -> Contents:
                     paths = unfinished
                 paths.append(folder / entry.name)
     except OSError as error:
-        raise ParameterError(f"is no folder of trials ({error.strerror})", field="folder", value=str(folder)) from None
+        raise ParameterError(
+            f"must be a folder of trials ({error.strerror})", field="folder", value=str(folder)
+        ) from None
     return Contents(*(tuple(sorted(each)) for each in (trials, aside, unfinished, foreign)))
 
 
@@ -165,7 +167,7 @@ def _kept(path: Path, header: Header) -> Kept:
     digest = digest_of(text)
     if not path.stem.endswith(f"-{digest}"):
         raise UnsoundError(
-            f"holds another trial, whose name ends in {digest}.nc" if text else "is no record of a trial"
+            f"holds another trial, whose name ends in {digest}.nc" if text else "is not the record of a trial"
         )
     try:
         told = json.loads(text)

@@ -60,7 +60,7 @@ def packed(batch: Sequence[Trial]) -> bytes:
     could not find, or tell apart, what steers them."""
     for trial in batch:
         if trial.code[1]:
-            raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="to walk them on this machine")
+            raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="trials run on this machine")
     packages = (*PACKAGES, TWIN_PACKAGE) if batch[0].engine == "twin" else PACKAGES
     try:
         trials = pickle.dumps(list(batch), pickle.HIGHEST_PROTOCOL)
@@ -120,7 +120,7 @@ def _walked(job: bytes, place: str) -> Any:
     for trial, there, text in zip(trials, here, texts, strict=True):
         if there != text:
             own = f"engine {trial.engine}" if trial.controller is None else path_of(type(trial.controller))
-            problem = f"the code of {own}, or of what it imports, is another on a worker than here"
+            problem = f"the code of {own}, or of what it imports, differs between a worker and this machine"
             raise ClusterError(problem, field="cluster", value=place)
     import numba
     from distributed import get_worker

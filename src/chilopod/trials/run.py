@@ -202,6 +202,6 @@ class _Study:
             walked = list(zip(begun[index], records, strict=True))
             for trial, record in walked:
                 if record.attrs.get("trial") != trial.text:
-                    problem = "gave the record of another trial, or one that other code walked"
+                    problem = "must return the record of this trial, computed by this code"
                     raise AnalysisError(problem, field=type(self._executor).__name__)
             yield walked

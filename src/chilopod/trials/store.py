@@ -65,7 +65,7 @@ class Store:
         """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept. Raises
         OutputError if it is another trial's record, or the file cannot be written."""
         if record.attrs.get("trial") != trial.text:
-            problem = "is that of another trial, or was walked by other code"
+            problem = "must belong to this trial and to this code"
             raise OutputError(problem, field="record", allowed=f"a record for {trial.file_name}")
         if NOT_KEPT in record.attrs:
             words = trial.not_kept(record.attrs.pop(NOT_KEPT))

@@ -85,7 +85,7 @@ class Trial:
     def __post_init__(self) -> None:
         for name, (kind, allowed) in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise ParameterError("is none", field=name, value=getattr(self, name), allowed=allowed)
+                raise ParameterError("must be of another kind", field=name, value=getattr(self, name), allowed=allowed)
         seeds = as_seeds([self.seed], "seed")
         # Equal trials have one text, whatever kinds of numbers they were given.
         plain_values = {
@@ -100,13 +100,22 @@ class Trial:
         in_range("duration", self.duration, LONGEST, "s")
         course, engine = self.course, engine_named(self.engine)
         if self.brief and course is None:
-            raise ParameterError("is for courses", field="brief", value=True, allowed="False, or a course as target")
+            raise ParameterError(
+                "must be False: only courses have brief records",
+                field="brief",
+                value=True,
+                allowed="False, or a course as target",
+            )
         if course is not None and self.duration != course.duration:
             allowed = f"{course.duration:g} s"
-            raise ParameterError("is not that of the course", field="duration", value=self.duration, allowed=allowed)
+            raise ParameterError(
+                "must be the duration of the course", field="duration", value=self.duration, allowed=allowed
+            )
         engine.common(self.robot)
         if self.recording.poses and not engine.traits.poses:
-            raise ParameterError("this engine has none", field="poses", value=True, allowed="False")
+            raise ParameterError(
+                "must be False: this engine has no poses in space", field="poses", value=True, allowed="False"
+            )
         if self.controller is not None:
             check_controller(self.controller)
             self.steering  # noqa: B018  (as it is now; what is in a frozen dataclass may still change)
@@ -116,9 +125,9 @@ class Trial:
         angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
         problem, allowed = "", ""
         if angles.shape not in ((0,), (1,), (joints,)):
-            problem, allowed = f"are {angles.size} angles", f"{joints}, or one for all"
+            problem, allowed = f"must be one angle for each joint, not {angles.size}", f"{joints}, or one for all"
         elif not (np.abs(angles) <= _MOST_BENT).all():
-            problem, allowed = "are bent too far", f"{_MOST_BENT} rad (85 deg) to either side"
+            problem, allowed = "must be smaller", f"-{_MOST_BENT} to {_MOST_BENT} rad (85 deg)"
         if problem:
             raise ParameterError(problem, field="joint_angles", value=self.joint_angles, allowed=allowed)
         return tuple(np.broadcast_to(angles, joints if angles.size else 0).tolist())
@@ -152,7 +161,7 @@ class Trial:
         """Digest of what the code of controller and engine is; why no other process could find that, if so; and why
         it could not walk the same, if so."""
         known_here = "__main__:" in self.engine or not all(map(is_findable, classes_in(self.controller)))
-        why = "it is known to this process only; put it at the top of a module that can be imported"
+        why = "it must be defined at the top of a module that can be imported"
         try:
             digest, chance = code_of(self.controller)
             again = f"{chance}, which answers otherwise every time; chance with a seed does not" if chance else ""
@@ -167,7 +176,12 @@ class Trial:
         if repeats < 1:
             raise ParameterError("must be positive", field="repeats", value=repeats)
         if repeats > 1 and seed is None:
-            raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
+            raise ParameterError(
+                "must be 1 without a seed, because the trials would be identical",
+                field="repeats",
+                value=repeats,
+                allowed="1, or a seed",
+            )
         spread = NONE if seed is None else self.disturbance
         return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 

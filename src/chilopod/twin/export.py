@@ -100,7 +100,7 @@ def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:
     """The format that goes with a suffix, such as ``.urdf``; ParameterError if none does."""
     if suffix.lower() not in FORMATS:
         allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
-        raise ParameterError("is the suffix of no format", field="out", value=suffix, allowed=allowed)
+        raise ParameterError("must be the suffix of a format", field="out", value=suffix, allowed=allowed)
     return FORMATS[suffix.lower()]
 
 

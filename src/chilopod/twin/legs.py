@@ -37,7 +37,10 @@ def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
     ):
         if wrong.any():
             raise ParameterError(
-                "the leg cannot reach its path", field="twin.hip_height", value=f"{1e3 * worst:.4g} mm", allowed=allowed
+                "must be lower: the leg cannot reach its path",
+                field="twin.hip_height",
+                value=f"{1e3 * worst:.4g} mm",
+                allowed=allowed,
             )
     knee = -np.arccos(np.clip((distance**2 - upper**2 - lower**2) / (2.0 * upper * lower), -1.0, 1.0))
     hip = np.arctan2(x, z) - np.arctan2(lower * np.sin(knee), upper + lower * np.cos(knee))
@@ -61,7 +64,7 @@ def check_reach(robot: Robot) -> None:
 def twin_of(robot: Robot) -> Twin:
     """The robot's [twin]; ParameterError if it has none."""
     if robot.twin is None:
-        problem = "this robot has none, so the three-dimensional model cannot be built"
+        problem = "must be given in the robot file for the three-dimensional model"
         allowed = "the keys of [twin] in the robot file; the preset aoi2022 has them"
         raise ParameterError(problem, field="twin", allowed=allowed)
     return robot.twin

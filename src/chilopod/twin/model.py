@@ -228,17 +228,17 @@ def _legs(module: int) -> list[str]:
 
 def _check_bodies(robot: Robot, twin: Twin) -> None:
     if 4.0 * twin.link_mass >= robot.module_mass:
-        problem = "leaves no mass for the bodies: a module has four links"
+        problem = "must leave mass for the body: a module has four links"
         allowed = f"less than {0.25 * robot.module_mass:.4g} kg"
         raise ParameterError(problem, field="twin.link_mass", value=f"{twin.link_mass:g} kg", allowed=allowed)
     if 0.5 * twin.body_height >= twin.hip_height + twin.foot_radius:
-        problem = "the body would touch the floor"
+        problem = "must keep the body above the floor"
         allowed = f"less than {2e3 * (twin.hip_height + twin.foot_radius):g} mm"
         raise ParameterError(problem, field="twin.body_height", value=f"{1e3 * twin.body_height:g} mm", allowed=allowed)
     low, high = yaw_inertia_range(robot.body, robot.legs, twin)
     if not low <= robot.module_yaw_inertia <= high:
         raise ParameterError(
-            "no module of this mass and size has it with its legs",
+            "must fit the mass and size of the module and its legs",
             field="body.yaw_inertia",
             value=f"{robot.module_yaw_inertia:.4g} kg*m^2",
             allowed=f"{low:.4g} to {high:.4g} kg*m^2",

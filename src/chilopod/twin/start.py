@@ -105,13 +105,15 @@ def start(
     """
     tolerance, expected = in_range("tolerance", tolerance, 1.0), check_wishes(record, expected)
     if as_number("threads", threads) not in range(1 << 16):
-        raise ParameterError("is no number of threads", field="threads", value=threads, allowed="0 (all cores) or more")
+        raise ParameterError(
+            "must be a number of threads", field="threads", value=threads, allowed="0 (all cores) or more"
+        )
     if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
-        raise ParameterError("are none", field="edit, traits", allowed="a function or None; a chilopod.engine.Traits")
+        raise ParameterError("must be a function and traits", field="edit, traits", allowed="a function or None; a chilopod.engine.Traits")
     given = as_robots(robots)
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
-        raise ParameterError("may differ in their springs only", field="robots")
+        raise ParameterError("must be equal except for their springs", field="robots")
     size, standing_still = state_size(compiled(first, edit=edit), initial), initial_states(given[0], edit=edit)
     begun = begin(given, standing_still, size, initial, friction, target, seeds)
     return TwinWalk(begun, record, tolerance, expected, traits=traits, threads=int(threads), edit=edit)

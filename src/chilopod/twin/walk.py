@@ -96,7 +96,7 @@ class TwinWalk(BatchWalk):
         most = _MOST_KEPT / (len(self._robots) * self._plan.steps_per_control * numbers)
         if most < 1.0:
             raise ParameterError(
-                f"is {self._plan.steps_per_control:g} steps, more than can be kept of {len(self._robots)} robots",
+                f"must be shorter: no memory for {self._plan.steps_per_control:g} steps of {len(self._robots)} robots",
                 field="twin.control_interval",
                 value=f"{twin.control_interval:g} s",
                 allowed=f"{most * twin.control_interval:.2g} s or less with this timestep",
@@ -150,7 +150,9 @@ class TwinWalk(BatchWalk):
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
         states, ids = rows["initial"], np.flatnonzero(marked)
         if seeds is not None and self._seeds is None:
-            raise ParameterError("this walk has no noise", field="seeds", allowed="None, or seeds at the start")
+            raise ParameterError(
+                "must be None: this walk has no noise", field="seeds", allowed="None, or seeds at the start"
+            )
         if states is None:
             return
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)

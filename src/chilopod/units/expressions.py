@@ -169,15 +169,15 @@ def parse(value: object, si_unit: str) -> float:
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise UnitError("not a finite number", value=value, allowed=kind)
+            raise UnitError("must be a finite number", value=value, allowed=kind)
         return number
     if not isinstance(value, str):
-        raise UnitError("not a quantity", value=value, allowed=f"{kind}, as a number or as text with its unit")
+        raise UnitError("must be a quantity", value=value, allowed=f"{kind}, as a number or as text with its unit")
     if len(value) > _LONGEST_TEXT:
         raise UnitError("too long for a quantity", value=value, allowed=f"up to {_LONGEST_TEXT} characters")
     match = _NUMBER.fullmatch(value)
     if match is None:
-        raise UnitError("does not start with a finite number", value=value, allowed=kind)
+        raise UnitError("must start with a finite number", value=value, allowed=kind)
     digits, exponent, unit_text = match.groups()
     if exponent and len(exponent) > _LONGEST_EXPONENT:
         raise UnitError("the exponent is out of range", value=value, allowed=kind)
@@ -215,7 +215,7 @@ def format(value: float, unit_text: str, digits: int | None = None) -> str:
         Significant digits; by default the fewest that `parse` reads back to exactly the same double.
     """
     if not math.isfinite(value):
-        raise UnitError("not a finite number", value=value)
+        raise UnitError("must be a finite number", value=value)
     if digits is not None:
         number = f"{from_si(value, unit_text):.{digits}g}"
     elif value == 0.0:

@@ -112,14 +112,14 @@ class Flag(Quantity):
     def check(self, value: float, given: object = None) -> bool:
         """Return whether `value` is 1; a ParameterError if it is neither that nor 0."""
         if value not in (0, 1):
-            raise ParameterError("is neither true nor false", value=value if given is None else given)
+            raise ParameterError("must be true or false", value=value if given is None else given)
         return bool(value)
 
     def read(self, value: object) -> bool:
         """Read true or false, as such or as text."""
         text = str(value).strip().lower()
         if text not in ("true", "false"):
-            raise ParameterError("is neither true nor false", value=value, allowed="true or false")
+            raise ParameterError("must be true or false", value=value, allowed="true or false")
         return text == "true"
 
 

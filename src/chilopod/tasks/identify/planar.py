@@ -135,7 +135,7 @@ def residuals(robot: Robot, data: CriticalMode) -> Array:
     """Computed numbers less the data, over their tolerance, shape (N,)."""
     count = len(data.components) + 1
     if robot.body.modules != count:
-        problem = f"the mode of the data is that of {count} modules"
+        problem = f"must be {count}, the number of modules in the mode of the data"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules)
     low, high = data.between
     try:
@@ -189,7 +189,7 @@ def identify_planar(
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     if (best[1] == _NO_PITCHFORK).all():
-        problem = "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted"
+        problem = "must have a pitchfork on its straight walk, and none of the constants tried gives one"
         raise AnalysisError(problem, field="robot", value=robot.name)
     ranges, cut = _ranges(robot, data, best[0])
     progress(0.4, "ranges")
