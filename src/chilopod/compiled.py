@@ -9,7 +9,7 @@ from typing import Any
 
 from chilopod.errors import ParameterError
 
-# Read once, when the first loop goes parallel: threads that wait for others sleep. By default GNU's spin, and where
+# Read once, when the first loop goes parallel: waiting threads sleep. By default GNU's threads spin, and where
 # another process has the cores, each of thousands of short loops waits for a spinning thread to be taken off.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
@@ -18,7 +18,7 @@ import numba
 from chilopod.numba_internals import keep
 
 if numba.config.DISABLE_JIT:
-    # As plain Python, what is compiled here would take hours, and its overloads do not run.
+    # As plain Python the compiled functions would take hours, and their overloads do not run.
     raise ParameterError(
         "must be 0: chilopod needs the compiler of Numba", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
     )
@@ -29,7 +29,7 @@ _LAYERS = {
 }
 if _LAYERS.keys() & os.environ.keys():
     try:
-        numba.get_num_threads()  # otherwise it is found in the midst of a walk
+        numba.get_num_threads()  # otherwise the error appears in the middle of a walk
     except ValueError as error:
         _name = "NUMBA_THREADING_LAYER" + "_PRIORITY" * ("PRIORITY" in str(error))
         _value = os.environ.get(_name)
@@ -72,7 +72,7 @@ threads."""
 def copy_into(target: Any, source: Any) -> None:
     """Copy an array of one dimension, or the start of it, over another.
 
-    With ``target[:] = source`` numba compiles what would say that the sizes differ, formatted: seconds of it.
+    For ``target[:] = source`` numba also compiles a formatted error message about unequal sizes, which takes seconds.
     """
     for i in range(target.size):
         target[i] = source[i]

@@ -109,7 +109,11 @@ def start(
             "must be a number of threads", field="threads", value=threads, allowed="0 (all cores) or more"
         )
     if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
-        raise ParameterError("must be a function and traits", field="edit, traits", allowed="a function or None; a chilopod.engine.Traits")
+        raise ParameterError(
+            "must be a function and traits",
+            field="edit, traits",
+            allowed="a function or None; a chilopod.engine.Traits",
+        )
     given = as_robots(robots)
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
