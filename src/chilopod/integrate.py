@@ -73,8 +73,7 @@ def step_factor(error: float, rejected: bool) -> float:
 
 @functools.cache
 def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., tuple[float, bool]]:
-    """Return the compiled integrator of one right-hand side (numba caches it on disk, unlike one that takes a function
-    argument).
+    """Return the compiled integrator of one right-hand side; numba can cache it on disk.
 
     ``rhs(t, x, args, out)`` writes ``dx/dt`` into ``out`` and is smooth between ``t0`` and ``t1``. A function made at
     run time is not cached, because its code would never be found again.

@@ -1,4 +1,4 @@
-"""Checks of arguments that all engines share; each raises ParameterError, naming the argument, where it is wrong."""
+"""Checks of arguments that all engines share; each raises a ParameterError that names the argument."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def as_array(name: str, value: object) -> Array:
 
 
 def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
-    """Whole numbers, zero or more; None for None."""
+    """Seeds as a list of whole numbers, zero or more; None for None."""
     if seeds is None:
         return None
     try:
@@ -44,7 +44,7 @@ def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
 
 
 def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
-    """An array of True and False, one each; a copy."""
+    """Copy of an array of truth values, one for each robot."""
     try:
         marks = np.array(value)
     except (TypeError, ValueError):
@@ -126,15 +126,15 @@ def rows_of(
     Parameters
     ----------
     robots
-        One, or one a walk.
+        One robot, or one for each walk.
     arguments
-        By name: what was given, and the shape of one row. What is called ``friction`` must be positive.
+        Value given and shape of one row, by name. The argument ``friction`` must be positive.
     seeds
-        One, or one a walk.
+        One seed, or one for each walk.
 
     Returns
     -------
-    Number of walks, and the arrays, each its own copy; None for what was not given.
+    Number of walks, and copies of the arrays; None for an argument that was not given.
     """
     counts = {"robots": len(robots), "seeds": len(seeds) if seeds else 1}
     arrays: dict[str, Array | None] = {}
@@ -146,7 +146,9 @@ def rows_of(
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
             allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
             raise ParameterError("has the wrong shape", field=name, value=array.shape, allowed=allowed)
-        largest = np.finfo(float).max if name == "initial" else LARGEST  # a state may be one that diverges
+        largest = (
+            np.finfo(float).max if name == "initial" else LARGEST
+        )  # the state of a walk that diverges may be larger
         if not (np.abs(array) <= largest).all():
             raise ParameterError("must be finite", field=name, allowed=f"numbers up to {largest:g}")
         if name == "friction" and not (array > 0.0).all():
@@ -184,7 +186,7 @@ def rows_anew(
 
     Returns
     -------
-    Which robots, and the arrays; None for what was not given, or if there are no such robots.
+    Mask of the robots, and the arrays; None for an argument that was not given, or if the mask is empty.
     """
     marked, cycles = as_marks("which", which, len(robots)), time / robots[0].gait.period
     if record is not None:
@@ -210,7 +212,7 @@ def rows_anew(
 
 
 def check_time(until: float, now: float) -> float:
-    """The time to walk on to, s; refuses to walk back, and beyond all reason."""
+    """Time to advance to, s; refuses times in the past and times beyond ``LONGEST``."""
     until = as_number("until", until)
     if not now <= until <= LONGEST:
         problem = "must not lie before the time of the walk" if until < now else "must be a time in s"

@@ -1,4 +1,4 @@
-"""Tries the promises of the contract on any engine, as Gymnasium's ``check_env`` does for environments."""
+"""Checker of the engine contract, comparable to Gymnasium's ``check_env`` for environments."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from chilopod.errors import AnalysisError
 from chilopod.record import MOTION, QUANTITIES
 from chilopod.robot import Robot
 
-_HUGE = 1e4  # N*m: no joint withstands it
+_HUGE = 1e4  # N*m: beyond what any joint withstands
 
 
 def check_engine(engine: Engine, robot: Robot, seed: int = 0) -> tuple[str, ...]:
-    """Try whether an engine keeps what :mod:`chilopod.engine.contract` promises; takes a few walks of two seconds.
+    """Check an engine against the promises of :mod:`chilopod.engine.contract` with a few walks of two seconds.
 
     Parameters
     ----------
     engine
         A module such as :mod:`chilopod.planar`, or an object.
     robot
-        One that it knows. Its springs are made adjustable for some of the walks.
+        A robot that the engine can walk. Its springs are made adjustable for some of the walks.
     seed
-        Seed of the odd instants at which the walks are interrupted.
+        Seed of the random instants at which the walks are interrupted.
 
     Returns
     -------
-    The promises that were tried, and kept.
+    Promises that were tested and kept.
 
     Raises
     ------
     AnalysisError
-        At the first that is broken: which, and what was seen instead.
+        At the first broken promise; the message says what happened instead.
     """
     trial = Trial(engine, robot, np.random.default_rng(seed))
     for promise, attempt in _PROMISES.items():

@@ -1,4 +1,4 @@
-"""Tries what the contract promises to referees, who set tasks and steer nothing."""
+"""Checks of the promises of the contract to referees, which set tasks and do not steer."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ BREAKS = 0.6
 """s: when something happens in the middle of trials."""
 
 _STOPS = 0.98  # s: on a sample, on no command
-_NEAR = 1e-4  # rad and m, of what agrees to the tolerance of an integrator or solver, after two gait cycles
+_NEAR = 1e-4  # rad and m, after two gait cycles, of states that agree to the tolerance of an integrator or solver
 
 
 def places(trial: Trial) -> None:
-    """Where robots are, and were by their record."""
+    """Check that poses agree with the record."""
     walk = trial.start(target=None)
     start = np.tile([0.2, -0.1, 0.3], (len(trial.robots), 1))
     expect_near(walk.pose(), start, 1e-6, "pose at the start, m and rad")
@@ -33,7 +33,7 @@ def places(trial: Trial) -> None:
 
 
 def aims(trial: Trial) -> None:
-    """Targets that are moved, taken away and put up."""
+    """Check targets that are moved, removed and set."""
     here, there, nowhere = np.array([0.9, 0.4]), np.array([0.8, -0.5]), np.full(2, np.nan)
     where = np.stack([there, nowhere, here])
 
@@ -49,7 +49,7 @@ def aims(trial: Trial) -> None:
         seen, pose = walk.observe(), walk.pose()
         away = where - pose[:, :2]
         bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[:, 2]
-        # A scanner's last look is from a moment ago.
+        # The last look of a scanner is older than the observation.
         expect_near(seen.distance, np.hypot(away[:, 0], away[:, 1]), 0.03, "distance of a target that was moved, m")
         expect_near(seen.bearing, bearing, 0.05, "bearing of a target that was moved, rad")
         expect_near(seen.distance[2:], before.distance[2:], 0.0, "distance of a target that stayed, m")
@@ -71,7 +71,7 @@ def aims(trial: Trial) -> None:
 
 
 def halts(trial: Trial) -> None:
-    """One of three, then all."""
+    """Check a halt of one robot of three, then of all."""
 
     def halted(walk: Walk) -> Walk:
         wrong: Any = ([1], np.ones(len(trial.robots)), np.ones(len(trial.robots) + 1, dtype=bool), None)
@@ -93,7 +93,7 @@ def halts(trial: Trial) -> None:
     for name in ("position", "heading", "joint_angle", "distance"):
         found, wanted = data[name].values, free[name].values
         expect(np.array_equal(found[:last, 1], wanted[:last, 1]), f"{name} is another before it was halted")
-        # At the very moment, or in the step of it, it may be either.
+        # At the time of the move, or within its step, either target is valid.
         expect(np.isnan(found[last + 2 :, 1]).all(), f"{name} is not NaN from where it was halted on")
         for i in (0, 2):
             expect(np.array_equal(found[:, i], wanted[:, i]), f"{name} of robot {i} is another where 1 is halted")
@@ -104,7 +104,7 @@ def halts(trial: Trial) -> None:
 
 
 def states(trial: Trial) -> None:
-    """They are what ``start`` takes."""
+    """Check that ``start`` accepts the states of a walk."""
     walk, period = trial.start(seeds=None), trial.robot.gait.period
     walk.advance(period)
     walk.halt(np.array([False, True, False]))
@@ -124,7 +124,7 @@ def states(trial: Trial) -> None:
 
 
 def restarts(trial: Trial) -> None:
-    """One of three that are under way, after it was halted."""
+    """Check a restart of one robot of three that walk, after it was halted."""
     free, walk = (trial.start(seeds=None, record=None) for _ in range(2))
     period, one, none = trial.robot.gait.period, np.array([False, True, False]), np.zeros(3, dtype=bool)
     begin = trial.engine.initial_states(trial.robot, -trial.bends[1], 1.0, (0.5, 0.2))
@@ -175,7 +175,7 @@ def _for_one(command: Command) -> Command:
 
 
 def _expect_alike(walk: Walk, robot: int, alone: Walk, whose: str) -> None:
-    """A robot of a batch that is where another is that walks alone."""
+    """Check that a robot of a batch is at the position of a robot that walks alone."""
     seen, other = walk.observe(), alone.observe()
     for name, unit in (("joint_angles", "rad"), ("leg_yaw", "rad"), ("stiffness", "N*m/rad")):
         expect_near(getattr(seen, name)[robot], getattr(other, name)[0], _NEAR, f"{name} {whose}, {unit}")

@@ -24,10 +24,10 @@ _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
 
 def engine_named(name: str) -> Engine:
-    """An engine by its name, one of :data:`ENGINES`; or one of your own as ``package.module:object``. ParameterError if
-    there is none.
+    """Return an engine by its name, one of :data:`ENGINES` or ``package.module:object``; ParameterError for an unknown
+    name.
 
-    It is imported now, not before: MuJoCo takes a moment to load.
+    The engine is imported here, because MuJoCo takes a moment to load.
     """
     engine: Engine
     if not isinstance(name, str):
@@ -43,7 +43,7 @@ def engine_named(name: str) -> Engine:
 
 
 class _Own:
-    """An engine of somebody else's: what goes wrong in it is said to be its own fault."""
+    """Engine from outside chilopod; errors in it name the engine."""
 
     def __init__(self, name: str, engine: Any) -> None:
         if isinstance(engine, type):
@@ -89,7 +89,7 @@ class _Own:
 
 
 class _OwnWalk:
-    """A walk of somebody else's engine, the same way."""
+    """Walk of an engine from outside chilopod; errors in it name the engine."""
 
     def __init__(self, name: str, walk: Any) -> None:
         self._name, self._walk = name, walk
@@ -113,7 +113,7 @@ class _OwnWalk:
 
 
 def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Any:
-    """Result of somebody else's code; what goes wrong in it is said to be its own fault."""
+    """Result of a call of foreign code; an error in it names the code."""
     try:
         return call(*arguments, **named)
     except (ChilopodError, KeyboardInterrupt):
@@ -124,7 +124,7 @@ def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, *
 
 def controller_named(path: str) -> Controller:
     """An instance of a controller's class, given as ``package.module:Class``, with the defaults of all its fields;
-    ParameterError if it cannot be imported or is no controller, see :func:`check_controller`."""
+    ParameterError if it cannot be imported or is not a controller, see :func:`check_controller`."""
     made = _imported("controller", path)
     if not isinstance(made, type):
         raise ParameterError("must name a class", field="controller", value=path, allowed="package.module:Class")
@@ -132,7 +132,7 @@ def controller_named(path: str) -> Controller:
         controller: Controller = made()
     except (ParameterError, KeyboardInterrupt):
         raise
-    except BaseException as error:  # it is somebody else's code
+    except BaseException as error:  # foreign code
         problem = f"cannot be made: {in_words(error)}"
         allowed = "a class whose fields all have defaults"
         raise ParameterError(problem, field="controller", value=path, allowed=allowed) from error
@@ -172,7 +172,7 @@ def _imported(field: str, path: str) -> Any:
         found: Any = import_module(module_name)
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # whatever somebody else's module does when it is imported
+    except BaseException as error:  # importing a foreign module may raise anything
         raise ParameterError(f"cannot be imported: {in_words(error)}", field=field, value=path) from error
     for part in name.split("."):
         if not hasattr(found, part):

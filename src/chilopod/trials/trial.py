@@ -28,7 +28,7 @@ _MOST_BENT = 1.5  # rad; at a right angle modules run into each other
 _FLAG = bool | np.bool_, "True or False"
 _KINDS = {
     "robot": (Robot, "a chilopod.Robot"),
-    "engine": (str, "its name"),
+    "engine": (str, "the name of an engine"),
     "target": (Target | Course | None, "a chilopod.steering.Target or Course, or None"),
     "disturbance": (Disturbance, "a chilopod.trials.Disturbance"),
     **dict.fromkeys(("forces", "poses", "brief"), _FLAG),
@@ -85,7 +85,9 @@ class Trial:
     def __post_init__(self) -> None:
         for name, (kind, allowed) in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise ParameterError("must be of another kind", field=name, value=getattr(self, name), allowed=allowed)
+                raise ParameterError(
+                    "must be of the right type", field=name, value=getattr(self, name), allowed=allowed
+                )
         seeds = as_seeds([self.seed], "seed")
         # Equal trials have one text, whatever kinds of numbers they were given.
         plain_values = {

@@ -110,7 +110,7 @@ def start(
         )
     if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
         raise ParameterError(
-            "must be a function and traits",
+            "must be a function and the traits of an engine",
             field="edit, traits",
             allowed="a function or None; a chilopod.engine.Traits",
         )
