@@ -1,4 +1,4 @@
-"""Cost of a walk of the planar model, foreseen before it is begun: the steps of its integrator."""
+"""Estimated cost of a walk of the planar model before its start: the steps of its integrator."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ _REACH = 6.0
 
 
 def check_steps(robot: Robot, seconds: float) -> None:
-    """Refuse a walk of some seconds that would take more steps than anybody waits for, naming what makes it move so
-    fast."""
+    """Refuse a walk that would take too many steps; the error names the property that makes the motion so fast."""
     switches = len(robot.gait.schedule(robot.body.modules).times) - 1  # as far as they differ; each ends a step
     rates = {**_rates(robot), "gait.stance, gait.swing": _REACH * switches / robot.gait.period}
     steps = robot.body.modules * seconds * sum(rates.values()) / _REACH
@@ -27,8 +26,8 @@ def check_steps(robot: Robot, seconds: float) -> None:
 def _rates(robot: Robot) -> dict[str, float]:
     """Contribution of each property to a bound on the fastest motion, 1/s.
 
-    The bounds are those of modules that nothing joins. Joints only take freedom away, and by Rayleigh's principle what
-    is left is damped and sprung no more strongly.
+    The bounds hold for modules without joints. Joints only remove degrees of freedom, and by Rayleigh's principle the
+    remaining motion is damped and sprung no more strongly.
     """
     mass, inertia = robot.module_mass, robot.module_yaw_inertia
     legs, springs, friction = robot.legs, robot.springs, robot.ground.friction

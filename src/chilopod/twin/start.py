@@ -1,4 +1,4 @@
-"""Start of a batch of walks: robots that go together, where they start, their floor and their targets."""
+"""Start of a batch of walks: robots, initial states, floor and targets."""
 
 from __future__ import annotations
 
@@ -83,23 +83,22 @@ def start(
     edit: Edit | None = None,
     traits: Traits = traits,
 ) -> TwinWalk:
-    """Put robots on the floor, see :class:`chilopod.engine.Engine`.
+    """Start walks on the floor, see :class:`chilopod.engine.Engine`.
 
     Parameters
     ----------
     robots, friction, record, expected
-        As there. Robots may differ in the numbers of their springs and in nothing else.
+        See :class:`chilopod.engine.Engine`. Robots may differ only in the numbers of their springs.
     initial
         From :func:`initial_states`, shape (walks, nq) or (nq,), or from ``states`` of a walk, (walks, nq + nv).
     target
-        Place of a pole on the floor, m, shape (2,) or (walks, 2); what is seen of it is what the scanner made of its
-        last scan.
+        Position of a pole on the floor, m, shape (2,) or (walks, 2); observations come from the scanner's last scan.
     seeds
-        Seeds of the scanner's noise, one a walk.
+        Seeds of the scanner's noise, one for each walk.
     threads
-        At most; 0 for all cores. Results are the same to the bit at any number.
+        Largest number of threads; 0 for all cores. Results are the same to the bit for any number.
     tolerance
-        At which MuJoCo's solver of contact forces stops, relative.
+        Relative tolerance of MuJoCo's solver of contact forces.
     edit, traits
         See :class:`Edited`.
     """
@@ -124,5 +123,5 @@ def start(
 
 
 def resume(saved: bytes, threads: int = 0, *, edit: Edit | None = None, traits: Traits = traits) -> TwinWalk:
-    """A walk that was saved, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
+    """Continue a saved walk, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
     return resumed(traits, saved, partial(TwinWalk, traits=traits, threads=threads, edit=edit))
