@@ -1,6 +1,6 @@
-"""Check of an engine's record against what was asked of it: before it is kept, for later nobody looks again.
+"""Check of an engine's record against its trials, before the record is kept.
 
-The law is that of :meth:`chilopod.engine.Walk.to_dataset`.
+The rules are those of :meth:`chilopod.engine.Walk.to_dataset`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing",
 
 
 def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
-    """The record that an engine gave of a batch. Raises AnalysisError, which names the engine and what is wrong, if it
-    is not that of these trials and of what was drawn for them."""
+    """Return the record that an engine gave of a batch. Raises AnalysisError, which names the engine and the fault, if
+    it does not fit these trials and their drawn disturbances."""
     if not isinstance(data, xr.Dataset):
         raise _refused("its record is no xarray.Dataset", trials[0].engine)
     try:
@@ -39,8 +39,8 @@ def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[
 
 
 def check_finite(values: Mapping[str, Any], engine: str) -> None:
-    """Raise AnalysisError unless, in the variables of a robot's record by name, shape (times, 1, ...), a robot that
-    walks is somewhere, and one that failed or was halted no more from some sample on."""
+    """Raise AnalysisError unless a robot's variables by name, shape (times, 1, ...), are finite while it walks, and NaN
+    from some sample on if it failed or was halted."""
     label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
     count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)
     for name in MOTION:
@@ -91,7 +91,7 @@ def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str
     """Fault of variables, in a record of these sizes."""
     aimed, commands = first.target is not None, sizes["event"] > 0
     asked = {"": True, "target": aimed, "forces": first.forces, "poses": first.poses, "commands": commands}
-    # Where all targets of a course are out of reach there never is one.
+    # A course without a target in reach has none.
     may_lack = {*_MAY_LACK, *(("target", "distance", "bearing") if first.course else ())}
     for name, (_, _, why) in QUANTITIES.items():
         if asked[why] and name not in may_lack and name not in data:

@@ -28,8 +28,8 @@ class Header:
 
 
 def content_of(record: xr.Dataset) -> bytes:
-    """A record as it stands in its file. Raises OutputError if it holds anything but floating-point numbers, integers
-    of 32 bits, truth values and text, or has a dimension of length 0."""
+    """Bytes of a record's file. Raises OutputError for types other than floating-point numbers, integers of 32 bits,
+    truth values and text, and for a dimension of length 0."""
     if not all(record.sizes.values()):
         sizes = {str(name): size for name, size in record.sizes.items()}
         raise OutputError("must not have a dimension of length 0", field="record", value=sizes)
@@ -55,7 +55,7 @@ def content_of(record: xr.Dataset) -> bytes:
 
 
 def _as_stored(field: str, values: NDArray[Any]) -> tuple[NDArray[Any], dict[str, str]]:
-    """Values as the file has them, text with one more dimension, and what readers must know of them."""
+    """Values in the form of the file, text with one more dimension, and attributes that readers need."""
     kind = values.dtype.kind
     if kind == "f":
         return values, {}
@@ -76,13 +76,13 @@ def _describe(target: Any, field: str, attributes: Mapping[Any, Any]) -> None:
 
 
 def read_record(path: Path) -> xr.Dataset:
-    """A record as it was walked: of the same types, and with nothing about the file. Raises what
-    :func:`chilopod.netcdf.unsealed` does."""
+    """Read a record with its original types and without attributes of the file. Raises the errors of
+    :func:`chilopod.netcdf.unsealed`."""
     try:
         record = xr.load_dataset(io.BytesIO(unsealed(path)), engine="scipy").drop_encoding()
     except UnsoundError:
         raise
-    except _DAMAGES as error:  # whoever wrote it has set the seal himself
+    except _DAMAGES as error:  # the seal is valid but the content is foreign
         raise UnsoundError(f"cannot be read ({in_words(error)})") from None
     record.attrs = {name: value if isinstance(value, str) else float(value) for name, value in record.attrs.items()}
     # The file has integers of 32 bits only, and all text is read as objects.
@@ -93,8 +93,8 @@ def read_record(path: Path) -> xr.Dataset:
 
 
 def read_header(path: Path, *, whole: bool = False) -> Header:
-    """Header of a record's file, all of which is held against its seal if ``whole``, otherwise its length alone. Raises
-    what :func:`chilopod.netcdf.unsealed` does."""
+    """Read the header of a record's file and check the whole file against its seal if ``whole``, otherwise only its
+    length. Raises the errors of :func:`chilopod.netcdf.unsealed`."""
     if whole:
         unsealed(path)
     with sealed_file(path) as file:

@@ -1,4 +1,4 @@
-"""One walk with its conditions: all that makes it, its disturbances drawn from a seed, and the name of its file."""
+"""One walk with its conditions, its disturbances drawn from a seed, and the name of its file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from chilopod.trials.disturbance import NONE, Disturbance
 from chilopod.trials.reach import UnknownKindError
 
 _DIGITS = 16
-_MOST_BENT = 1.5  # rad; at a right angle modules run into each other
+_MOST_BENT = 1.5  # rad; at a right angle modules collide
 _FLAG = bool | np.bool_, "True or False"
 _KINDS = {
     "robot": (Robot, "a chilopod.Robot"),
@@ -39,34 +39,34 @@ _ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks
 
 @dataclass(frozen=True)
 class Trial:
-    """Everything that makes a walk.
+    """Everything that defines a walk.
 
     Attributes
     ----------
     robot, duration
-        Robot with the springs of this trial; s.
+        Robot with the springs of this trial, and duration of the walk, s.
     seed, disturbance
         Seed and size of the differences from trial to trial.
     joint_angles
-        Joint angles at the start, before disturbance, rad: one a joint, front to rear, one for all, or none for
-        straight.
+        Joint angles at the start, before disturbance, rad: one for each joint, front to rear, one for all, or none for
+        a straight robot.
     target
         Target of the robot, if any: one target, or a course of them, which ends the walk.
     controller
-        Controller, if any: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
-        fields, and everything that the code of its class can reach, are part of what the trial is.
+        Controller, if any: a frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its fields, and
+        everything that the code of its class can reach, are part of the trial.
     rate, forces, poses
         See :class:`chilopod.record.Recording`.
     engine
-        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+        Name of an engine, one of :data:`chilopod.engine.ENGINES` or ``package.module:object``.
     brief
         True to keep only the outcomes of a course's targets, not its motion over time.
 
     Raises
     ------
     ParameterError
-        If something is out of range, there is no such engine, it does not know such a robot, or the controller cannot
-        be told from others.
+        If a value is out of range, the engine is unknown or cannot walk the robot, or the controller cannot be
+        identified by its code and fields.
     """
 
     robot: Robot
@@ -120,10 +120,10 @@ class Trial:
             )
         if self.controller is not None:
             check_controller(self.controller)
-            self.steering  # noqa: B018  (as it is now; what is in a frozen dataclass may still change)
+            self.steering  # noqa: B018  (as it is now; the content of a frozen dataclass may still change)
 
     def _every_joint_angle(self) -> tuple[float, ...]:
-        """Joint angles at the start, one a joint, or none."""
+        """Joint angles at the start, one for each joint, or none."""
         angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
         problem, allowed = "", ""
         if angles.shape not in ((0,), (1,), (joints,)):
@@ -135,12 +135,12 @@ class Trial:
         return tuple(np.broadcast_to(angles, joints if angles.size else 0).tolist())
 
     def __getstate__(self) -> dict[str, Any]:
-        # Another process finds out anew what it makes of a trial: its versions may be others.
+        # Another process derives these again, because its versions may differ.
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def course(self) -> Course | None:
-        """The target if it is a course."""
+        """The target if it is a course, else None."""
         return self.target if isinstance(self.target, Course) else None
 
     @property
@@ -150,7 +150,7 @@ class Trial:
 
     @property
     def least_bytes(self) -> float:
-        """Least memory of its record."""
+        """Least memory of its record, bytes."""
         return 0.0 if self.brief else self.recording.least_bytes(self.robot.body.modules, self.duration)
 
     @cached_property
@@ -160,8 +160,8 @@ class Trial:
 
     @cached_property
     def code(self) -> tuple[str, str, str]:
-        """Digest of what the code of controller and engine is; why no other process could find that, if so; and why
-        it could not walk the same, if so."""
+        """Digest of the code of controller and engine; reason why another process could not import it, if so; and
+        reason why its walks are not reproducible, if so."""
         known_here = "__main__:" in self.engine or not all(map(is_findable, classes_in(self.controller)))
         why = "it must be defined at the top of a module that can be imported"
         try:
@@ -173,8 +173,8 @@ class Trial:
             return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}", ""
 
     def repeated(self, seed: int | None = None, repeats: int = 1) -> tuple[Trial, ...]:
-        """The same trial so many times, with seeds that count up; undisturbed where the seed is None. Raises
-        ParameterError if there would be no walks, or several that are all alike."""
+        """Repeat the trial with consecutive seeds, or once without disturbance if the seed is None. Raises
+        ParameterError for no walks, or several identical ones."""
         if repeats < 1:
             raise ParameterError("must be positive", field="repeats", value=repeats)
         if repeats > 1 and seed is None:
@@ -188,13 +188,13 @@ class Trial:
         return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 
     def as_now(self) -> Trial:
-        """The same trial, with code and fields of its controller as they are now."""
+        """The same trial with the present code and fields of its controller."""
         own = ":" in self.engine or any(not is_ours(kind) for kind in classes_in(self.controller))
         return replace(self) if own else self
 
     @cached_property
     def text(self) -> str:
-        """All of it as JSON; equal texts are equal trials."""
+        """Complete trial as JSON; equal texts mean equal trials."""
         plain_names = ("engine", "duration", "seed", "rate", "forces", "poses", "brief")
         target: Any = self.target
         if isinstance(target, Target):
@@ -221,15 +221,15 @@ class Trial:
         return f"{kind}-{digest_of(self.text)}.nc"
 
     def not_kept(self, why: str) -> str:
-        """A line for whoever wonders why a folder does not have this trial."""
+        """Message that explains why a folder does not keep this trial."""
         who = f"engine {self.engine}" if self.controller is None else f"controller {path_of(type(self.controller))}"
         return f"{who}: its trials walk and are not kept: {why}"
 
 
 def versions_of(engine: str) -> dict[str, Any]:
-    """Versions of what makes a record, as they stand in a trial's text."""
+    """Versions of the software that determines a record, as written in a trial's text."""
     return {
-        # What else a version says of a checkout, the sources say better.
+        # The rest of a checkout's version is covered by the digest of the sources.
         "chilopod": chilopod.__version__.partition("+")[0],
         "sources": digest(_ABOVE)[:_DIGITS],
         "engine_version": engine_named(engine).traits.version,
@@ -237,5 +237,5 @@ def versions_of(engine: str) -> dict[str, Any]:
 
 
 def digest_of(text: str) -> str:
-    """Digest of a trial's text: the name of its file."""
+    """Digest of a trial's text, which names its file."""
     return hashlib.sha256(text.encode()).hexdigest()[:20]
