@@ -1,4 +1,4 @@
-"""Where the straight walk of a robot changes, in the plane of two of its parameters, and in their units."""
+"""Curves of bifurcations of the straight walk in the plane of two parameters, in their units."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float
     if parameters[0] == parameters[1]:
         raise ParameterError("must be two parameters", field="parameters", value=parameters)
     for parameter in parameters:
-        robot.unit_of(parameter)  # refuses what is no parameter
+        robot.unit_of(parameter)  # refuses an unknown parameter
         if parameter == "body.modules":
             raise ParameterError(
                 "must be a continuous parameter, not a whole number", field="parameters", value=parameter
@@ -103,8 +103,7 @@ def transition_curve(
     longest: float = 0.05,
     progress: Progress = silent,
 ) -> TransitionCurve:
-    """The curve on which the straight walk changes, through the topmost such point at one value of the second
-    parameter.
+    """Follow the curve of bifurcations through the topmost such point at one value of the second parameter.
 
     Parameters
     ----------
@@ -115,14 +114,14 @@ def transition_curve(
     kind, second
         Kind of the bifurcation; value of the second parameter (SI) at which the first is searched.
     points, longest
-        At most so many points in each direction; largest step, in units of ``between``.
+        Largest number of points in each direction; largest step, in units of ``between``.
     progress
-        Called with how many points there are.
+        Function that receives the number of points so far.
 
     Raises
     ------
     AnalysisError
-        If there is no such bifurcation to start from.
+        If there is no such bifurcation at the start.
     """
     family = family2(robot, parameters)
     there = robot.with_value(parameters[1], second)

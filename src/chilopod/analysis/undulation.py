@@ -1,9 +1,9 @@
-"""Undulating walks: what the straight walk gives way to when all springs are softened together.
+"""Undulating walks, which replace the straight walk when all springs are softened together.
 
 At the Neimark-Sacker point a pair of multipliers leaves the unit circle and the body begins to swing at a second
-frequency. Here the nonlinear model runs until that has settled, for several springs below the point, and is held
-against what the normal form predicts there: an amplitude that grows as the square root of the distance, and a
-frequency that moves in proportion to it.
+frequency. The nonlinear model runs until the undulation has settled, for several springs below the point. The result is
+compared with the normal form: the amplitude grows as the square root of the distance, and the frequency changes in
+proportion to it.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     robot, distances
         Robot, whose springs do not matter; 1 - k/k* of the springs, each above 0 and below 1.
     progress
-        Called as the simulation goes on.
+        Function that receives the progress.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
 
 @dataclass(frozen=True)
 class _Expected:
-    """The normal form at a spring: fixed radius and turn per period, and the mode they are measured along."""
+    """Normal form at a spring: fixed radius and turn per period, and the mode along which they are measured."""
 
     orbit: Array
     multiplier: complex

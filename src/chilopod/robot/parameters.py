@@ -14,12 +14,12 @@ from chilopod.robot.parts import Body, Legs, Springs, Twin
 from chilopod.units import Description, Quantity, quantities
 
 _PATH: Final = re.compile(r"([a-z_]+\.[a-z_]+)(?:\[([0-9]{1,6})\])?")
-_INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # as one may have meant it
+_INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # the likely intention
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a parameter stands: section, key, index among the springs or None, and what it may hold."""
+    """Place of a parameter: section, key, index among the springs or None, and allowed values."""
 
     section: str
     key: str
@@ -44,7 +44,7 @@ QUANTITIES: Final = {
 @lru_cache(maxsize=1024)
 def place_of(path: str) -> Place:
     """Read a dotted path such as ``springs.stiffness[0]``; whether the robot has that many springs is not checked.
-    ParameterError if it names no number, with the nearest path that does."""
+    ParameterError, with the nearest path, if it is not the path of a number."""
     known = QUANTITIES
     match = _PATH.fullmatch(path)
     stem, index = match.groups() if match else (path, None)

@@ -1,4 +1,4 @@
-"""Courses: targets one after another, and how they are read."""
+"""Courses: targets one after another, and their text form."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ _FORM = 'a direction and a distance, such as "45 deg, 1.3 m", or a place on the 
 _RANDOM = "random:"
 _LONGEST_SEED = 18  # digits: a 64-bit whole number holds them
 _WIDEST_BEARING = math.radians(75.0)
-_DIGITS = 9  # of a distance: what rounding does to the 0.15 m or 10 km that somebody typed is not held against them
+_DIGITS = 9  # relative tolerance of a distance, so that rounding of 0.15 m or 10 km is accepted
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A target of a course: a place on the floor, or one seen from where the robot is when its turn comes.
+    """Target of a course: a position on the floor, or relative to the robot at the time the target is set.
 
     Attributes
     ----------
     x, y
-        On the floor, where the robot starts at the origin along x; or ahead of module 1 and to its left, m.
+        Position on the floor, where the robot starts at the origin along x; or ahead of module 1 and to its left, m.
     relative
-        True if seen from module 1 when the goal before is done with.
+        True if the position is relative to module 1 at the end of the goal before.
 
     Raises
     ------
     ParameterError
-        If it is too far to be a target, or is relative and on the robot already.
+        If the target is too far, or is relative and within the arrival radius.
     """
 
     x: float
@@ -76,12 +76,12 @@ class Goal:
         Raises
         ------
         ParameterError, UnitError
-            If it is neither, or no place to go to.
+            For any other text, or a position out of range.
         """
         first, comma, second = (part.strip() for part in text.partition(","))
         fits = [unit for unit in ("rad", "m") if _is_quantity(first, unit)]
         if not comma or len(fits) != 1:
-            # Of a bare number nobody could tell whether it is an angle or a length.
+            # A number without a unit could be an angle or a length.
             problem = "must have a unit behind its first number" if comma and fits else "must be a target"
             raise ParameterError(problem, field="target", value=text.strip(), allowed=_FORM)
         value = units.parse(first, fits[0])
@@ -105,7 +105,7 @@ class Goal:
         return f"{math.degrees(math.atan2(self.y, self.x)):g} deg, {math.hypot(self.x, self.y):g} m"
 
     def place(self, poses: Array) -> Array:
-        """Place on the floor, m, shape (robots, 2), by the poses of module 1 when the goal's turn comes: x, y (m) and
+        """Position on the floor, m, shape (robots, 2), from the poses of module 1 when the goal is set: x, y (m) and
         heading (rad), shape (robots, 3)."""
         if not self.relative:
             return np.tile([self.x, self.y], (len(poses), 1))
@@ -120,14 +120,14 @@ class Course:
     Attributes
     ----------
     goals, patience
-        At least one goal, none where the one before is; time for each, s, then the next has its turn.
+        At least one goal, each apart from the one before; time for each, s, after which the next is set.
     view, range
-        Whole angle ahead of module 1 within which its scanner sees, rad, and range of the scanner, m; by default those
-        of the paper's (Hokuyo URG-04LX).
+        Full angle of the scanner's view ahead of module 1, rad, and its range, m; by default those of the paper's
+        (Hokuyo URG-04LX).
     tightest
-        Radius of the circles that the shortest path to a target is made of, m; 0 for a robot that turns on the spot.
-        That of a radius law is the paper's measure, of the body axis: module 1 itself goes round in smaller circles, so
-        that a walk may be shorter than this path.
+        Radius of the circles of the shortest path to a target, m; 0 for a robot that turns on the spot. The radius of a
+        radius law is the paper's measure of the body axis: module 1 itself follows smaller circles, so that a walk may
+        be shorter than this path.
 
     Raises
     ------
@@ -162,7 +162,7 @@ class Course:
 
     @property
     def duration(self) -> float:
-        """Nothing takes longer, s."""
+        """Longest duration of a walk along the course, s."""
         return self.patience * len(self.goals)
 
     def __str__(self) -> str:
@@ -191,8 +191,8 @@ eight   a circle of 1 m to the left and one to the right, back each time
 
 
 def random_course(seed: int, patience: float, count: int = 5) -> Course:
-    """So many targets seen from module 1 at random, each with so much patience, s: bearings within 75 deg of the
-    heading, distances of 0.8 to 2 m. The same seed, 0 or more, makes the same course."""
+    """Random course of a number of targets relative to module 1, each with a patience, s: bearings within 75 deg of the
+    heading, distances of 0.8 to 2 m. Equal seeds, 0 or more, give equal courses."""
     rng = np.random.default_rng(seed)
     bearings = rng.uniform(-_WIDEST_BEARING, _WIDEST_BEARING, count)
     distances = rng.uniform(*RANDOM_DISTANCES, count)
@@ -201,19 +201,19 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
 
 
 def course_named(text: str, patience: float) -> Course:
-    """Read a course with so much patience for each target, s.
+    """Read a course with a patience for each target, s.
 
     Parameters
     ----------
     text
         Targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or the
         path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or ``random:SEED``.
-        A file that is named like a course is reached as ``./name``.
+        Write ``./name`` for a file with the name of a course.
 
     Raises
     ------
     ParameterError, UnitError
-        If it is none of these, saying which target is wrong.
+        For any other text; the message names the wrong target.
     """
     if text in COURSES:
         return Course(COURSES[text], patience)

@@ -22,19 +22,19 @@ _FORM = 'a direction and a distance, such as "45 deg, 1.3 m"'
 
 @dataclass(frozen=True)
 class Target:
-    """Where a target is, seen from module 1 before the walk.
+    """Target relative to module 1 before the walk.
 
     Attributes
     ----------
     bearing
-        Direction relative to the heading, left positive, rad; ahead of the robot, that is, within a right angle.
+        Direction relative to the heading, left positive, rad, within a right angle.
     distance
-        From the centre of module 1, m; farther than :data:`ARRIVAL_RADIUS`.
+        Distance from the centre of module 1, m, more than :data:`ARRIVAL_RADIUS`.
 
     Raises
     ------
     ParameterError
-        If there is no circle to it: on the robot, behind it, or too far.
+        For a target within the arrival radius, behind the robot, or too far.
     """
 
     bearing: float
@@ -60,7 +60,7 @@ class Target:
         Raises
         ------
         ParameterError, UnitError
-            If it is not that, or there is no circle to it.
+            For any other text, or a target out of range.
         """
         bearing, comma, distance = text.partition(",")
         if not comma:
@@ -80,7 +80,7 @@ class Target:
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """On the floor, for a robot at the origin that heads along x, m, shape (2,)."""
+        """Position on the floor, for a robot at the origin that heads along x, m, shape (2,)."""
         return self.distance * np.array([math.cos(self.bearing), math.sin(self.bearing)])
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""How tightly a robot turns with which first spring: by its exact branch where there is one, by walks elsewhere."""
+"""Radius of a robot's curved walks over its first spring: from the exact branch if there is one, else from walks."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _LAW_BEND = 0.8  # rad in all, to start with
 def radius_law(
     robot: Robot, engine: str = "planar", folder: str | Path | None = None, progress: Progress = silent
 ) -> RadiusLaw:
-    """Radius of the curved walks over k1, by the paper's measure of it.
+    """Radius of the curved walks over k1, by the paper's measure.
 
     An engine whose walks are those of the planar theory has the law of the exact branch, from the softest spring on
-    that holds a robot which bends from straight on (:func:`that_holds`). The law of any other engine is measured in
-    undisturbed walks that start bent; springs at which these fail are no part of it.
+    that a robot with a straight start withstands (:func:`that_holds`). The law of any other engine is measured in
+    undisturbed walks that start bent; springs at which these fail are left out.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def radius_law(
     Raises
     ------
     AnalysisError
-        If there is no such branch; or fewer than three springs curve, or softer ones do not curve more tightly.
+        If there is no such branch, fewer than three springs curve, or softer springs do not curve more tightly.
     """
     if engine_named(engine).traits.exact:
         return that_holds(radius_laws(robot, progress).axis, robot, engine)
@@ -76,11 +76,11 @@ def radius_law(
 
 
 def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:
-    """The part of a radius law whose circles a robot reaches from straight on.
+    """Part of a radius law whose circles a robot reaches from a straight start.
 
-    A robot bends farther on its way into a circle than on the circle, and no two feet are alike, so that a joint may
-    leave its range although that of the settled walk does not. The softest spring that is left is the first at which
-    none of :data:`HELD` walks does, with the disturbance that all studies have. Raises AnalysisError if none is left.
+    A robot bends farther on its way into a circle than on the circle, and feet differ, so that a joint may leave its
+    range although it does not in the settled walk. The softest spring of the result is the first at which no joint does
+    in :data:`HELD` walks with the disturbance of all studies. Raises AnalysisError if no spring remains.
     """
     for first, value in enumerate(law.values[:-2].tolist()):
         walker = robot.with_value(K1, value)
@@ -91,14 +91,14 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
 
 
 def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
-    """Numbers at the end of one trial's record.
+    """Measures at the end of one trial's record.
 
     Returns
     -------
     Dataset over joint: ``mean_angle``, ``axis_radius`` (m) and ``status`` of :class:`chilopod.trials.WalkSummary`;
     ``bend``, the sum of the sizes of the mean angles (rad); ``direction`` (left, right, straight; empty where the walk
     failed); ``moved``, the difference of the bend from that of the 10 s before (rad), ``settled``, whether that is less
-    than :data:`SETTLED` of the bend; and ``speed`` of module 1 over the last 12 s (m/s).
+    than :data:`SETTLED` of the bend; and ``speed``, that of module 1 over the last 12 s (m/s).
     """
     (end,) = summaries(robot, record)
     walk = record.isel(robot=0)
@@ -108,7 +108,7 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
     back = int(np.searchsorted(times, times[-1] - 12.0))
-    # Along the way, gait cycle by gait cycle: on a curve the chord of 12 s is shorter.
+    # Path length, gait cycle by gait cycle: on a curve the chord of 12 s is shorter.
     stride = max(1, round(robot.gait.period / (times[1] - times[0])))
     steps = np.linalg.norm(np.diff(place[back::stride], axis=0), axis=1) / (stride * (times[1] - times[0]))
     return xr.Dataset(
