@@ -28,7 +28,7 @@ _FORM = 'a direction and a distance, such as "45 deg, 1.3 m", or a place on the 
 _RANDOM = "random:"
 _LONGEST_SEED = 18  # digits: a 64-bit whole number holds them
 _WIDEST_BEARING = math.radians(75.0)
-_DIGITS = 9  # relative tolerance of a distance, so that rounding of 0.15 m or 10 km is accepted
+_DIGITS = 9  # decimal places of a distance, so that rounding does not exclude 0.15 m or 10 km
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,10 @@ class SpringLaw(ReadOnlyArrays):
     the body axis, the sum of joint angles over (N-1) L. The first spring is then
 
     - as soft as possible where the body bends less, because a bend grows by only a few percent a second beside the
-    pitchfork;
+      pitchfork;
     - that of the inverse radius law, the paper's k1-hat, where it bends as desired, which keeps the bend;
     - as stiff as possible where it bends more or to the wrong side, where the desired bend is nearly zero, and where a
-    joint reaches its limit, which straightens it.
+      joint reaches its limit, which straightens it.
 
     The desired bend is zero where the target lies so far within the tightest circle that the robot would circle it for
     ever. Where the target is out of view it is the tightest, to the side that the legs were last turned to, until the
