@@ -49,22 +49,21 @@ def _compiled(function: Any = None, **options: Any) -> Any:
 @functools.cache
 def _warn() -> None:
     warnings.warn(
-        "compiled code cannot be kept, every start compiles anew: set NUMBA_CACHE_DIR to a folder that can be written",
+        "compiled code cannot be kept, so every start compiles again: set NUMBA_CACHE_DIR to a writable folder",
         RuntimeWarning,
         stacklevel=4,
     )
 
 
-# With debug information numba keeps every value in memory, where no product is seen beside its sum: other bits.
+# With debug information numba keeps every value in memory, which prevents fused operations and changes bits.
 njit = functools.partial(_compiled, nogil=True, debug=False)
-"""``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
-answer Ctrl-C."""
+"""``numba.njit`` with the compiled code kept on disk; other threads run meanwhile, for progress and for Ctrl-C."""
 
 fused_njit = functools.partial(njit, fastmath={"contract"})
-"""The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
+""":data:`njit` with fused products and sums of one rounding allowed: not for exact error terms."""
 
 parallel_njit = functools.partial(njit, parallel=True)
-"""The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
+""":data:`njit` for loops over ``prange``, one robot in an iteration, so that results do not depend on the number of
 threads."""
 
 

@@ -89,7 +89,7 @@ def nearest_name(name: str, valid: Iterable[str]) -> str | None:
 
     Letter case does not count, and of two names equally alike the first one wins.
     """
-    # difflib is quadratic in the length of its input, and nobody mistypes a name this long.
+    # difflib is quadratic in the length of its input, and misspelt names are never this long.
     if len(name) > _LONGEST_VALUE:
         return None
     folded: dict[str, str] = {}

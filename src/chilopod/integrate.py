@@ -37,7 +37,7 @@ _E5 = np.ascontiguousarray(DOP853.E5)
 STAGES = 12
 """Slopes that a step needs."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
-"""The next step aims at this part of the tolerated one, and is that many times as long at least and at most."""
+"""Safety factor of the next step, and the least and largest ratio of two steps."""
 
 
 # What is summed of the slopes, row by row without the zeros, in fours: for every stage, the new state and both errors.

@@ -24,7 +24,7 @@ from chilopod.compiled import njit
 from chilopod.numba_internals import Conversion, cgutils, ir, signature
 
 LANES = 8
-"""Lanes of double precision that fill the widest registers there are; narrower ones are used two or four at a time."""
+"""Number of lanes of double precision in the widest registers; narrower ones are used two or four at a time."""
 
 _CACHE_LINE = 8  # numbers
 _INDEX = ir.IntType(32)

@@ -22,7 +22,7 @@ INK = "#808080"
 """Colour of frames and of text in drawings."""
 
 COLORS = ("#3a8fd0", "#e69f00", "#00a67a", "#d679a8", "#b07d4f", "#8a7fd0")
-"""Colours of what is to be told apart."""
+"""Colours of different series."""
 
 _SMALL = 11  # px, of text
 _WIDEST = 110  # characters of a line

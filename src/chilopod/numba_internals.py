@@ -26,14 +26,14 @@ from chilopod import sources
 __all__ = ["COMPILING", "Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
 
 ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "twin")
-"""Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
+"""Subpackages without compiled code, which no compiled code reaches: their changes need no new compilation."""
 
 NOTICED = 1.0
-"""Seconds of compiling after which it is said."""
+"""Seconds of compilation after which a message appears."""
 
 _FOLDER = "chilopod-"
 FOLDERS = 3
-"""Versions whose code is kept: as many as one goes back and forth between."""
+"""Number of versions whose code is kept, for switching between them."""
 
 
 def keep(dispatcher: Any) -> bool:
@@ -72,7 +72,7 @@ class _Locator:
         if self._folder.exists():
             return
         self._folder.mkdir(parents=True, exist_ok=True)
-        # A process that still runs may have one of these; it makes it anew.
+        # A running process may use one of these folders; it creates the folder again.
         others = {other.stat().st_mtime: other for other in self._folder.parent.glob(f"{_FOLDER}*")}
         for when in sorted(others)[:-FOLDERS]:
             shutil.rmtree(others[when], ignore_errors=True)

@@ -26,7 +26,7 @@ INTERRUPTED = 130
 
 _ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # not all systems have all of them
 
-_PATIENCE = 1.0  # s after Ctrl-C until it is said that something is still being stopped
+_PATIENCE = 1.0  # s after Ctrl-C until a message that work is still being stopped
 _SHOW_CURSOR = b"\n\x1b[?25h"  # a progress bar hides it
 
 
@@ -136,7 +136,7 @@ def leave(words: str = "error: interrupted\n") -> NoReturn:
 
 
 on_leave: list[Callable[[], object]] = []
-"""Functions to call where this process ends on the spot."""
+"""Functions to call when this process ends at once."""
 
 _pressed: list[int] = []
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 Progress = Callable[[float, str], None]
-"""Called with the part done (0 to 1) and a few words."""
+"""Function of the fraction done (0 to 1) and a few words."""
 
 
 def silent(done: float, words: str) -> None:

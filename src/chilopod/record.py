@@ -22,13 +22,13 @@ RATE = 100.0
 """Default sampling rate of records, Hz."""
 
 LONGEST = 1e5
-"""s, more than a day: anything longer is a slip of the pen."""
+"""Largest duration, s, more than a day: longer ones are typing errors."""
 
 MOST_NUMBERS = 5e8
 """Largest number of values of a record (4 GB)."""
 
 LARGEST = 1e100
-"""No number in a record is larger, in its unit: sums of squares stay finite."""
+"""Largest number in a record, in its unit: sums of squares stay finite."""
 
 _MOVING, _TOLD = ("time", "robot"), ("event", "robot")
 MOTION = {
@@ -60,8 +60,8 @@ QUANTITIES = MOTION | {
     "seen_bearing": (_TOLD, "rad", "commands"),
     "seen_distance": (_TOLD, "m", "commands"),
 }
-"""All quantities that an engine can record: dimensions, unit, and what they come with, if not always. Springs that
-cannot be adjusted, and targets that stay, are not over time."""
+"""All quantities that an engine can record: dimensions, unit, and the condition of optional ones. Springs that are not
+adjustable, and fixed targets, have no dimension of time."""
 
 
 @dataclass(frozen=True)

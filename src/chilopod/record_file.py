@@ -78,7 +78,7 @@ class RecordFile:
             self._failure = error
             return
         self._medium = _Medium(self._spooled.fileno(), "r+b", closefd=False)
-        # A chunk of the file is of one robot: each record is written at a stretch.
+        # A chunk of the file has one robot, so each record is written contiguously.
         shaped = record.copy()
         for variable in shaped.variables.values():
             if "robot" in variable.dims:

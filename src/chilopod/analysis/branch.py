@@ -31,13 +31,13 @@ from chilopod.stability.spectrum.errors import VERDICTS
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
-"""Tolerance of the nonlinear flow along a branch; orbits are good to 1e-10 (the tests hold 1e-9 against 1e-14)."""
+"""Tolerance of the nonlinear flow along a branch; orbits are accurate to 1e-10 (the tests compare 1e-9 with 1e-14)."""
 
 VERSION = 2
-"""Version of the file of a branch: goes up whenever its data mean something else, or would go on in another way."""
+"""Version of the file of a branch, increased whenever the meaning of its data or their continuation changes."""
 
 GRAVITY = 9.80665
-"""m/s^2, standard."""
+"""Standard gravity, m/s^2."""
 
 _SUFFIX = {
     "axis_radius": "m",

@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
 
 _BETWEEN = (1.0 / 20.0, 3.0)
-"""Interval, relative to the stiffest spring, in which the pitchfork of the first one is looked for."""
+"""Interval, relative to the stiffest spring, in which the pitchfork of the first spring is searched."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from chilopod.errors import AnalysisError, ParameterError
 Array = NDArray[np.float64]
 
 RESAMPLED = 1000
-"""Sets of trials that the bootstrap draws by default."""
+"""Default number of bootstrap samples."""
 
 _GRID = 2000
 _CLOSEST, _FARTHEST = 1e-3, 0.999  # to the springs fitted: of their distance, and on the way to an infinite kc

@@ -30,10 +30,10 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 DISTANCES = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
-"""1 - k/k* of the springs looked at by default."""
+"""Default distances 1 - k/k* of the springs."""
 
 TOLERANCE = 1e-8
-"""Tolerance of the nonlinear flow; orbits are good to about a tenth of it, and the amplitude is a few degrees."""
+"""Tolerance of the nonlinear flow; orbits are accurate to about a tenth of it, and the amplitude is a few degrees."""
 
 _SETTLING = 6.0  # e-folds of the slowest disturbance, that of the amplitude
 _MEASURED = 1000  # periods

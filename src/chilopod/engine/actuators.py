@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SINCE, FROM, SLOPE, UNTIL, GOAL, RAMPING, SETTLING = range(7)
-"""Rows of :attr:`Actuators.profile`: when the command came (s), where the ramp began (N*m/rad), its slope (N*m/rad/s),
-when it ends (s) and where; and what is left of the lag at its beginning and at its end (N*m/rad)."""
+"""Rows of :attr:`Actuators.profile`: time of the command (s), start of the ramp (N*m/rad), its slope (N*m/rad/s), its
+end in time (s) and in stiffness (N*m/rad); and the remaining lag at its start and at its end (N*m/rad)."""
 
 _MOST_YAW = 0.5 * np.pi
 _SAME_INSTANT = 1e-9  # s

@@ -16,7 +16,8 @@ from chilopod.robot import Robot
 Array = NDArray[np.float64]
 
 BEGINNING = 1e-9
-"""Part of a gait cycle by which a time may miss its beginning: rounding of whole multiples of the period."""
+"""Tolerance of a time at the beginning of a gait cycle, relative to the cycle: rounding of whole multiples of the
+period."""
 
 
 def as_array(name: str, value: object) -> Array:
@@ -173,7 +174,7 @@ def rows_anew(
     arguments: Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]],
     seeds: object = None,
 ) -> tuple[NDArray[np.bool_], dict[str, Array | None]]:
-    """Arguments of ``restart`` as arrays with one row for each robot that is put on the floor anew.
+    """Arguments of ``restart`` as arrays with one row for each restarted robot.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from chilopod.engine.contract import Array, Command, Observation, Status, Walk
 from chilopod.record import Recording
 
 BREAKS = 0.6
-"""s: when something happens in the middle of trials."""
+"""Time of the event in the middle of the walks, s."""
 
 _STOPS = 0.98  # s: on a sample, on no command
 _NEAR = 1e-4  # rad and m, after two gait cycles, of states that agree to the tolerance of an integrator or solver
@@ -38,7 +38,7 @@ def aims(trial: Trial) -> None:
     where = np.stack([there, nowhere, here])
 
     def aimed(walk: Walk) -> Walk:
-        expect(np.isnan(walk.observe().bearing).all(), "a target is seen where there is none")
+        expect(np.isnan(walk.observe().bearing).all(), "the bearing is finite without a target")
         wrong: Any = (here[:1], np.full((len(where) + 1, 2), 1.0), here * np.inf, [np.nan, 1.0], "there", None)
         for target in wrong:
             expect_refused(f"the target {target}", partial(walk.aim, target))
@@ -56,18 +56,18 @@ def aims(trial: Trial) -> None:
         return walk
 
     still = trial.walked(trial.start())
-    expect("target" not in trial.walked(trial.start(target=None)), "the record has a target where there is none")
+    expect("target" not in trial.walked(trial.start(target=None)), "the record of a walk without a target has one")
     data = trial.led(trial.start(target=None), {BREAKS: aimed}).to_dataset()
     over = ("time", "robot", "axis")
     expect("target" in data, "the record has no target")
-    expect(data.target.dims == over, f"target is over {data.target.dims}, not {over}")
+    expect(data.target.dims == over, f"target has dimensions {data.target.dims}, not {over}")
     count = int((data.time.values <= BREAKS).sum())
     moved = np.concatenate([np.full((count, *where.shape), np.nan), np.tile(where, (data.sizes["time"] - count, 1, 1))])
     expect_near(data.target.values, moved, 0.0, "target over time, m")
     away = moved - data.position.values
     expect_near(data.distance.values, np.hypot(away[..., 0], away[..., 1]), 1e-9, "distance over time, m")
     for name in ("position", "heading", "joint_angle", "stiffness"):
-        expect(data[name].equals(still[name]), f"{name} is another where the target is moved")
+        expect(data[name].equals(still[name]), f"{name} changes when the target is moved")
 
 
 def halts(trial: Trial) -> None:
@@ -92,15 +92,15 @@ def halts(trial: Trial) -> None:
     last = round(_STOPS * 50.0)
     for name in ("position", "heading", "joint_angle", "distance"):
         found, wanted = data[name].values, free[name].values
-        expect(np.array_equal(found[:last, 1], wanted[:last, 1]), f"{name} is another before it was halted")
+        expect(np.array_equal(found[:last, 1], wanted[:last, 1]), f"{name} of a halted robot changes before the halt")
         # At the time of the move, or within its step, either target is valid.
-        expect(np.isnan(found[last + 2 :, 1]).all(), f"{name} is not NaN from where it was halted on")
+        expect(np.isnan(found[last + 2 :, 1]).all(), f"{name} is finite after the halt")
         for i in (0, 2):
-            expect(np.array_equal(found[:, i], wanted[:, i]), f"{name} of robot {i} is another where 1 is halted")
+            expect(np.array_equal(found[:, i], wanted[:, i]), f"{name} of robot {i} changes when robot 1 is halted")
     walk.halt(np.ones(len(trial.robots), dtype=bool))
     walk.advance(END + 0.1)
     expect(set(walk.status) == {Status.HALTED}, "robots walk on that were halted")
-    expect(np.isnan(walk.to_dataset().heading.values[-1]).all(), "robots that were halted are recorded")
+    expect(np.isnan(walk.to_dataset().heading.values[-1]).all(), "halted robots have finite records")
 
 
 def states(trial: Trial) -> None:
@@ -110,11 +110,9 @@ def states(trial: Trial) -> None:
     walk.halt(np.array([False, True, False]))
     now = walk.states()
     expect(len(now) == len(trial.robots) and now.ndim == 2, f"states have shape {now.shape}")
-    expect(
-        np.isnan(now[1]).all() and np.isfinite(now[[0, 2]]).all(), "states of who was halted, and only theirs, are NaN"
-    )
+    expect(np.isnan(now[1]).all() and np.isfinite(now[[0, 2]]).all(), "states must be NaN for halted robots only")
     again = trial.engine.start(trial.robots[2], initial=now[2], target=(0.9, 0.4), record=None)
-    expect(again.time == 0.0 and again.states().shape == (1, now.shape[1]), "states of the new walk have another shape")
+    expect(again.time == 0.0 and again.states().shape == (1, now.shape[1]), "states of the new walk have a wrong shape")
     for ahead in (0.0, 2.0 * period):
         walk.advance(period + ahead)
         again.advance(ahead)
@@ -133,9 +131,9 @@ def restarts(trial: Trial) -> None:
         for each in (free, walk):
             each.advance((number + 0.4) * period)
             each.command(command)
-    expect_refused("putting robots on the floor in the middle of a cycle", partial(walk.restart, one, begin))
+    expect_refused("a restart in the middle of a gait cycle", partial(walk.restart, one, begin))
     recorded = trial.start(record=Recording(rate=50.0))
-    expect_refused("putting robots on the floor of a walk with a record", partial(recorded.restart, one, begin))
+    expect_refused("a restart of a walk with a record", partial(recorded.restart, one, begin))
     for each in (free, walk):
         each.advance(len(told) * period)
     walk.halt(one)
@@ -144,7 +142,7 @@ def restarts(trial: Trial) -> None:
         expect_refused(f"{which}, {initial} for a restart", partial(walk.restart, which, initial))
     expect_refused("friction 0", partial(walk.restart, one, begin, friction=0.0 * firm))
     walk.restart(none, begin)
-    expect(walk.status[1] is Status.HALTED, "a robot walks that was not put on the floor anew")
+    expect(walk.status[1] is Status.HALTED, "a robot walks that was not restarted")
     walk.restart(one, begin, firm)
     walk = trial.engine.resume(walk.save())
     fresh = trial.engine.start(trial.robots[1], initial=begin, friction=firm, target=(0.9, 0.4), record=None)
@@ -155,7 +153,7 @@ def restarts(trial: Trial) -> None:
             if then is not None:
                 each.command(_for_one(then) if each is fresh else then)
         expect(set(walk.status) == {Status.WALKED}, f"status is {walk.status}")
-        _expect_alike(walk, 1, fresh, "of a robot that was put on the floor anew and of one that has just started")
+        _expect_alike(walk, 1, fresh, "of a restarted robot and a freshly started one")
     for name in ("joint_angles", "leg_yaw", "stiffness", "bearing"):
         here, there = (getattr(each.observe(), name)[[0, 2]] for each in (walk, free))
         expect(np.array_equal(here, there), f"{name} of the others is another")

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TIMES = (0.35, 0.8, 1.3)
-"""s, of the commands that every trial gets."""
+"""Times of the commands of every walk, s."""
 
 END = 2.0
-"""s, of every trial."""
+"""Duration of every walk, s."""
 
 _BENT = 0.2  # rad in all at the start
 
@@ -108,7 +108,7 @@ def expect_refused(what: str, attempt: Callable[[], object]) -> None:
     except ChilopodError:
         return
     except Exception as error:
-        raise Broken(f"{what} ends in {type(error).__name__}, not in a ChilopodError") from None
+        raise Broken(f"{what} raises {type(error).__name__}, not a ChilopodError") from None
     raise Broken(f"{what} is accepted")
 
 

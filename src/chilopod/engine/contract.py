@@ -32,7 +32,7 @@ class Status(Labelled):
     DIVERGED = "diverged", "the motion became too fast to follow or infinite"
     OUT_OF_RANGE = "out of range", "a yaw joint bent by more than a right angle, where modules run into each other"
     FALLEN = "fallen", "module 1 tipped over"
-    HALTED = "halted", "stopped where it was told to"
+    HALTED = "halted", "stopped by a command"
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class Walk(Protocol):
         """
 
     def halt(self, which: NDArray[np.bool_]) -> None:
-        """Stop some robots for good, now, with ``HALTED``; the others walk on to the same bits.
+        """Stop some robots finally, with ``HALTED``; the results of the others do not change.
 
         Parameters
         ----------

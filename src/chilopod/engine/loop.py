@@ -23,13 +23,13 @@ from chilopod.progress import Progress, silent
 _T = TypeVar("_T")
 
 _MOMENT = 0.3
-"""s, for which a walk goes on without a word, about: that long Ctrl-C may have to wait too."""
+"""Approximate time between two reports of progress, s; Ctrl-C may wait as long."""
 
 _MOST_EVENTS = 10_000
-"""In a gait cycle: more come from a generator that never ends."""
+"""Largest number of events in a gait cycle: more would come from an endless generator."""
 
 _FIRST, _SHORTEST = 0.02, 1e-3
-"""s of the walk, at first and at least, that it goes on for at a time."""
+"""First and least stretch of a walk that is advanced at a time, s."""
 
 
 @dataclass

@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 _MODULES: Final[Mapping[str, str]] = {"planar": "chilopod.planar", "twin": "chilopod.twin"}
 
 ENGINES: Final = tuple(_MODULES)
-"""Engines by name: the planar model, or the whole robot in three dimensions."""
+"""Engines by name: the planar model, and the robot in three dimensions."""
 
 _PARTS: Final = ("traits", "common", "initial_states", "start", "resume")
 _SAME_TIME: Final = 1e-9  # s

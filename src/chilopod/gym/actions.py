@@ -19,8 +19,8 @@ SPRINGS = ("first", "all")
 """Springs that an action sets."""
 
 _SOFTEST = 1.0 / 7.0
-"""Part of the stiffest spring, where the robot file says nothing: at it the paper's robot turns, and bends, ever more
-tightly, until a joint leaves its range."""
+"""Default softest spring relative to the stiffest: there the paper's robot bends ever more tightly, until a joint
+leaves its range."""
 
 _ROUNDING = 1e-6  # tolerance of single precision at the end of a range
 

@@ -21,7 +21,7 @@ from chilopod.steering import ARRIVAL_RADIUS
 Array = NDArray[np.float64]
 
 SIZE: Final = 480
-"""Pixels, of height and width."""
+"""Height and width of a picture, pixels."""
 
 _FONT, _MARGIN = 14.0, 0.3  # pixels; m
 

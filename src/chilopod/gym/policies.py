@@ -16,10 +16,10 @@ from chilopod.tasks.radius_law import radius_law
 Row = NDArray[np.float32]
 
 Policy = Callable[[Row], Row]
-"""From the observation of a robot, or one a robot, to its action."""
+"""Function from observations, one row or one for each robot, to actions."""
 
 BASELINES = {name: each for name, each in ON_THE_WAY.items() if not each.needs_torque}
-"""Strategies that steer with what actions set."""
+"""Strategies that steer only with the actuators of actions."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ MOST_STEPS = 2e9
 """Largest number of steps of all modules together: an hour or so of one robot on one core."""
 
 _REACH = 6.0
-"""About the fastest rate times the longest step with which the integrator is stable."""
+"""Approximate stability limit of the integrator: fastest rate times longest step."""
 
 
 def check_steps(robot: Robot, seconds: float) -> None:

@@ -144,7 +144,7 @@ class PlanarModel(ReadOnlyArrays):
         carry([self], batch, t0, t1, self.tolerance)
         derivative = batch.imag.T / COMPLEX_STEP
         # Against finer steps the global error stays within some tens of the tolerance per step, times the growth of the
-        # motion; and the derivative is that of a motion so much in error, which counts as its growth once more.
+        # motion; the derivative is that of a motion with this error, which adds the growth once more.
         growth = max(1.0, float(np.abs(derivative).max()))
         error = 100.0 * self.tolerance * growth**2
         return batch[0].real.copy(), derivative, error

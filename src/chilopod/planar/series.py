@@ -19,7 +19,7 @@ PANEL = 16
 """Number of columns."""
 
 ROWS = 4
-"""The matrix must have a multiple of so many rows."""
+"""The number of rows of the matrix must be a multiple of this."""
 
 _LANES = 8
 

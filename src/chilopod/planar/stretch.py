@@ -24,19 +24,19 @@ from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOP
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
-"""Largest bend of a yaw joint, rad: beyond it modules run into each other."""
+"""Largest bend of a yaw joint, rad: beyond it modules collide."""
 
 _A_GROUP, _GROUPS = LANES, 4
-"""Robots that a thread is given at a time at least, and how many times each thread is given some at most."""
+"""Least number of robots in a group for a thread, and largest number of groups for each thread."""
 
 _WORTH_WAKING, _A_STEP = 2e-4, 2.5e-7
-"""Work that is worth waking other threads for, and that of a step for one module, in lanes, about, s."""
+"""Least work for several threads, and approximate work of a step for one module in lanes, s."""
 
 _TIME, _STEP, _ERROR = range(3)
 _NOBODY = -1
 
 _slope = njit(rhs.py_func)
-"""Without leave for LLVM to fuse, see :mod:`chilopod.lanes`."""
+"""Compiler without permission to fuse, see :mod:`chilopod.lanes`."""
 
 _attempt = lanes_step(_slope)
 
@@ -327,10 +327,10 @@ def _describe(profile: Any, lag: Any, torque: Any, now: float, zero: float, spri
 
 
 walk_alone = _carrier(1)
-"""As :func:`carry`, one robot after the other on this thread."""
+""":func:`carry`, one robot after the other on this thread."""
 
 walk_abreast = _carrier(LANES)
-"""As :func:`carry`, side by side on this thread: waking the others takes longer than a step of some robots."""
+""":func:`carry` in lanes on this thread: waking other threads takes longer than a step of a few robots."""
 
 
 @parallel_njit

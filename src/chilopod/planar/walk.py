@@ -24,7 +24,7 @@ from chilopod.robot import Robot
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
-"""Default of :func:`start`: a minute of walking is then good to better than 1e-6 m."""
+"""Default of :func:`start`: a minute of walking is then accurate to 1e-6 m."""
 
 traits = Traits(
     name="planar",

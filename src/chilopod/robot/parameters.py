@@ -14,7 +14,7 @@ from chilopod.robot.parts import Body, Legs, Springs, Twin
 from chilopod.units import Description, Quantity, quantities
 
 _PATH: Final = re.compile(r"([a-z_]+\.[a-z_]+)(?:\[([0-9]{1,6})\])?")
-_INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # the likely intention
+_INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # tolerates spaces and a missing bracket
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ SECTIONS: Final[dict[str, type[Description]]] = {
 QUANTITIES: Final = {
     f"{section}.{key}": quantity for section, model in SECTIONS.items() for key, quantity in quantities(model).items()
 }
-"""The quantity of every number of a robot by its path, springs not counted singly."""
+"""Quantity of every number of a robot by its path, with one entry for all springs."""
 
 
 @lru_cache(maxsize=1024)

@@ -18,10 +18,10 @@ from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
 from chilopod.text_file import read_text
 
 MOST_GOALS = 1000
-"""More targets than this are a slip of the pen."""
+"""Largest number of targets; more are typing errors."""
 
 RANDOM_DISTANCES = (0.8, 2.0)
-"""Least and largest distance of the targets of a random course from where the robot is when their turn comes, m."""
+"""Least and largest distance of the targets of a random course from the robot when they are set, m."""
 
 _LONGEST_PATIENCE = 1e4
 _FORM = 'a direction and a distance, such as "45 deg, 1.3 m", or a place on the floor, such as "1.2 m, 0.5 m"'
@@ -180,13 +180,12 @@ COURSES: Mapping[str, tuple[Goal, ...]] = {
         (1.0, 1.0), (0.0, 2.0), (-1.0, 1.0), (0.0, 0.0), (1.0, -1.0), (0.0, -2.0), (-1.0, -1.0), (0.0, 0.0)
     ),
 }
-"""By name, for a robot as long as the paper's, 1.35 m, which turns within about 0.35 m.
+"""Courses by name, for a robot as long as the paper's, 1.35 m, which turns within about 0.35 m.
 
 ======  ===============================================================
-slalom  gates left and right of the way ahead, 1.5 m from each other
-square  the corners of a square of 2 m, all turns to the left
-eight   a circle of 1 m to the left and one to the right, back each time
-======  ===============================================================
+slalom  gates left and right of the straight path, 1.5 m from each other square  the corners of a square of 2 m, all
+turns to the left eight   a circle of 1 m to the left and one to the right, back each time ======
+===============================================================
 """
 
 

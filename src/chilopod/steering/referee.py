@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LOOK = 0.1
-"""s between two looks at where the robots are: the paper's robot goes 6 mm meanwhile."""
+"""Time between two looks at the positions of the robots, s, in which the paper's robot moves 6 mm."""
 
 
 class Verdict(Labelled):
@@ -223,7 +223,7 @@ _KEPT = {
     "leg_yaw": (("side",), "rad"),
     "stiffness": (("joint",), "N*m/rad"),
 }
-"""Variables shown to a controller, over what besides event and robot, and their units."""
+"""Variables observed by a controller, their dimensions besides event and robot, and their units."""
 
 
 def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Command]:

@@ -12,10 +12,10 @@ from chilopod import units
 from chilopod.errors import ParameterError, UnitError
 
 ARRIVAL_RADIUS = 0.15
-"""m: nearer than this the paper counts the target as reached."""
+"""Distance within which the paper counts the target as reached, m."""
 
 FARTHEST = 1e4
-"""m: a target farther away is a slip of the pen."""
+"""Largest distance of a target, m; larger ones are typing errors."""
 
 _FORM = 'a direction and a distance, such as "45 deg, 1.3 m"'
 

@@ -22,7 +22,7 @@ from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import Trial, finite
 
 GRAVITY = 9.81
-"""m/s^2"""
+"""Standard gravity, m/s^2."""
 
 _RATE = 20.0  # Hz, of records: looks of the referee fall on samples
 _PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the straight walk without slip

@@ -21,16 +21,16 @@ from chilopod.steering import RadiusLaw
 from chilopod.trials import AVERAGED, NONE, Trial, mean_joint_angles, run, summaries
 
 DURATION = 90.0
-"""s, of every trial: beside the onset a bend takes a minute to grow."""
+"""Duration of every trial, s: beside the onset a bend takes a minute to grow."""
 
 CURVED = 0.25
-"""rad: a walk is curved if its joints bend by more than this in all, to a radius of 4.5 m or less."""
+"""Least bend of all joints together of a curved walk, rad: a radius of 4.5 m or less."""
 
 SETTLED = 0.05
 """Largest relative change of the bend of a settled curve in the 10 s before its end."""
 
 HELD = 16
-"""Walks that must hold at a spring: of 20 none leaves the range then, as a rule."""
+"""Number of walks that must stay in range at a spring; then of 20 walks usually all do."""
 
 _LAW_SPRINGS = (0.2, 0.3, 0.37, 0.44, 0.51, 0.59, 0.68, 0.78, 0.9)  # of the stiffest spring
 _LAW_BEND = 0.8  # rad in all, to start with

@@ -32,7 +32,7 @@ def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[
     try:
         wrong = _outline(data, walk, trials[0], len(trials)) or _content(data, walk, trials, drawn)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        wrong = f"its record cannot be understood ({in_words(error)})"
+        wrong = f"its record cannot be read ({in_words(error)})"
     if wrong:
         raise _refused(wrong, trials[0].engine)
     return data
@@ -49,7 +49,7 @@ def check_finite(values: Mapping[str, Any], engine: str) -> None:
         finite = np.isfinite(values[name][:, 0]).reshape(len(there), -1).all(axis=1)
         if not finite[:count].all() or finite[count:].any():
             raise _refused(
-                f"{name} of a robot that {label} is not finite as long as it walks, or is so afterwards", engine
+                f"{name} of a robot with status {label} must be finite while it walks and NaN afterwards", engine
             )
 
 
@@ -117,7 +117,7 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
     """Fault of numbers."""
     first, status = trials[0], data["status"].values.tolist()
     if status != [each.label for each in walk.status]:
-        return f"status is {status}, not that of the walk"
+        return f"status is {status}, which differs from that of the walk"
     for name, each in data.data_vars.items():
         if name != "status" and (np.abs(each.values) > LARGEST).any():
             return f"{name} has numbers beyond {LARGEST:g}"
@@ -136,5 +136,5 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
             off["target"] = places[..., robot, :] - np.array(trial.target.position)
         for name, error in off.items() if np.isfinite(heading[robot]) else ():
             if not np.all(np.abs(error) <= _NEAR):
-                return f"{name} of robot {robot} does not start as asked"
+                return f"{name} of robot {robot} does not start at the given values"
     return ""

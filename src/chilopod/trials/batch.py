@@ -19,12 +19,12 @@ from chilopod.trials.disturbance import Drawn, conditions, draw
 from chilopod.trials.trial import Trial
 
 NOT_KEPT = "not kept"
-"""Attribute of a record that is not to be kept: why. It stays nowhere."""
+"""Attribute with the reason why a record must not be kept; files never have it."""
 
-_CHANGES = "what its code can reach changes while it steers"
+_CHANGES = "an object that its code can reach changes while it steers"
 _KNOWN: dict[str, str] = {}  # findings about controllers, by everything that defines them
 _MOST_BYTES = 256e6
-"""Largest size of the records of a batch, about."""
+"""Approximate largest size of the records of a batch, bytes."""
 
 
 def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
@@ -112,7 +112,7 @@ def _doubts(trial: Trial) -> str:
         one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
         # An engine may return anything.
         if not getattr(one, "identical", lambda _: True)(other):
-            _KNOWN[who] = "it steers otherwise when it sees the same again (a clock, np.random, a count?)"
+            _KNOWN[who] = "equal observations give different commands (a clock, np.random, a counter?)"
         else:
             _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
     return _KNOWN[who]

@@ -22,7 +22,7 @@ _FINE = ("sleep", "uuid3", "uuid5")
 _SEEDED = frozenset(
     ("Random", "RandomState", "default_rng", "SeedSequence", "MT19937", "PCG64", "PCG64DXSM", "Philox", "SFC64")
 )
-"""Numbers as good as chance that are the same every time, if their seed is."""
+"""Random generators that repeat their numbers for a given seed."""
 _BESIDE = ("CACHE", "COPY_FREE_VARS", "EXTENDED_ARG", "KW_NAMES", "NOP", "PRECALL", "PUSH_NULL", "RESUME", "SWAP")
 _GLOBAL = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_DEREF", "LOAD_CLASSDEREF")
 _INNER = ("LOAD_ATTR", "LOAD_METHOD", "IMPORT_FROM")

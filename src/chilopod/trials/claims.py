@@ -14,7 +14,7 @@ from typing import Self
 from chilopod.process import on_leave
 
 NAME = ".chilopod-claims"
-"""Name of the file whose bytes are locked; there while somebody walks, and after one who was killed."""
+"""Name of the file whose bytes are locked; it exists while a process walks, and after a killed one."""
 
 _NOT, _WITH_OTHERS, _ALONE = "F_UNLCK", "F_RDLCK", "F_WRLCK"  # how a byte is locked
 _PRESENT = 0  # the byte that all processes in the folder share a lock of

@@ -131,7 +131,7 @@ class Cluster:
             yield from self._walk([suspect], guilty)
         if guilty:
             which = "; ".join(_named(batch) for _, batch in guilty)
-            raise self._error(f"these kill their worker again and again, all others are done: {which}")
+            raise self._error(f"these batches kill their worker repeatedly, all others are done: {which}")
 
     def _walk(
         self, batches: Iterable[tuple[int, Sequence[Trial]]], killed: list[tuple[int, Sequence[Trial]]]
@@ -203,13 +203,13 @@ class Cluster:
         if self._threads:
             self._seen = now
         elif now - self._seen > _ALONE:
-            raise self._error(f"has had no workers for {_ALONE:.0f} s; what is kept in a folder goes on from here")
+            raise self._error(f"has had no workers for {_ALONE:.0f} s; a kept study resumes from here")
 
     def _in_words(self, error: BaseException) -> ClusterError:
         """Message of an error of dask."""
         gone = isinstance(error, (OSError, TimeoutError, asyncio.CancelledError)) or "Cancelled" in type(error).__name__
         if gone or self._client.status != "running":
-            return self._error("the scheduler went away; what is kept in a folder goes on from here")
+            return self._error("the scheduler was lost; a kept study resumes from here")
         return self._error(one_line(f"{type(error).__name__}: {error}"))
 
     def _error(self, problem: str) -> ClusterError:
@@ -287,7 +287,7 @@ def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
 def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
     """Client of worker processes on this machine, which end with it."""
     # Ctrl-C goes to all processes of the terminal; workers inherit from the thread that starts them, which is made
-    # here, that it is not for them. (Whoever starts Python's resource tracker is told to listen again.)
+    # here and blocks it. (Python's resource tracker unblocks it for the thread that starts the tracker.)
     if sys.platform != "win32":
         resource_tracker.ensure_running()
     others = multiprocessing.active_children()

@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 Array = NDArray[np.float64]
 
 _SLICK = 1e-3
-"""Friction that a foot without grip has left."""
+"""Remaining friction of a foot without grip, as a factor."""
 
 _DEVIATIONS = ("joint_angle", "heading", "friction", "bearing")
 

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
 
 PACKAGES = ("chilopod", "numpy", "numba")
-"""Packages that have to be the same on all machines."""
+"""Packages whose versions must be equal on all machines."""
 
 TWIN_PACKAGE = "mujoco-core"
-"""Package that has to be where there are trials of the twin."""
+"""Package that trials of the twin need."""
 
 _SOURCES = "source code of chilopod"
 _DIGITS = 12  # of a digest, in an error

@@ -98,7 +98,7 @@ class Store:
             return  # another process was faster
         except OSError as error:
             raise OutputError(f"{why}, and cannot be moved aside ({error.strerror})", source=str(path)) from None
-        self._tell(f"{path} {why}: walked again, what was there is {aside.name}")
+        self._tell(f"{path} {why}: walked again; the old file is now {aside.name}")
 
     def _sweep(self) -> None:
         """Remove unfinished files of killed processes."""

@@ -14,7 +14,7 @@ from chilopod.record import Array
 from chilopod.robot import Robot
 
 AVERAGED = 5.0
-"""s at the end of a walk over which the paper averages joint angles."""
+"""Time at the end of a walk over which the paper averages joint angles, s."""
 
 
 @dataclass(frozen=True)

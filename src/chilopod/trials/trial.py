@@ -34,7 +34,7 @@ _KINDS = {
     **dict.fromkeys(("forces", "poses", "brief"), _FLAG),
 }
 _ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks")
-"""Subpackages that no walk is made with: who edits these finds trials that were kept before."""
+"""Subpackages that do not affect walks: editing them keeps earlier trials valid."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class Trial:
         why = "it must be defined at the top of a module that can be imported"
         try:
             digest, chance = code_of(self.controller)
-            again = f"{chance}, which answers otherwise every time; chance with a seed does not" if chance else ""
+            again = f"{chance}, whose result varies from call to call; use random numbers with a seed" if chance else ""
             return digest + sources_of(self.engine), why if known_here else "", again
         except UnknownKindError as error:
             can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
@@ -223,7 +223,7 @@ class Trial:
     def not_kept(self, why: str) -> str:
         """Message that explains why a folder does not keep this trial."""
         who = f"engine {self.engine}" if self.controller is None else f"controller {path_of(type(self.controller))}"
-        return f"{who}: its trials walk and are not kept: {why}"
+        return f"{who}: its trials run but are not kept: {why}"
 
 
 def versions_of(engine: str) -> dict[str, Any]:

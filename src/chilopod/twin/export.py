@@ -93,7 +93,7 @@ def urdf(robot: Robot) -> str:
 
 
 FORMATS: dict[str, tuple[str, Callable[[Robot], str]]] = {".xml": ("MJCF", mjcf), ".urdf": ("URDF", urdf)}
-"""By suffix of the file: the name of the format, and what writes it."""
+"""Name of the format and its writer, by suffix of the file."""
 
 
 def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:

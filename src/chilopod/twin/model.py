@@ -31,15 +31,15 @@ from chilopod.twin.step import with_step
 Array = NDArray[np.float64]
 
 Edit = Callable[[mujoco.MjSpec, Robot], None]
-"""Changes a robot's description for MuJoCo in place, before it is compiled."""
+"""Function that changes a robot's description for MuJoCo in place, before it is compiled."""
 
 SIDES = ("left", "right")
 
 POLE_GROUP = 4
-"""Geom group of the pole that marks a target, the only thing that the scanner sees."""
+"""Geom group of the pole that marks a target, the only geometry that the scanner detects."""
 
 AWAY = (0.0, 0.0, -10.0)
-"""Where that pole is when there is no target, m."""
+"""Position of that pole without a target, m."""
 
 _POLE_HEIGHT = 0.4  # m
 _SCANNER_ABOVE = 0.03  # m, of its beams above the body

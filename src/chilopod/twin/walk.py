@@ -29,7 +29,7 @@ from chilopod.twin.scanner import Scanner, rotation
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-8
-"""Default of the contact solver, MuJoCo's own."""
+"""Default tolerance of the contact solver, MuJoCo's own."""
 
 _LONGEST_STRETCH = 0.6  # s stepped without a check, with every step kept meanwhile
 _MOST_KEPT = 5e7  # numbers, of these steps

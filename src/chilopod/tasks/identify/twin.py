@@ -41,10 +41,10 @@ from chilopod.tasks.radius_law import end_of_walk
 from chilopod.trials import Trial, run
 
 VERSION = 3
-"""Goes up whenever the same constants would give other bends; evaluations of other versions are left alone."""
+"""Version of evaluations, increased whenever the same constants would give other bends; other versions are ignored."""
 
 GOOD = 1.0
-"""A set of constants does as well as any if its misfit is below this: then each datum is within its tolerance."""
+"""Misfit below which a set of constants is good: each datum is then within its tolerance."""
 
 _PRIOR = 0.25  # of its range: standard deviation of a constant about the middle
 _POPULATION = 10

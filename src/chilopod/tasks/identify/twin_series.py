@@ -18,10 +18,10 @@ from chilopod.tasks.identify.data import BaseSeries
 from chilopod.twin.walk import TOLERANCE
 
 DURATION = 60.0
-"""s, of the walks."""
+"""Duration of the walks, s."""
 
 LOST = 30.0
-"""Every residual of constants with which the robot does not walk."""
+"""Value of every residual for constants with which the robot cannot walk."""
 
 _SOONER = 36.0  # s, when walks that are far off are given up
 _HOPELESS = 4.0  # misfit
