@@ -93,7 +93,7 @@ def test_a_walk_that_leaves_the_range_says_so(capsys):
         (["--repeats", "3"], ["repeats", "seed"]),
         (["--trials", "/dev/null/trials"], ["/dev/null/trials", "cannot be written"]),
         (["--initial-joints", "1,2 deg"], ["not 2", "5"]),
-        (["--initial-joints", "120 deg"], ["bent too far"]),
+        (["--initial-joints", "120 deg"], ["must be smaller"]),
         (["--initial-joints", "1,x,0,0,0 deg"], ["x"]),
         (["--set", "springs.stiffness=0 N*mm/deg"], ["springs.stiffness", "positive"]),
     ],

@@ -210,9 +210,7 @@ def walk_record(
 
     Parameters
     ----------
-    time
-        s, shape (T,).
-    position, velocity
+    time position, velocity
         Position and velocity of the centre of module 1, m and m/s, shape (T, robots, 2).
     heading, heading_rate
         Heading and heading rate of module 1, rad and rad/s, shape (T, robots).

@@ -325,7 +325,7 @@ def test_an_action_that_is_none_is_one_line(action, words):
         ({"robot": "aoi2021"}, "aoi2021"),
         ({"robot": "aoi2022-planar", "engine": "twin"}, "twin"),
         ({"springs": "second"}, "first or all"),
-        ({"patience": 3.0}, "too short"),
+        ({"patience": 3.0}, "long enough"),
         ({"render_mode": "human"}, "rgb_array"),
         *(({"targets": targets}, "targets.*1 to 1000") for targets in (10**9, -1, 0, 1.5, "1", None)),
         ({"patience": np.nan}, "patience"),

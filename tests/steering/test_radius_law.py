@@ -44,7 +44,7 @@ def test_outside_it_says_so():
     found = law()
     with pytest.raises(AnalysisError, match="must be at least the tightest radius"):
         found.value(0.9 * found.tightest)
-    with pytest.raises(AnalysisError, match="no spring"):
+    with pytest.raises(AnalysisError, match="tightest radius"):
         found.value(math.nan)
     with pytest.raises(ParameterError, match="at least the smallest value of the radius law"):
         found.radius(0.39)

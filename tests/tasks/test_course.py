@@ -141,7 +141,7 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
         ),
         (["legs.half_width=0.3 m"], "actuated", None, AnalysisError, "no pitchfork"),
         ([], "pitchfork", None, ParameterError, "strategy pitchfork needs one stiffness"),
-        ([], "variable", 0.3, ParameterError, "no spring to choose"),
+        ([], "variable", 0.3, ParameterError, "sets its own springs"),
     ],
 )
 def test_what_cannot_be_driven_is_refused(changed, strategy, spring, error, words):

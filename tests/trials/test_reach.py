@@ -99,7 +99,11 @@ def test_a_controller_that_does_not_repeat_itself_is_not_kept(controller, tmp_pa
     assert [each.status.item() for each in records] == ["walked"] * 2
     assert list(tmp_path.iterdir()) == []
     (said,) = [each.message for each in caplog.records]
-    reason = "changes while it steers" if isinstance(controller, Remembering) else "when it sees the same again"
+    reason = (
+        "changes while it steers"
+        if isinstance(controller, Remembering)
+        else "equal observations give different commands"
+    )
     assert reason in said
 
 
