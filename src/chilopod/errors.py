@@ -107,10 +107,10 @@ def one_line(text: str) -> str:
 def in_words(error: BaseException) -> str:
     """Return type and message of an exception from foreign code, as one line."""
     try:
-        said = str(error)
+        message = str(error)
     except Exception:  # one that cannot even be printed
-        said = ""
-    return one_line(f"{type(error).__name__}: {said}" if said else type(error).__name__)
+        message = ""
+    return one_line(f"{type(error).__name__}: {message}" if message else type(error).__name__)
 
 
 def briefly(error: BaseException) -> str:

@@ -181,10 +181,10 @@ class Actuators:
 
     def leg_yaw_told(self, times: Array) -> Array:
         """Setpoint of leg yaw at any rising times of the walk, rad, shape (times, robots, 2)."""
-        told = np.concatenate(
+        setpoints = np.concatenate(
             [np.zeros((1, *self.leg_yaw.shape)), self._logged("command").reshape(-1, *self.leg_yaw.shape)]
         )
-        return told[np.searchsorted(self._logged("event"), times, side="left")]
+        return setpoints[np.searchsorted(self._logged("event"), times, side="left")]
 
     def state(self) -> dict[str, Array]:
         """Complete state, for :meth:`restore`."""

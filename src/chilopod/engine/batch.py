@@ -134,8 +134,10 @@ class BatchWalk(Walk):
         raise NotImplementedError
 
     def _observation(self, bearing: Array, distance: Array, joint_angles: Array) -> Observation:
-        told = self._actuators
-        return Observation(self._time, bearing, distance, joint_angles, told.leg_yaw.copy(), told.stiffness(self._time))
+        actuators = self._actuators
+        return Observation(
+            self._time, bearing, distance, joint_angles, actuators.leg_yaw.copy(), actuators.stiffness(self._time)
+        )
 
     def _finish(self, data: xr.Dataset, times: Array) -> None:
         """Add outcome, target and attributes to a record that has everything else."""

@@ -126,8 +126,8 @@ def restarts(trial: Trial) -> None:
     free, walk = (trial.start(seeds=None, record=None) for _ in range(2))
     period, one, none = trial.robot.gait.period, np.array([False, True, False]), np.zeros(3, dtype=bool)
     begin = trial.engine.initial_states(trial.robot, -trial.bends[1], 1.0, (0.5, 0.2))
-    firm, told = np.full((trial.robot.body.modules, 2), 1.2), trial.commands()
-    for number, command in enumerate(told):
+    firm, commands = np.full((trial.robot.body.modules, 2), 1.2), trial.commands()
+    for number, command in enumerate(commands):
         for each in (free, walk):
             each.advance((number + 0.4) * period)
             each.command(command)
@@ -135,7 +135,7 @@ def restarts(trial: Trial) -> None:
     recorded = trial.start(record=Recording(rate=50.0))
     expect_refused("a restart of a walk with a record", partial(recorded.restart, one, begin))
     for each in (free, walk):
-        each.advance(len(told) * period)
+        each.advance(len(commands) * period)
     walk.halt(one)
     wrong: Any = (([1], begin), (one, begin[:, :-1]), (one, np.nan * begin), (one, np.tile(begin, (2, 1))))
     for which, initial in wrong:
@@ -148,7 +148,7 @@ def restarts(trial: Trial) -> None:
     fresh = trial.engine.start(trial.robots[1], initial=begin, friction=firm, target=(0.9, 0.4), record=None)
     later: list[Command | None] = [None, *trial.commands()[:2]]
     for number, then in enumerate(later):
-        for each, when in ((free, len(told)), (walk, len(told)), (fresh, 0)):
+        for each, when in ((free, len(commands)), (walk, len(commands)), (fresh, 0)):
             each.advance((number + when) * period)
             if then is not None:
                 each.command(_for_one(then) if each is fresh else then)

@@ -67,13 +67,13 @@ class Trial:
     def led(self, walk: Walk, at: Mapping[float, Callable[[Walk], Walk]], which: Sequence[int] = (0, 1, 2)) -> Walk:
         """Walk to the end with the commands; at some times, before a command, continue with the result of a function of
         the walk."""
-        told = dict(zip(TIMES, self.commands(which), strict=True))
+        commands_at = dict(zip(TIMES, self.commands(which), strict=True))
         for time in sorted({*TIMES, *at, END}):
             if time > walk.time:
                 walk.advance(time)
             walk = at[time](walk) if time in at else walk
-            if time in told:
-                walk.command(told[time])
+            if time in commands_at:
+                walk.command(commands_at[time])
         return walk
 
     def walked(self, walk: Walk, which: Sequence[int] = (0, 1, 2), stops: Sequence[float] = ()) -> xr.Dataset:

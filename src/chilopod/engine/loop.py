@@ -180,9 +180,9 @@ def steer(
         if referee is not None:
             seen = referee.through(index, seen)
         assert controller is not None
-        asked = clock.perf_counter()
+        called_at = clock.perf_counter()
         command = _answer(controller, event, seen)
-        thought += clock.perf_counter() - asked
+        thought += clock.perf_counter() - called_at
         try:
             walk.command(command)
         except ParameterError as error:
@@ -201,15 +201,15 @@ def _instants(
 ) -> Iterator[tuple[float, int, Event | None]]:
     """Instants before ``until`` (s) at which the controller or the referee observes, some of them before ``since``:
     number of the event, and the event or None for the referee, which comes first."""
-    asked: Iterator[tuple[float, int, Event | None]] = iter(())
+    events: Iterator[tuple[float, int, Event | None]] = iter(())
     if controller is not None:
-        asked = _numbered(controller, gait, since, until)
+        events = _numbered(controller, gait, since, until)
     looks: Iterator[tuple[float, int, Event | None]] = iter(())
     if referee is not None:
         every = referee.every
         times = (n * every for n in count(_whole(since, every)))
         looks = ((time, -1, None) for time in takewhile(lambda time: time < until, times))
-    return merge(asked, looks, key=lambda each: each[:2])
+    return merge(events, looks, key=lambda each: each[:2])
 
 
 @dataclass

@@ -127,9 +127,9 @@ class Actions:
         stiffness = np.tile(self.robot.springs.stiffness, (len(actions), 1))
         stiffness[:, self.joints] = self.stiffness(actions)
         wanted, yaw = self.legs.limit * actions[:, len(self.joints) :], leg_yaw.copy()
-        told = []
+        timed = []
         for number, (phase, window, side) in enumerate(self.moments):
             yaw[:, side] = wanted[:, side]
             springs = stiffness if number == 0 else None
-            told.append((phase, Command(leg_yaw=yaw.copy(), stiffness=springs, within=window)))
-        return told
+            timed.append((phase, Command(leg_yaw=yaw.copy(), stiffness=springs, within=window)))
+        return timed

@@ -160,10 +160,10 @@ class Episodes:
         first episode, or for an invalid action."""
         if self._walk is None:
             raise ParameterError("must not be called before the first reset", field="step", allowed="reset() first")
-        told, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk
+        checked, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk
         if waiting.all():
             return self._begin([None] * self.count)
-        for phase, command in self.actions.commands(told, self._leg_yaw):
+        for phase, command in self.actions.commands(checked, self._leg_yaw):
             walk.advance((self._cycle + phase) * self.period)
             walk.command(command)
         self._cycle += 1

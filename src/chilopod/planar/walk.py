@@ -284,13 +284,20 @@ class PlanarWalk(BatchWalk):
         status: NDArray[np.intp],
     ) -> None:
         """Carry all robots through pieces of time, in place."""
-        record, told = self._samples.grown(self._timeline.samples if self._record else 0), self._actuators
+        record, actuators = self._samples.grown(self._timeline.samples if self._record else 0), self._actuators
         rows = np.flatnonzero(status == stretch.WALKING)
         if not rows.size or not len(pieces[0]):
             return
         scalars, feet = self._bodies
         robots = stretch.Robots(
-            scalars, feet, self._damping, self._friction, told.profile, told.lag, told.joint_torque, told.leg_yaw
+            scalars,
+            feet,
+            self._damping,
+            self._friction,
+            actuators.profile,
+            actuators.lag,
+            actuators.joint_torque,
+            actuators.leg_yaw,
         )
         when = stretch.Pieces(*pieces, *self._feet)
         stretch.carry(rows, when, robots, self._tolerance, states, step, status, record)

@@ -230,8 +230,8 @@ def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Co
     """Commands of a controller for the observations in the record of a course."""
     shown = {name: record[f"seen_{name}"].transpose("event", "robot", ...).values for name in _KEPT}
     until = float(record.event[-1]) + gait.period
-    asked = zip(event_times(controller, gait, until), range(record.sizes["event"]), strict=False)
+    events = zip(event_times(controller, gait, until), range(record.sizes["event"]), strict=False)
     return [
         controller.act(event, Observation(time, **{name: values[index].copy() for name, values in shown.items()}))
-        for (time, event), index in asked
+        for (time, event), index in events
     ]

@@ -107,20 +107,20 @@ class SpringLaw(ReadOnlyArrays):
 
     def remarks(self, law: RadiusLaw) -> list[str]:
         """Remarks on the radii that the robot's actuator cannot reach."""
-        said = []
+        found = []
         softest, stiffest, pitchfork = (
             units.format(each, law.unit, digits=4) for each in (self.softest, self.stiffest, law.pitchfork)
         )
         if self.softest >= law.pitchfork:
-            said.append(f"at {softest}, its softest, the first spring bends no straight walk ({pitchfork} does)")
+            found.append(f"at {softest}, its softest, the first spring bends no straight walk ({pitchfork} does)")
         elif self.softest > law.values[0]:
-            said.append(
+            found.append(
                 f"at {softest}, its softest, the first spring makes circles of {self.tightest:.3g} m; tighter ones, "
                 f"down to {law.tightest:.3g} m, are out of its reach"
             )
         if self.stiffest <= law.pitchfork:
-            said.append(f"at {stiffest}, its stiffest, the first spring holds no straight walk ({pitchfork} does)")
-        return said
+            found.append(f"at {stiffest}, its stiffest, the first spring holds no straight walk ({pitchfork} does)")
+        return found
 
     def events(self, gait: Gait) -> Sequence[Event]:
         """Events of the legs of module 1."""

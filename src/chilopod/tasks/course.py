@@ -63,8 +63,8 @@ class Driver(Short):
         """Trial of a course, with the disturbance of all studies; the robot's tightest circle replaces that of the
         course if it is known."""
         goals = course if self.law is None else replace(course, tightest=self.law.tightest)
-        told = self.robot, course.duration, seed, (), goals, self.controller
-        return Trial(*told, rate=_RATE, engine=self.engine, poses=poses, brief=brief)
+        conditions = self.robot, course.duration, seed, (), goals, self.controller
+        return Trial(*conditions, rate=_RATE, engine=self.engine, poses=poses, brief=brief)
 
 
 @dataclass(frozen=True)
@@ -138,12 +138,12 @@ def _of_targets(goals: list[dict[str, Any]]) -> list[Sequence[str]]:
         ("target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)")
     ]
     for number, goal in enumerate(goals, 1):
-        told = ["-"] * 5  # of a target that was never set
+        cells = ["-"] * 5  # of a target that was never set
         if goal["path_m"]:
-            told = [f"{goal['end_s'] - goal['begin_s']:.1f}", f"{goal['path_m']:.2f} / {goal['shortest_m']:.2f} m"]
-            told.append(f"{goal['leg_yaw_effort_rad2_s']:.4f}")
-            told += [f"{goal[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]
-        rows.append((str(number), goal["verdict"], *told))
+            cells = [f"{goal['end_s'] - goal['begin_s']:.1f}", f"{goal['path_m']:.2f} / {goal['shortest_m']:.2f} m"]
+            cells.append(f"{goal['leg_yaw_effort_rad2_s']:.4f}")
+            cells += [f"{goal[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]
+        rows.append((str(number), goal["verdict"], *cells))
     return rows
 
 
@@ -173,8 +173,8 @@ def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
     for goal in record.goal.values:
         found = record.isel(robot=0).sel(goal=goal)
         verdict, place = str(found.goal_verdict.item()), [finite(each) for each in found.goal_place.values]
-        told = {told: finite(found[f"goal_{name}"].item()) for name, told in _OF_GOALS.items()}
-        goals.append({"verdict": verdict, "sentence": sentences[verdict], "place_m": place, **told})
+        measures = {key: finite(found[f"goal_{name}"].item()) for name, key in _OF_GOALS.items()}
+        goals.append({"verdict": verdict, "sentence": sentences[verdict], "place_m": place, **measures})
     return {
         "status": str(record.status.values[0]),
         "arrived": _arrived(record),

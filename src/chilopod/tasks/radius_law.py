@@ -62,8 +62,8 @@ def radius_law(
     stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
     springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
     bent = Trial(robot, DURATION, 0, (_LAW_BEND / (robot.body.modules - 1),), None, None, NONE, 10.0, engine=engine)
-    asked = [replace(bent, robot=robot.with_value(K1, stiffness(spring))) for spring in springs]
-    ends = xr.concat([end_of_walk(each, robot) for each in run(asked, folder, progress)], "spring")
+    trials = [replace(bent, robot=robot.with_value(K1, stiffness(spring))) for spring in springs]
+    ends = xr.concat([end_of_walk(each, robot) for each in run(trials, folder, progress)], "spring")
     curved = is_curved(ends)
     if curved.sum() < 3:
         raise AnalysisError("must give at least three curved walks for a radius law", field="springs")

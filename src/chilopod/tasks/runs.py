@@ -102,8 +102,8 @@ class Runs(Summary):
         """Plain numbers; null for missing values."""
         steering = self.first.controller
         controller = None if steering is None else path_of(type(steering))
-        told = {"robot": self.robot.name, "engine": self.engine, "controller": controller, **self._found()}
-        return {**told, "foot_creep_N_s_m": self.foot_creep}
+        shared = {"robot": self.robot.name, "engine": self.engine, "controller": controller, **self._found()}
+        return {**shared, "foot_creep_N_s_m": self.foot_creep}
 
     def _found(self) -> dict[str, Any]:
         return {}

@@ -77,7 +77,7 @@ class Turn(Pathed):
             "spring_N_m_rad": finite(self.stiffness),
             "evaluation_time_s": found.time,
             "walks": [
-                {"outcome": outcome.label, **{told: finite(getattr(found, name)[i]) for name, told in _TOLD.items()}}
+                {"outcome": outcome.label, **{key: finite(getattr(found, name)[i]) for name, key in _TOLD.items()}}
                 for i, outcome in enumerate(found.outcome)
             ],
         }

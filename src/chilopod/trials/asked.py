@@ -80,8 +80,12 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     if found.shape != events.shape or not np.all(np.abs(found - events) <= _NEAR):
         return f"{found.size} commands instead of {events.size}, or at other times"
     sizes = {name: len(values) for name, values in coords.items()} | {"time": times.size, "event": events.size}
-    told = {"engine": engine_named(first.engine).traits.name, "robot": file_text(first.robot), "duration": walk.time}
-    for name, value in told.items():
+    attributes = {
+        "engine": engine_named(first.engine).traits.name,
+        "robot": file_text(first.robot),
+        "duration": walk.time,
+    }
+    for name, value in attributes.items():
         if data.attrs.get(name) != value:
             return f"its attribute {name} is {str(data.attrs.get(name))[:40]!r}, not {str(value)[:40]!r}"
     return _quantities(data, first, sizes)
@@ -108,8 +112,8 @@ def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str
         units = found.attrs.get("units", "")
         kind, unit = found.dtype if name == "status" else np.dtype(np.float64), units if name == "pose" else unit
         if (found.dims, found.shape, found.dtype, units) != (dims, shape, kind, unit):
-            told = f"{found.dtype} over {dict(found.sizes)} in {units!r}"
-            return f"{name} is {told}, not {kind} over {dict(zip(dims, shape, strict=True))} in {unit!r}"
+            actual = f"{found.dtype} over {dict(found.sizes)} in {units!r}"
+            return f"{name} is {actual}, not {kind} over {dict(zip(dims, shape, strict=True))} in {unit!r}"
     return ""
 
 
@@ -124,12 +128,12 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
     angle, heading, position, yaw = (data[name].values[0] for name in ("joint_angle", "heading", "position", "leg_yaw"))
     places = data["target"].transpose(..., "robot", "axis").values if isinstance(first.target, Target) else None
     springs = data["stiffness"].transpose(..., "robot", "joint").values.reshape(-1, *data["joint_angle"].shape[1:])[0]
-    for robot, (trial, told) in enumerate(zip(trials, drawn, strict=True)):
+    for robot, (trial, draw) in enumerate(zip(trials, drawn, strict=True)):
         off = {
             "position": position[robot],
             "leg_yaw": yaw[robot],
-            "joint_angle": angle[robot] - told.joint_angles,
-            "heading": np.sin(0.5 * (heading[robot] - told.heading)),
+            "joint_angle": angle[robot] - draw.joint_angles,
+            "heading": np.sin(0.5 * (heading[robot] - draw.heading)),
             "stiffness": springs[robot] / np.array(trial.robot.springs.stiffness) - 1.0,
         }
         if places is not None and isinstance(trial.target, Target):

@@ -127,10 +127,10 @@ def _locked(handle: int, kind: str, byte: int) -> bool:
     import fcntl
 
     # Type, from where, first byte, how many, and the number of a process, which has to be 0.
-    asked = struct.pack("hhqqi", getattr(fcntl, kind), os.SEEK_SET, byte, 1, 0)
+    request = struct.pack("hhqqi", getattr(fcntl, kind), os.SEEK_SET, byte, 1, 0)
     try:
         # Those of an open file: threads exclude each other too, and none is lost when another file is closed.
-        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, asked)
+        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, request)
     except (BlockingIOError, PermissionError):
         return False
     return True

@@ -56,18 +56,18 @@ def plain(value: object, field: str) -> Any:
 def code_of(value: object) -> tuple[str, str]:
     """Digest of everything that the code of a controller can reach now, and the source of chance in it, if any; empty
     for controllers of chilopod. Raises UnknownKindError for an object that cannot be described."""
-    told: list[str] = []
+    parts: list[str] = []
     chances: list[str] = []
     for each in _parts(value):
         kind, beside = type(each), Reach()
         found, chance = _once(kind, kind.__module__, kind.__qualname__)
-        told.append(found)
+        parts.append(found)
         chances.append(chance)
         for name in sorted(getattr(each, "__dict__", {}).keys() - _declared(each)):
             beside.see(vars(each)[name], f"{kind.__qualname__}.{name}")
-            told += [name, beside.digest]
+            parts += [name, beside.digest]
         chances.append(beside.chance)
-    digest = hashlib.sha256(repr(told).encode()).hexdigest()[:_DIGITS] if any(told) else ""
+    digest = hashlib.sha256(repr(parts).encode()).hexdigest()[:_DIGITS] if any(parts) else ""
     return digest, next(filter(None, chances), "")
 
 

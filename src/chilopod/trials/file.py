@@ -100,7 +100,7 @@ def read_header(path: Path, *, whole: bool = False) -> Header:
     with sealed_file(path) as file:
         try:
             with netcdf_file(file, mmap=True) as front:
-                told = {name: value for name, value in vars(front).items() if isinstance(value, bytes)}
-                return Header({name: value.decode() for name, value in told.items()}, file.seek(0, io.SEEK_END))
+                attributes = {name: value for name, value in vars(front).items() if isinstance(value, bytes)}
+                return Header({name: value.decode() for name, value in attributes.items()}, file.seek(0, io.SEEK_END))
         except _DAMAGES:
             raise UnsoundError("is damaged or was edited") from None

@@ -80,12 +80,12 @@ def run_each(
 def _each(
     trials: Sequence[Trial], folder: str | Path | None, progress: Progress, executor: Executor | None
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
-    asked = {trial.file_name: trial for trial in trials}
+    distinct = {trial.file_name: trial for trial in trials}
     store = None if folder is None else Store(folder)
-    kept = {name: trial for name, trial in asked.items() if store and store.has(trial)}
-    study = _Study(store, current() if executor is None else executor, progress, len(asked), len(kept))
+    kept = {name: trial for name, trial in distinct.items() if store and store.has(trial)}
+    study = _Study(store, current() if executor is None else executor, progress, len(distinct), len(kept))
     # Missing trials come first, so that a study that is killed repeatedly progresses however much there is to read.
-    yield from study.walk([trial for name, trial in asked.items() if name not in kept])
+    yield from study.walk([trial for name, trial in distinct.items() if name not in kept])
     damaged = []
     for trial in kept.values():
         found = store.read(trial) if store else None
@@ -96,7 +96,7 @@ def _each(
     if damaged:
         study.done -= len(damaged)
         yield from study.walk(damaged)
-    progress(1.0, f"{len(asked)} trials")
+    progress(1.0, f"{len(distinct)} trials")
 
 
 def as_now(trials: Sequence[Trial]) -> list[Trial]:

@@ -195,16 +195,16 @@ def search(
         bounds = np.tile([0.0, 1.0], (len(FREE), 1))
         strategy = CMA(mean=mean, sigma=0.15, bounds=bounds, population_size=_POPULATION, seed=seed + number)
         for generation in range(generations):
-            told = []
+            results = []
             for _ in range(_POPULATION):
                 parts = strategy.ask()
                 fit = evaluate(robot, values_at(parts), data, kept)
-                told.append((parts, fit.objective))
+                results.append((parts, fit.objective))
                 fits.append(fit)
                 best = min(fits, key=lambda each: each.objective)
                 done = len(fits) / (starts * generations * _POPULATION)
                 progress(done, f"start {number + 1}, generation {generation + 1}: best misfit {best.misfit:.2f}")
-            strategy.tell(told)
+            strategy.tell(results)
     return sorted(fits, key=lambda fit: fit.objective)
 
 
@@ -279,12 +279,12 @@ def confirmed(robot: Robot, data: BaseSeries) -> bool:
     """True if walks from a straight start agree with the data: at the stiffest curved spring most of them curve, to
     both sides, and at the softest straight spring most of them stay straight."""
     curves, stays = max(data.curved), min(data.straight)
-    asked = [
+    trials = [
         Trial(robot.with_value(K1, stiffness(spring)), LONG, seed, rate=10.0, engine="twin")
         for spring in (curves, stays)
         for seed in range(_TRIALS)
     ]
-    ends = xr.concat([end_of_walk(record, robot) for record in run(asked)], "trial")
+    ends = xr.concat([end_of_walk(record, robot) for record in run(trials)], "trial")
     sides = ends.direction.values.reshape(2, _TRIALS)
     bent = np.isin(sides, ("left", "right")).sum(axis=1)
     return bool(2 * bent[0] > _TRIALS > 2 * bent[1] and {"left", "right"} <= set(sides[0]))
