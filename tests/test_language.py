@@ -10,7 +10,8 @@ SOURCES = Path(chilopod.__file__).parent
 ROOT = Path(__file__).resolve().parent.parent
 HEAD = re.compile(r"(Of|That|Whose|What|Whether|Which)\b")
 FRAGMENT = re.compile(r"(Of|That|Whose|What|Whether|Which|Where|When|Why|Who|How)\b")
-ERRORS = re.compile(r"(Parameter|Analysis|Robot|RobotFile|Output|Engine|Thread|Unit|Cluster|Unsound)Error")
+ERRORS = re.compile(r"(Parameter|Analysis|RobotFile|Output|Thread|Unit|Cluster|Unsound|Extra)Error")
+WORDS = re.compile(r"\b(problem|allowed|reason)\b")
 RIDDLE = re.compile(
     r" (is|are) (no|none)\b| there (is|are) (no|none)\b| says otherwise| has none\b|^ (That|What|Who|Which)\b"
 )
@@ -52,10 +53,12 @@ def test_a_fragment_is_found():
 
 
 def riddles(source):
-    """Texts within the errors of a module that say what something is not, where an error says what it must be."""
-    for call in ast.walk(ast.parse(source)):
-        if isinstance(call, ast.Call) and ERRORS.fullmatch(ast.unparse(call.func).rpartition(".")[2]):
-            texts = (each.value for each in ast.walk(call) if isinstance(each, ast.Constant))
+    """Texts of errors that say what something is not, where an error says what it must be."""
+    for node in ast.walk(ast.parse(source)):
+        call = isinstance(node, ast.Call) and ERRORS.fullmatch(ast.unparse(node.func).rpartition(".")[2])
+        words = isinstance(node, ast.Assign) and WORDS.search(ast.unparse(node.targets[0]))
+        if call or words:
+            texts = (each.value for each in ast.walk(node) if isinstance(each, ast.Constant))
             yield from (text for text in texts if isinstance(text, str) and RIDDLE.search(f" {text.lstrip()}"))
 
 
@@ -67,6 +70,7 @@ def test_errors_say_what_must_be():
 
 def test_a_riddle_is_found():
     assert list(riddles('raise ParameterError("is no number", value=1)')) == ["is no number"]
+    assert list(riddles('problem, value = "is none", 1')) == ["is none"]
     assert list(riddles('errors.AnalysisError(f"{name}: there are none")')) == [": there are none"]
     assert list(riddles('ParameterError("must be a number", field="there is no"), ValueError("is none")')) == [
         "there is no"

@@ -54,5 +54,5 @@ def test_exponents_of_very_many_states_say_how_long_they_would_take():
 
 
 def test_equations_that_no_memory_holds_are_refused():
-    with pytest.raises(AnalysisError, match="a period has 800 intervals intervals"):
+    with pytest.raises(AnalysisError, match="a period has 800 intervals"):
         _ = PlanarModel(PRESET.set_from_text(["body.modules=200", "gait.module_phase=119.3 deg"])).contraction

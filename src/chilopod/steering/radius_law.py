@@ -62,7 +62,7 @@ class RadiusLaw(ReadOnlyArrays):
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
         count = 1 + (len(good) if good.all() else int(np.argmin(good)))
         if count < 3:
-            problem = "the curved walks beside the pitchfork are unstable or do not tighten: there is no radius law"
+            problem = "the curved walks beside the pitchfork must be stable and tighten for a radius law"
             raise AnalysisError(problem, field="branch")
         bent = np.concatenate([[np.inf], radii[1:count]])
         return cls(values[:count][::-1], bent[::-1], unit)

@@ -112,14 +112,14 @@ class SpringLaw(ReadOnlyArrays):
             units.format(each, law.unit, digits=4) for each in (self.softest, self.stiffest, law.pitchfork)
         )
         if self.softest >= law.pitchfork:
-            found.append(f"at {softest}, its softest, the first spring bends no straight walk ({pitchfork} does)")
+            found.append(f"the softest first spring, {softest}, does not bend the straight walk; {pitchfork} does")
         elif self.softest > law.values[0]:
             found.append(
-                f"at {softest}, its softest, the first spring makes circles of {self.tightest:.3g} m; tighter ones, "
-                f"down to {law.tightest:.3g} m, are out of its reach"
+                f"the softest first spring, {softest}, gives circles of {self.tightest:.3g} m; tighter ones, "
+                f"down to {law.tightest:.3g} m, are out of reach"
             )
         if self.stiffest <= law.pitchfork:
-            found.append(f"at {stiffest}, its stiffest, the first spring holds no straight walk ({pitchfork} does)")
+            found.append(f"the stiffest first spring, {stiffest}, does not keep the walk straight; {pitchfork} does")
         return found
 
     def events(self, gait: Gait) -> Sequence[Event]:
