@@ -118,7 +118,7 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
     named = ["springs.adjustable[0]=true", "springs.softest=9 N*mm/deg"]
     found = driver(ROBOT.set_from_text(named), VARIABLE)
     assert found.controller.softest == pytest.approx(0.5157, abs=1e-4)
-    assert ["out of its reach" in each for each in found.remarks] == [True]
+    assert ["are out of reach" in each for each in found.remarks] == [True]
     assert ["no actuator" in each for each in ready.remarks] == [True]
 
 

@@ -197,7 +197,7 @@ def test_what_this_process_cannot_read_for_a_moment_stays(store, record, monkeyp
 
 
 def test_a_record_of_another_trial_is_not_written(store, record):
-    with pytest.raises(OutputError, match="another trial"):
+    with pytest.raises(OutputError, match="must belong to this trial"):
         store.write(dataclasses.replace(BASE, seed=4), record)
     assert not store.folder.exists()
 

@@ -200,7 +200,7 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
             f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
             f"out {contraction:.3g} e-folds a period or more"
         )
-        allowed = f"a search of about {_duration(longest)}: fewer modules, or longer and heavier ones"
+        allowed = f"about {_duration(longest)}: fewer modules, or longer and heavier ones"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules, allowed=allowed)
     found = stability.exponents(model)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
