@@ -180,7 +180,7 @@ def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
         (["--target", "0 deg, 0 m"], ["distance"]),
         (["--target", "20 deg, 0.1 m"], ["distance", "0.15"]),
         (["--target", "20 deg, -1 m"], ["distance"]),
-        (["--target", "170 deg, 1 m"], ["behind"]),
+        (["--target", "170 deg, 1 m"], ["in front of the robot"]),
         (["--target", "45"], ["45 deg, 1.3 m"]),
         (["--target", "45 m, 1.3 m"], ["target"]),
         (["--target", "80 deg, 0.4 m"], ["must be at least the tightest radius"]),
