@@ -161,7 +161,7 @@ def test_a_damaged_or_edited_file_is_refused(tmp_path):
         with pytest.raises(ParameterError, match="is damaged or was edited"):
             read_walks(path)
     path.write_bytes(sealed(netcdf(data.assign_attrs(version=0))))
-    with pytest.raises(ParameterError, match="another version"):
+    with pytest.raises(ParameterError, match="of this version of chilopod"):
         read_walks(path)
     path.unlink()
     for make in (lambda path: None, os.mkfifo):
