@@ -88,9 +88,7 @@ class Recording:
             object.__setattr__(self, "rate", rate)
         for name in ("forces", "poses"):
             if not isinstance(getattr(self, name), bool | np.bool_):
-                raise ParameterError(
-                    "must be a truth value", field=name, value=getattr(self, name), allowed="True or False"
-                )
+                raise ParameterError("must be True or False", field=name, value=getattr(self, name))
             object.__setattr__(self, name, bool(getattr(self, name)))
 
     def samples(self, until: float) -> Array:

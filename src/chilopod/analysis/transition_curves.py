@@ -84,9 +84,7 @@ def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float
     for parameter in parameters:
         robot.unit_of(parameter)  # refuses an unknown parameter
         if parameter == "body.modules":
-            raise ParameterError(
-                "must be a continuous parameter, not a whole number", field="parameters", value=parameter
-            )
+            raise ParameterError("must be continuous, not a whole number", field="parameters", value=parameter)
     symmetric = "gait.side_phase" not in parameters
     first, second = parameters
     return lambda p, q: PlanarModel(robot.with_value(first, p).with_value(second, q), use_symmetry=symmetric)

@@ -72,9 +72,7 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     loss = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER)
     point = loss.point
     if point.criticality is not Criticality.SUPERCRITICAL:
-        raise AnalysisError(
-            "must be supercritical for a small undulation to grow from it", field="Neimark-Sacker point"
-        )
+        raise AnalysisError("must be supercritical for an undulation to grow from it", field="Neimark-Sacker point")
     ks = [point.value * (1.0 - distance) for distance in distances]
     models = [FollowedModel(robot.with_value(ALL, k), TOLERANCE) for k in ks]
     expected = [_expected(model, point) for model in models]
@@ -158,9 +156,7 @@ def _settled(models: list[FollowedModel], expected: list[_Expected], progress: P
     slowest = min(2.0 * np.log(abs(each.multiplier)) for each in expected)
     settling = int(np.ceil(_SETTLING / slowest))
     if settling > _LONGEST:
-        raise AnalysisError(
-            "must be larger: so close to the point the undulation settles too slowly", field="distances"
-        )
+        raise AnalysisError("must be larger: near the point the undulation settles too slowly", field="distances")
     recorded = np.empty((len(models), _MEASURED, models[0].dimension))
     for count in range(-settling, _MEASURED):
         if count >= 0:

@@ -51,9 +51,7 @@ def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
     except (TypeError, ValueError):
         marks = np.empty(0)
     if marks.dtype != np.bool_ or marks.shape != (count,):
-        raise ParameterError(
-            "must be truth values", field=name, value=value, allowed=f"{count} values, each True or False"
-        )
+        raise ParameterError("must be truth values", field=name, value=value, allowed=f"{count} of True or False")
     return marks
 
 
@@ -198,9 +196,7 @@ def rows_anew(
         )
     if abs(cycles - round(cycles)) > BEGINNING:
         allowed = f"a whole multiple of the period, {robots[0].gait.period:g} s"
-        raise ParameterError(
-            "must fall on the end of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed
-        )
+        raise ParameterError("must be the end of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
     count, own = int(marked.sum()), as_seeds(seeds)
     if own is not None and len(own) != count:
         raise ParameterError("has the wrong length", field="seeds", value=len(own), allowed=str(count))

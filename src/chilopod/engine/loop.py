@@ -146,9 +146,7 @@ def steer(
     gait, begun = walk.robots[0].gait, walk.time
     until = check_time(until, begun)
     if not callable(progress):
-        raise ParameterError(
-            "must be a function", field="progress", value=progress, allowed="a function of two arguments"
-        )
+        raise ParameterError("must be a function of two arguments", field="progress", value=progress)
     noise = None
     if controller is not None and bearing_noise is not None:
         walks, events = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))

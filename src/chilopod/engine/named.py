@@ -164,9 +164,7 @@ def path_of(kind: type) -> str:
 def _imported(field: str, path: str) -> Any:
     if not _PATH.fullmatch(path):
         kind = "Class" if field == "controller" else "object"
-        raise ParameterError(
-            "must name an object of a module", field=field, value=path, allowed=f"package.module:{kind}"
-        )
+        raise ParameterError("must name an object", field=field, value=path, allowed=f"package.module:{kind}")
     module_name, _, name = path.partition(":")
     try:
         found: Any = import_module(module_name)

@@ -37,9 +37,7 @@ def _alone(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
         # One step for the interpreter, so that of two threads one is first.
         if state.setdefault(_INSIDE, me) != me:
             allowed = "one thread at a time: give each thread its own walk, or use a lock"
-            raise ThreadError(
-                "must not run while another thread uses the same walk", field=f"walk.{name}", allowed=allowed
-            )
+            raise ThreadError("must not run while another thread uses the walk", field=f"walk.{name}", allowed=allowed)
         try:
             return verb(self, *arguments, **named)
         finally:

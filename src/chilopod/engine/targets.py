@@ -58,9 +58,7 @@ class Targets:
         none = np.isnan(given)
         if np.isinf(given).any() or (none.any(axis=-1) != none.all(axis=-1)).any():
             raise ParameterError(
-                "must be a finite position",
-                field="target",
-                allowed="x and y in m, or NaN for both without a target",
+                "must be a finite position", field="target", allowed="x and y in m, or NaN for both without a target"
             )
         places = np.array(np.broadcast_to(given, shape))
         if np.array_equal(places, self.present, equal_nan=True):

@@ -48,9 +48,7 @@ def pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array
     Start of each piece in its contact interval, s, its duration, s, and the number of the interval in the period.
     """
     if not (np.isfinite(t0) and np.isfinite(t1) and t0 <= t1):
-        raise ParameterError(
-            "must be finite and in ascending order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1"
-        )
+        raise ParameterError("must be finite and ascending", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
     period = gait.period
     times = gait.schedule(modules).times
     first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))

@@ -94,9 +94,7 @@ class Goal:
             return cls(value, other, relative=False)
         if not abs(value) <= math.pi or other < 0.0:
             allowed = "-180 to 180 deg, a positive distance"
-            raise ParameterError(
-                "must be a bearing and a distance", field="target", value=text.strip(), allowed=allowed
-            )
+            raise ParameterError("must be bearing and distance", field="target", value=text.strip(), allowed=allowed)
         return cls(other * math.cos(value), other * math.sin(value), relative=True)
 
     def __str__(self) -> str:

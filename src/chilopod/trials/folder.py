@@ -66,9 +66,7 @@ def contents(folder: Path) -> Contents:
                     paths = unfinished
                 paths.append(folder / entry.name)
     except OSError as error:
-        raise ParameterError(
-            f"must be a folder of trials ({error.strerror})", field="folder", value=str(folder)
-        ) from None
+        raise ParameterError(f"must be a trial folder ({error.strerror})", field="folder", value=str(folder)) from None
     return Contents(*(tuple(sorted(each)) for each in (trials, aside, unfinished, foreign)))
 
 

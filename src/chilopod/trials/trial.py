@@ -85,9 +85,7 @@ class Trial:
     def __post_init__(self) -> None:
         for name, (kind, allowed) in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise ParameterError(
-                    "must be of the right type", field=name, value=getattr(self, name), allowed=allowed
-                )
+                raise ParameterError("has the wrong type", field=name, value=getattr(self, name), allowed=allowed)
         seeds = as_seeds([self.seed], "seed")
         # Equal trials have one text, whatever kinds of numbers they were given.
         plain_values = {
@@ -110,14 +108,10 @@ class Trial:
             )
         if course is not None and self.duration != course.duration:
             allowed = f"{course.duration:g} s"
-            raise ParameterError(
-                "must be the duration of the course", field="duration", value=self.duration, allowed=allowed
-            )
+            raise ParameterError("must be that of the course", field="duration", value=self.duration, allowed=allowed)
         engine.common(self.robot)
         if self.recording.poses and not engine.traits.poses:
-            raise ParameterError(
-                "must be False: this engine has no poses in space", field="poses", value=True, allowed="False"
-            )
+            raise ParameterError("must be False: this engine has no poses in space", field="poses", value=True)
         if self.controller is not None:
             check_controller(self.controller)
             self.steering  # noqa: B018  (as it is now; the content of a frozen dataclass may still change)

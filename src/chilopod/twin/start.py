@@ -104,9 +104,7 @@ def start(
     """
     tolerance, expected = in_range("tolerance", tolerance, 1.0), check_wishes(record, expected)
     if as_number("threads", threads) not in range(1 << 16):
-        raise ParameterError(
-            "must be a number of threads", field="threads", value=threads, allowed="0 (all cores) or more"
-        )
+        raise ParameterError("must be a thread count", field="threads", value=threads, allowed="0 (all cores) or more")
     if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
         raise ParameterError(
             "must be a function and the traits of an engine",
