@@ -72,7 +72,7 @@ def test_nothing_is_overwritten_unless_forced(capsys, saved):
     [
         (("--set", "ground.friction=200 N*s/m"), "another robot"),
         (("--parameter", "springs.stiffness[1]"), "springs.stiffness[0]"),
-        (("--left",), "other side"),
+        (("--left",), "the side to which"),
         (("--between", "15 N*mm/deg", "20 N*mm/deg"), "last point"),
     ],
 )

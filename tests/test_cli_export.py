@@ -63,7 +63,7 @@ def test_a_file_is_only_replaced_when_told(folder):
         (["aoi2022", "--out", "no/such/folder/robot.xml"], "cannot be written"),
         (["aoi2022", "--out", "robot.xml", "--set", "twin.hip_height=13 cm"], "cannot reach"),
         (["aoi2022", "--out", "robot.xml", "--set", "twin.hip_hight=9 cm"], "did you mean 'twin.hip_height'?"),
-        (["aoi2022", "--out", "robot.xml", "--set", "twin.link_mass=1 kg"], "no mass for the bodies"),
+        (["aoi2022", "--out", "robot.xml", "--set", "twin.link_mass=1 kg"], "must leave mass for the body"),
         (["aoi2022", "--out", "robot.urdf", "--set", "twin.foot_radius=1e-8 m"], "larger than mjMINVAL"),
     ],
 )

@@ -90,5 +90,5 @@ def test_what_cannot_be_written_is_printed_all_the_same(capsys, tmp_path, monkey
     assert json.loads(out)["robot"] == ROBOT
     last = err.splitlines()[-1]
     assert last.startswith("error: there/")
-    assert last.endswith("cannot be written (No space left on device); and no other place could be written")
+    assert last.endswith("cannot be written (No space left on device); no other place could be written")
     assert os.listdir(tmp_path) == []

@@ -57,12 +57,15 @@ def test_a_turn_in_three_dimensions_comes_with_a_replay(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["walk", "aoi2022-planar", "--engine", "twin"], "this robot has none, so the three-dimensional model cannot"),
+        (
+            ["walk", "aoi2022-planar", "--engine", "twin"],
+            "must be given in the robot file for the three-dimensional model",
+        ),
         (["walk", ROBOT, "--engine", "twn"], "did you mean 'twin'?"),
         (["walk", ROBOT, "--engine", "twin", "--set", "twin.hip_height=130 mm"], "cannot reach its path"),
-        (["walk", ROBOT, "--engine", "twin", "--set", "twin.link_mass=1 kg"], "leaves no mass for the bodies"),
+        (["walk", ROBOT, "--engine", "twin", "--set", "twin.link_mass=1 kg"], "must leave mass for the body"),
         (["walk", ROBOT, "--engine", "twin", "--set", "twin.servo_stiffness=0 N*m/rad"], "must be positive"),
-        (["walk", ROBOT, "--engine", "twin", "--set", "twin.timestep=0.003 s"], "whole number of times"),
+        (["walk", ROBOT, "--engine", "twin", "--set", "twin.timestep=0.003 s"], "must divide twin.control_interval"),
         (["identify", "twin", "aoi2022-planar"], "[twin]"),
     ],
 )

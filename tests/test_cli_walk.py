@@ -92,8 +92,8 @@ def test_a_walk_that_leaves_the_range_says_so(capsys):
         (["--repeats", "0"], ["--repeats"]),
         (["--repeats", "3"], ["repeats", "seed"]),
         (["--trials", "/dev/null/trials"], ["/dev/null/trials", "cannot be written"]),
-        (["--initial-joints", "1,2 deg"], ["2 angles", "5"]),
-        (["--initial-joints", "120 deg"], ["bent too far"]),
+        (["--initial-joints", "1,2 deg"], ["not 2", "5"]),
+        (["--initial-joints", "120 deg"], ["must be smaller"]),
         (["--initial-joints", "1,x,0,0,0 deg"], ["x"]),
         (["--set", "springs.stiffness=0 N*mm/deg"], ["springs.stiffness", "positive"]),
     ],
@@ -112,20 +112,20 @@ def test_walk_refuses(capsys, arguments, words):
             "--duration = '1e6 s': is out of range; allowed: more than 0, at most",
         ),
         (["walk", ROBOT, "--initial-joints", "2 kg"], "--initial-joints = '2 kg': "),
-        (["walk", ROBOT, "--initial-joints", "120 deg"], "--initial-joints = '120 deg': are bent too far"),
-        (["walk", ROBOT, "--set", "1"], "--set = '1': is not an override"),
+        (["walk", ROBOT, "--initial-joints", "120 deg"], "--initial-joints = '120 deg': must be smaller"),
+        (["walk", ROBOT, "--set", "1"], "--set = '1': must be an override"),
         (
             ["walk", ROBOT, "--set", "springs.stiffness[ 0]=1"],
-            "springs.stiffness[ 0]: names no parameter; did you mean ",
+            "springs.stiffness[ 0]: must be the path of a parameter; did you mean ",
         ),
         (["turn", ROBOT, "--target", "170 deg, 1 m"], "--target bearing = '170 deg': "),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--k1", "-3"], "--k1 = '-3': must be positive"),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--duration", "1e6 s"], "--duration = '1e6 s': is out of range"),
         (["branch", ROBOT, "--between", "1 kg", "2 kg"], "--between springs.stiffness[0] = '1 kg': is a mass"),
-        (["branch", ROBOT, "--parameter", "k1"], "--parameter = 'k1': names no parameter"),
+        (["branch", ROBOT, "--parameter", "k1"], "--parameter = 'k1': must be the path of a parameter"),
         (["robot", "new", "x.toml", "--modules", "1"], "--modules = '1': "),
         (["robot", "export", "aoi2022", "--out", "x.pdf"], "--out = 'x.pdf': "),
-        (["identify", "twin", ROBOT], "twin: this robot has none"),
+        (["identify", "twin", ROBOT], "twin: must be given in the robot file"),
     ],
 )
 def test_options_are_named_as_they_are_typed(capsys, monkeypatch, tmp_path, arguments, start):
@@ -180,10 +180,10 @@ def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
         (["--target", "0 deg, 0 m"], ["distance"]),
         (["--target", "20 deg, 0.1 m"], ["distance", "0.15"]),
         (["--target", "20 deg, -1 m"], ["distance"]),
-        (["--target", "170 deg, 1 m"], ["behind"]),
+        (["--target", "170 deg, 1 m"], ["in front of the robot"]),
         (["--target", "45"], ["45 deg, 1.3 m"]),
         (["--target", "45 m, 1.3 m"], ["target"]),
-        (["--target", "80 deg, 0.4 m"], ["no spring turns so tightly"]),
+        (["--target", "80 deg, 0.4 m"], ["must be at least the tightest radius"]),
         (["--target", "45 deg, 1 m", "--strategy", "pitchfrok"], ["did you mean 'pitchfork'"]),
         (["--target", "45 deg, 1 m", "--k1", "0 N*mm/deg"], ["must be positive"]),
         (["--target", "45 deg, 1 m", "--k1", "atuo"], ["atuo"]),
@@ -301,11 +301,11 @@ def test_a_controller_of_ones_own_turns_in_place_of_the_strategys(capsys, own, t
     ("name", "words"),
     [
         ("Raises", ["Raises.act", "RuntimeError", "nobody at home"]),
-        ("Nonsense", ["Nonsense", "is no chilopod.engine.Command"]),
-        ("Endless", ["Endless.events", "is no phase"]),
+        ("Nonsense", ["Nonsense", "must be a chilopod.engine.Command"]),
+        ("Endless", ["Endless.events", "must be a phase"]),
         ("Loose", ["frozen dataclass"]),
         ("Lefft", ["has no Lefft", "did you mean 'Left'"]),
-        ("toy", ["is no class"]),
+        ("toy", ["must name a class"]),
     ],
 )
 @pytest.mark.parametrize("command", [["walk"], [*TURN, "--k1", "10 N*mm/deg"], ["course", "--targets", "0 deg, 1 m"]])
@@ -318,9 +318,9 @@ def test_controllers_that_are_none_are_refused_in_one_line(capsys, own, command,
     ("path", "words"),
     [
         ("nosuch.module:Class", ["cannot be imported", "nosuch"]),
-        ("Class", ["names nothing", "package.module:Class"]),
-        ("", ["names nothing"]),
-        ("os; rm:Class", ["names nothing"]),
+        ("Class", ["must name an object", "package.module:Class"]),
+        ("", ["must name an object"]),
+        ("os; rm:Class", ["must name an object"]),
     ],
 )
 def test_paths_that_do_not_import_are_refused_in_one_line(capsys, path, words):
@@ -342,7 +342,9 @@ def test_an_engine_of_ones_own_walks(capsys, own):
     found, planar = printed(capsys, *arguments, "--engine", f"{own}:toy"), printed(capsys, *arguments)
     assert found["engine"] == f"{own}:toy"
     assert found["walks"] == planar["walks"]
-    assert "is a class; allowed: an object" in refused(capsys, "walk", ROBOT, "--engine", f"{own}:Left")
+    assert "must be an object, not a class; allowed: an instance" in refused(
+        capsys, "walk", ROBOT, "--engine", f"{own}:Left"
+    )
 
 
 def test_walks_are_kept_and_not_walked_again(capsys, tmp_path):

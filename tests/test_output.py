@@ -63,7 +63,7 @@ def test_only_regular_files_are_replaced(tmp_path):
     for path in [*others, "/dev/null", "/dev/stdout"]:
         before = os.lstat(path)
         for write in (lambda path: write_atomic(path, "new"), lambda path: check_files([path], replace=True)):
-            with pytest.raises(OutputError, match=r"is no regular file|is a link|is a folder"):
+            with pytest.raises(OutputError, match=r"is not a regular file|is a link|is a folder"):
                 write(path)
         assert os.lstat(path).st_ino == before.st_ino
     listening.close()

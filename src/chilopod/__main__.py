@@ -19,7 +19,7 @@ def _run() -> int:
 
     process.answer_interrupts()
     stdout = process.hold_streams()
-    # Figures go into files: which windows somebody prefers does not matter, nor whether there are such.
+    # Figures go into files, so a window backend is neither needed nor used.
     os.environ["MPLBACKEND"] = "agg"
     # Numba would go on without a variable that it cannot read, after many lines about it.
     warnings.filterwarnings("error", "Environment variable 'NUMBA_", RuntimeWarning)

@@ -9,7 +9,7 @@ from typing import Any
 
 from chilopod.errors import ParameterError
 
-# Read once, when the first loop goes parallel: threads that wait for others sleep. By default GNU's spin, and where
+# Read once, when the first loop goes parallel: waiting threads sleep. By default GNU's threads spin, and where
 # another process has the cores, each of thousands of short loops waits for a spinning thread to be taken off.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
@@ -18,9 +18,9 @@ import numba
 from chilopod.numba_internals import keep
 
 if numba.config.DISABLE_JIT:
-    # As plain Python, what is compiled here would take hours, and its overloads do not run.
+    # As plain Python the compiled functions would take hours, and their overloads do not run.
     raise ParameterError(
-        "chilopod does not run without compiling", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
+        "must be 0: chilopod needs the compiler of Numba", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
     )
 
 _LAYERS = {
@@ -29,7 +29,7 @@ _LAYERS = {
 }
 if _LAYERS.keys() & os.environ.keys():
     try:
-        numba.get_num_threads()  # otherwise it is found in the midst of a walk
+        numba.get_num_threads()  # otherwise the error appears in the middle of a walk
     except ValueError as error:
         _name = "NUMBA_THREADING_LAYER" + "_PRIORITY" * ("PRIORITY" in str(error))
         _value = os.environ.get(_name)
@@ -49,22 +49,21 @@ def _compiled(function: Any = None, **options: Any) -> Any:
 @functools.cache
 def _warn() -> None:
     warnings.warn(
-        "compiled code cannot be kept, every start compiles anew: set NUMBA_CACHE_DIR to a folder that can be written",
+        "compiled code cannot be kept, so every start compiles again: set NUMBA_CACHE_DIR to a writable folder",
         RuntimeWarning,
         stacklevel=4,
     )
 
 
-# With debug information numba keeps every value in memory, where no product is seen beside its sum: other bits.
+# With debug information numba keeps every value in memory, which prevents fused operations and changes bits.
 njit = functools.partial(_compiled, nogil=True, debug=False)
-"""``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
-answer Ctrl-C."""
+"""``numba.njit`` with the compiled code kept on disk; other threads run meanwhile, for progress and for Ctrl-C."""
 
 fused_njit = functools.partial(njit, fastmath={"contract"})
-"""The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
+""":data:`njit` with fused products and sums of one rounding allowed: not for exact error terms."""
 
 parallel_njit = functools.partial(njit, parallel=True)
-"""The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
+""":data:`njit` for loops over ``prange``, one robot in an iteration, so that results do not depend on the number of
 threads."""
 
 
@@ -72,7 +71,7 @@ threads."""
 def copy_into(target: Any, source: Any) -> None:
     """Copy an array of one dimension, or the start of it, over another.
 
-    With ``target[:] = source`` numba compiles what would say that the sizes differ, formatted: seconds of it.
+    For ``target[:] = source`` numba also compiles a formatted error message about unequal sizes, which takes seconds.
     """
     for i in range(target.size):
         target[i] = source[i]

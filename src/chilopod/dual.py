@@ -48,13 +48,14 @@ _real_series, _lanes_series = (each(forceinline=True)(_series) for each in (fuse
 
 @fused_njit
 def _real_cos_sin(a: float) -> Any:
-    """By the series for angles that joints seldom leave, in half the time."""
+    """Cosine and sine by the series for common joint angles, in half the time."""
     return (np.cos(a), np.sin(a)) if abs(a) > _SMALL else _real_series(a)
 
 
 @njit
 def _lanes_turned(a: Any) -> Any:
-    """To the last bits for angles of up to a million; what is small has the bits that the series alone gives it."""
+    """Cosine and sine in lanes, accurate to the last bits for angles of up to a million; small angles have the bits of
+    the series."""
     turns = nearest_integer(a * (2.0 / math.pi))
     one, two, three = _RIGHT_ANGLES
     c, s = _lanes_series(((a - turns * one) - turns * two) - turns * three)

@@ -1,7 +1,7 @@
-"""The exceptions a user of chilopod can meet.
+"""Exceptions that users of chilopod can meet.
 
-Each one says in a single line which field is wrong, what was given, what is allowed and, for a misspelt name, which
-valid name is nearest. The command line prints that line and exits with code 2.
+Each message is one line: the field that is wrong, the value given, the values allowed and, for a misspelt name, the
+nearest valid name. The command line prints that line and exits with code 2.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ _LONGEST_NAME = 200
 class ChilopodError(Exception):
     """Base of all errors chilopod raises on purpose.
 
-    Each has the problem in a few words; and as far as they are known the dotted name of what is wrong, such as
-    ``body.mass``, the value that was given, the values that are allowed in words, the valid name nearest to the one
-    given, and the source, the file it stands in.
+    Each error has the problem in a few words and, as far as they are known, the dotted name of the wrong field, such as
+    ``body.mass``, the value given, the values allowed in words, the valid name nearest to the given one, and the
+    source, the file that has the field.
     """
 
     def __init__(
@@ -69,19 +69,19 @@ class OutputError(ChilopodError, OSError):
 
 
 class AnalysisError(ChilopodError, RuntimeError):
-    """A computation cannot deliver what was asked of it."""
+    """A computation cannot deliver its result."""
 
 
 class ExtraError(ChilopodError, ImportError):
-    """Something takes a package that an extra brings, and the extra is not installed."""
+    """A feature needs a package of an extra that is not installed."""
 
 
 class ThreadError(ChilopodError, RuntimeError):
-    """Two threads are within a thing at the same time that belongs to one."""
+    """Two threads use an object at the same time that only one thread may use."""
 
 
 class ClusterError(ChilopodError, RuntimeError):
-    """A cluster is not there, is not what this machine is, or went away."""
+    """A cluster does not answer, differs from this machine in its software, or was lost."""
 
 
 def nearest_name(name: str, valid: Iterable[str]) -> str | None:
@@ -89,7 +89,7 @@ def nearest_name(name: str, valid: Iterable[str]) -> str | None:
 
     Letter case does not count, and of two names equally alike the first one wins.
     """
-    # difflib is quadratic in the length of its input, and nobody mistypes a name this long.
+    # difflib is quadratic in the length of its input, and misspelt names are never this long.
     if len(name) > _LONGEST_VALUE:
         return None
     folded: dict[str, str] = {}
@@ -105,16 +105,16 @@ def one_line(text: str) -> str:
 
 
 def in_words(error: BaseException) -> str:
-    """Return the kind of an exception of somebody else's and what it says, as one line."""
+    """Return type and message of an exception from foreign code, as one line."""
     try:
-        said = str(error)
+        message = str(error)
     except Exception:  # one that cannot even be printed
-        said = ""
-    return one_line(f"{type(error).__name__}: {said}" if said else type(error).__name__)
+        message = ""
+    return one_line(f"{type(error).__name__}: {message}" if message else type(error).__name__)
 
 
 def briefly(error: BaseException) -> str:
-    """As :func:`in_words`, but of what it says the first line only: others explain at length."""
+    """Return type and first line of the message of an exception; some messages are long."""
     words = str(error).strip().partition("\n")[0]
     return one_line(f"{type(error).__name__}: {words}" if words else type(error).__name__)
 

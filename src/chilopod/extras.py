@@ -1,4 +1,4 @@
-"""Packages that only an extra of the installation brings (``pip install "chilopod[live]"``)."""
+"""Optional packages, which are installed as extras (``pip install "chilopod[live]"``)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from chilopod.errors import ExtraError, briefly
 
 
 def needs(package: str, *, extra: str) -> None:
-    """Say in one line what to install, unless a package is there; to be called before it is imported.
+    """Check that an optional package is installed, before it is imported.
 
     Raises ExtraError if the package, named as it is imported, is not installed or cannot be imported; the error names
     the chilopod extra that installs it.

@@ -1,4 +1,4 @@
-"""Arrays that nobody can write into: what keeps models and results as they are once they are made."""
+"""Read-only arrays, which keep models and results unchanged after their construction."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 
 
 def read_only(array: AnyArray) -> AnyArray:
-    """An array of the same numbers, in the same order in memory, that cannot be written into.
+    """Read-only array of the same numbers in the same order in memory.
 
-    It is a copy: behind a view, whoever holds the original could still change the numbers, and the original is left as
-    writable as it was. Only an array that is read-only down to its memory is given back itself.
+    The result is a copy, because the numbers behind a view could still be changed through the original. Only an array
+    that is read-only down to its memory is returned itself.
 
     Compiled kernels take copies of these (numba compiles a function once more for read-only arguments).
     """
@@ -36,7 +36,7 @@ _MOST_SHOWN, _WIDEST, _FEW = 12, 88, 6  # fields; characters of one; numbers of 
 
 
 class Short:
-    """Base of dataclasses that print as a few lines: large parts are named with their size."""
+    """Base of dataclasses that print as a few lines; large parts are shown by type and size."""
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
@@ -53,7 +53,7 @@ def _short(result: Any) -> str:
 
 
 def in_one_line(value: Any) -> str:
-    """A field in one line: large parts are named with their size."""
+    """Text of a field in one line; large parts are shown by type and size."""
     kind = type(value).__name__
     if isinstance(value, enum.Enum):
         return str(getattr(value, "label", value.name))
@@ -72,7 +72,7 @@ def in_one_line(value: Any) -> str:
 
 
 class ReadOnlyArrays(Short):
-    """Base of frozen dataclasses whose arrays are as frozen as their fields, also after a copy or a pickle.
+    """Base of frozen dataclasses whose arrays are read-only, also after a copy or a pickle.
 
     A subclass with a ``__post_init__`` of its own calls this one last.
     """

@@ -1,4 +1,4 @@
-"""The gait: when each foot stands, and where it is along the body while it does.
+"""Gait: times at which each foot stands, and its position along the body.
 
 Phases are counted in cycles here: 0 is touch-down at the anterior extreme position (AEP), stance lasts while the phase
 is below the duty factor, 1 is the next touch-down. Module i (0 = front) and side s (0 = left, 1 = right) have phase
@@ -75,7 +75,7 @@ class Gait(Description):
 
     @property
     def duty(self) -> float:
-        """Part of the cycle a foot stands, between 0 and 1."""
+        """Fraction of the cycle in which a foot stands, between 0 and 1."""
         return self.stance / self.period
 
     @property

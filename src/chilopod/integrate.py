@@ -37,7 +37,7 @@ _E5 = np.ascontiguousarray(DOP853.E5)
 STAGES = 12
 """Slopes that a step needs."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
-"""The next step aims at this part of the tolerated one, and is that many times as long at least and at most."""
+"""Safety factor of the next step, and the least and largest ratio of two steps."""
 
 
 # What is summed of the slopes, row by row without the zeros, in fours: for every stage, the new state and both errors.
@@ -60,7 +60,7 @@ def _size(value: Any) -> float:
 
 @njit(inline="always")
 def first_step(size: float, slope: float, left: float) -> float:
-    """Guess of the first step from the sizes of state and slope: the control corrects it within two steps."""
+    """First guess of the step from the sizes of state and slope; the step control corrects it within two steps."""
     return 0.01 * max(size, 1e-3) / slope if slope > 0.0 else left
 
 
@@ -73,10 +73,10 @@ def step_factor(error: float, rejected: bool) -> float:
 
 @functools.cache
 def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., tuple[float, bool]]:
-    """The compiled integrator of one right-hand side (numba keeps it on disk, which it cannot for a function argument).
+    """Return the compiled integrator of one right-hand side; numba can cache it on disk.
 
-    ``rhs(t, x, args, out)`` writes ``dx/dt`` into ``out`` and is smooth between ``t0`` and ``t1``. Of one that is made
-    at run time nothing is kept on disk: its code would never be found again.
+    ``rhs(t, x, args, out)`` writes ``dx/dt`` into ``out`` and is smooth between ``t0`` and ``t1``. A function made at
+    run time is not cached, because its code would never be found again.
 
     Returns ``integrate(args, x, t0, t1, h, tolerance, work) -> (h, reached)``, which advances the state ``x``, shape
     (n,), float64 or complex128, in place. ``h`` is the first step to try, 0 for a guess, and the one to start the next
@@ -131,7 +131,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
             e5, e3 = _E5[STAGES], _E3[STAGES]
             err5 = 0.0
             err3 = 0.0
-            check = 0.0  # a comparison forgets what is not a number, a sum does not
+            check = 0.0  # NaN survives a sum and gets lost in a comparison
             for i in range(n):
                 scale = tolerance * max(1.0, _size(x[i]), _size(y[i]))
                 err5 = max(err5, _size(fifth[i] + e5 * k[12, i]) / scale)
@@ -176,12 +176,12 @@ def _sum_slopes(k: Any, which: int, i: int, zero: Any) -> Any:
 
 @functools.cache
 def lanes_step(rhs: Callable[..., None]) -> Callable[..., Any]:
-    """A compiled step of states side by side in lanes, each at its own time and of its own length.
+    """Return a compiled step of states in lanes, each with its own time and step length.
 
     Returns ``attempt(args, x, t, step, tolerance, work, wide) -> error``, all in lanes but the tolerance, as for
     :func:`integrator`. ``work`` is scratch, shape (LANES_WORK, n or more): row 0 holds the slope at the beginning, and
     row STAGES is left with the new state. ``wide`` is the same memory in ``LANES`` lanes, through which sums of slopes
-    go, whatever the number of lanes elsewhere. The error is a part of what is tolerated, 1e300 where the new state is
+    go, whatever the number of lanes elsewhere. The error is relative to the tolerance, and 1e300 where the new state is
     not finite.
     """
 
@@ -200,7 +200,7 @@ def lanes_step(rhs: Callable[..., None]) -> Callable[..., Any]:
                 wide[which, i] = _sum_slopes(wide, which, i, zero)
         err5 = step * 0.0
         err3 = err5
-        check = err5  # a comparison forgets what is not a number, a sum does not
+        check = err5  # NaN survives a sum and gets lost in a comparison
         for i in range(x.size):
             new[i] = x[i] + step * new[i]
             share = 1.0 / (tolerance * larger(1.0, larger(absolute(x[i]), absolute(new[i]))))

@@ -1,9 +1,8 @@
-"""The chain seen from above: headings, places and velocities of its modules and feet.
+"""Kinematics of the chain in the plane: headings, positions and velocities of its modules and feet.
 
-Everything follows from module 1 and the joints; nothing here knows of forces. Arrays hold modules along their last axis
-but for components, front to rear, feet by side (left, right) behind that; whatever else is in front is a batch.
-Directions are those of the axes that headings are measured from: the floor's, or those of module 1 where its heading
-is given as 0.
+Everything follows from module 1 and the joints, without forces. Arrays hold modules along their last axis but for
+components, front to rear, feet by side (left, right) behind that; whatever else is in front is a batch. Directions are
+those of the axes that headings are measured from: the floor's, or those of module 1 where its heading is given as 0.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ def module_velocities(velocity: ArrayLike, headings: Array, rates: Array, length
 
 
 def foot_places(forward_offset: ArrayLike, half_width: ArrayLike, stroke: ArrayLike, yaw: ArrayLike = 0.0) -> Array:
-    """Places of all feet in the frames of their modules: ahead of the centre and left of the axis, m, shape (..., N, 2,
-    2).
+    """Positions of all feet in the frames of their modules: ahead of the centre and left of the axis, m, shape (..., N,
+    2, 2).
 
     Offset and half-width are those of a foot at mid-stroke, m, for all or of shape (..., 1, 1); ``stroke`` is how far
     it is ahead of that, m, and ``yaw`` (rad, left positive) turns its stroke about it, both of shape (..., N, 2).
@@ -50,7 +49,7 @@ def foot_velocities(places: Array, rates: Array, speed: float, yaw: ArrayLike = 
     """Velocities of standing feet relative to the centres of their modules, in the frames of these, m/s, shape (..., N,
     2, 2).
 
-    Places and yaw are those of :func:`foot_places`, rates those of the modules, rad/s, shape (..., N); standing feet
+    Positions and yaw are those of :func:`foot_places`, rates those of the modules, rad/s, shape (..., N); standing feet
     move back along their strokes at ``speed``, m/s.
     """
     turn = rates[..., None]
@@ -59,10 +58,10 @@ def foot_velocities(places: Array, rates: Array, speed: float, yaw: ArrayLike = 
 
 
 def from_modules(centres: Array, headings: Array, inside: Array) -> Array:
-    """Places or velocities of feet, shape (..., N, 2, 2), on the axes that headings are measured from.
+    """Positions or velocities of feet, shape (..., N, 2, 2), on the axes that headings are measured from.
 
     ``inside`` has them relative to the centres of their modules, in the frames of these, same shape; ``centres`` has
-    the places or velocities of the centres, shape (..., N, 2); headings are in rad, shape (..., N).
+    the positions or velocities of the centres, shape (..., N, 2); headings are in rad, shape (..., N).
     """
     ahead, left = (direction[..., None, :] for direction in directions(headings))
     out: Array = centres[..., None, :] + inside[..., :1] * ahead + inside[..., 1:] * left

@@ -1,4 +1,4 @@
-"""Enumerations that are shown: every member has a word for tables and a sentence for readers."""
+"""Enumerations whose members have a label for tables and a sentence for readers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers in lanes, for numba: several side by side that one instruction of the processor works on.
+"""Numbers in lanes for numba: several numbers that one vector instruction of the processor works on.
 
 In compiled code :func:`as_lanes` makes an array of them of an array of plain numbers. It is indexed as any array, and
 its numbers are added, multiplied and so on as any number; a plain number beside them is the same in every lane. No lane
@@ -24,7 +24,7 @@ from chilopod.compiled import njit
 from chilopod.numba_internals import Conversion, cgutils, ir, signature
 
 LANES = 8
-"""Lanes of double precision that fill the widest registers there are; narrower ones are used two or four at a time."""
+"""Number of lanes of double precision in the widest registers; narrower ones are used two or four at a time."""
 
 HALF = LANES // 2
 """Lanes for what has few numbers side by side."""
@@ -34,7 +34,7 @@ _INDEX = ir.IntType(32)
 
 
 class LanesType(types.Type):  # type: ignore[misc]
-    """The type of a number in lanes: 1 of them, ``HALF`` or ``LANES``."""
+    """Numba type of a number in 1, ``HALF`` or ``LANES`` lanes."""
 
     def __init__(self, width: int) -> None:
         self.width = width
@@ -66,14 +66,14 @@ def _everywhere(context: Any, builder: Any, given: Any, kind: Any, value: Any) -
 
 
 def _call(builder: Any, name: str, kind: Any, values: Sequence[Any]) -> Any:
-    """One of LLVM's own functions, of numbers of one type."""
+    """Call of an intrinsic function of LLVM for numbers of one type."""
     full = f"llvm.{name}." + (f"v{kind.width}f64" if kind.width > 1 else "f64")
     signature = ir.FunctionType(kind.vector, [kind.vector] * len(values))
     return builder.call(cgutils.get_or_insert_function(builder.module, signature, full), values)
 
 
 def _factors(value: Any) -> Any:
-    """Those of a product, or None."""
+    """Factors of a product, or None for another operation."""
     return value.operands if getattr(value, "opname", "") == "fmul" else None
 
 
@@ -94,7 +94,7 @@ def _subtract(builder: Any, kind: Any, a: Any, b: Any) -> Any:
 
 
 def _same(*given: Any) -> Any:
-    """The signature of a function whose arguments, plain ones too, and result are all in lanes; None if none is."""
+    """Signature of a function whose arguments and result are all in lanes; None if no argument is in lanes."""
     kinds = [kind for kind in given if isinstance(kind, LanesType)]
     return signature(*kinds[:1] * (len(given) + 1)) if kinds else None
 
@@ -122,7 +122,7 @@ for _make, *_functions in (
 
 
 def _kind(*given: Any) -> Any:
-    """The type in lanes among the types of some arguments."""
+    """Lane type among the types of some arguments."""
     return next(each for each in given if isinstance(each, LanesType))
 
 
@@ -132,7 +132,7 @@ def _operands(context: Any, builder: Any, sig: Any, values: Any) -> list[Any]:
 
 
 def _instruction_of(name: str) -> Any:
-    """A function of one number that LLVM has an instruction for."""
+    """Function of one number for which LLVM has an instruction."""
 
     @intrinsic
     def function(typing: Any, a: Any) -> Any:
@@ -200,7 +200,7 @@ def exponential(typing: Any, a: Any) -> Any:
 
 @intrinsic(prefer_literal=True)
 def as_lanes(typing: Any, array: Any, width: Any) -> Any:
-    """The same memory as an array of numbers in lanes, without the last dimension, which is ``width``, a constant."""
+    """View of an array as numbers in lanes, without the last dimension, whose length is the constant ``width``."""
     kind = types.Array(_TYPES[width.literal_value], array.ndim - 1, "C", aligned=False)
 
     def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
@@ -223,7 +223,7 @@ def as_lanes(typing: Any, array: Any, width: Any) -> Any:
 
 @njit
 def room(numbers: int) -> Any:
-    """So many zeros, from where a line of the processor's cache begins, as registers like it."""
+    """Array of zeros that begins at a cache line of the processor, as vector registers need it."""
     more = np.zeros(numbers + _CACHE_LINE)
     skip = -(more.ctypes.data // 8) % _CACHE_LINE
     return more[skip : skip + numbers]

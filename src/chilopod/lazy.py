@@ -1,6 +1,6 @@
 """Packages that load what they export on first use (PEP 562).
 
-A verb then costs what it needs itself, not what its neighbours need.
+A function then loads only the modules that it needs itself.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class _Package(ModuleType):
-    """A package in which an export stays what it is when a submodule of the same name is loaded."""
+    """Package in which an export keeps its value when a submodule of the same name is loaded."""
 
     _homes: Mapping[str, str]
 

@@ -1,4 +1,4 @@
-"""How much memory there is for us."""
+"""Memory that this process may still take."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _CONTAINER = (
 
 
 def available() -> float:
-    """Bytes that this process may still take: of the machine, of its container, and of its own limit; infinite where
-    the system does not say."""
+    """Free bytes, the least of the machine's, the container's and the process's own limit; infinite if the system does
+    not tell."""
     return min([float("inf"), *_limits()])
 
 
@@ -36,7 +36,7 @@ def _limits() -> Iterator[float]:
         yield 1024.0 * int(found[1])  # type: ignore[index]
     for most, used, details in _CONTAINER:
         with suppress(OSError, ValueError):  # there is none, or it is "max"
-            # What is cached of files is given up for us.
+            # The system gives up its file cache on demand.
             cached = re.search(r"^(?:total_)?inactive_file ([0-9]+)$", (_CGROUPS / details).read_text(), re.MULTILINE)
             taken = int((_CGROUPS / used).read_text()) - int(cached[1] if cached else 0)
             yield float(int((_CGROUPS / most).read_text()) - taken)

@@ -1,4 +1,5 @@
-"""Datasets as netCDF-4, built in memory because the library that writes them dies where a disk is full; and seals."""
+"""Datasets as netCDF-4, built in memory because the library crashes when the disk is full, and checksums behind
+them."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ _OUR_FAULT = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
 
 
 class UnsoundError(ValueError):
-    """A file is not as it was written; says in words what is wrong with it."""
+    """A file differs from what was written; the message says how."""
 
 
 def storable(data: xr.Dataset) -> xr.Dataset:
@@ -43,19 +44,19 @@ def netcdf(data: xr.Dataset, unlimited: Iterable[str] = ()) -> bytes:
 
 
 def sealed(content: bytes) -> bytes:
-    """A netCDF file with a checksum behind it, where readers do not look."""
+    """Bytes of a netCDF file with a checksum appended, which readers of netCDF ignore."""
     return content + _SEAL + hashlib.sha256(content).hexdigest().encode()
 
 
 @contextmanager
 def sealed_file(path: Path) -> Iterator[IO[bytes]]:
-    """A file that ends with a seal, open; the seal is not checked, and nothing is read of what has none.
+    """Open file that ends with a seal; the seal is not yet checked.
 
-    FileNotFoundError if there is none; UnsoundError if it is no file, cannot be read, or has no seal; OutputError if
-    this process has no more memory, or too many files open, to read it.
+    Raises FileNotFoundError if the file is missing, UnsoundError if it is not a regular file, cannot be read or has no
+    seal, and OutputError if this process lacks memory or file handles to read it.
     """
     try:
-        # A pipe of this name must not keep us waiting.
+        # A pipe of this name must not block.
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with os.fdopen(handle, "rb") as file:
             if not stat.S_ISREG(os.fstat(handle).st_mode):
@@ -68,10 +69,10 @@ def sealed_file(path: Path) -> Iterator[IO[bytes]]:
             yield file
     except FileNotFoundError:
         if path.is_symlink():
-            raise UnsoundError("leads nowhere") from None
+            raise UnsoundError("is a link to a missing file") from None
         raise
     except MemoryError:
-        raise OutputError("cannot be read for want of memory", source=str(path)) from None
+        raise OutputError("cannot be read: not enough memory", source=str(path)) from None
     except OSError as error:
         if error.errno in _OUR_FAULT:
             raise OutputError(f"cannot be read ({error.strerror})", source=str(path)) from None

@@ -1,6 +1,6 @@
-"""How results show themselves: as lines of text, as a drawing, and in notebooks as HTML and SVG that load nothing.
+"""Display of results: as lines of text, as a drawing, and in notebooks as HTML and SVG without external files.
 
-What is drawn is in colours that are told apart on a white page as on a black one; text beside it has those of the page.
+Drawings use colours that are distinct on white and on black pages; text takes the colours of the page.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ INK = "#808080"
 """Colour of frames and of text in drawings."""
 
 COLORS = ("#3a8fd0", "#e69f00", "#00a67a", "#d679a8", "#b07d4f", "#8a7fd0")
-"""Colours of what is to be told apart."""
+"""Colours of different series."""
 
 _SMALL = 11  # px, of text
 _WIDEST = 110  # characters of a line
@@ -58,7 +58,7 @@ class Shown(Short):
 
 
 class Summary(Shown):
-    """Base of results that are summed up by a title, a table with a head, and sentences above and below it."""
+    """Base of results whose summary is a title, a table with a head, and sentences above and below it."""
 
     @property
     def title(self) -> str:
@@ -66,11 +66,11 @@ class Summary(Shown):
         raise NotImplementedError
 
     def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
-        """Sentences, table, sentences."""
+        """Lines of the sentences above, the table, and the sentences below."""
         raise NotImplementedError
 
     def lines(self) -> list[str]:
-        """All that there is to say, as lines of text."""
+        """The whole summary as lines of text."""
         above, cells, below = self._told()
         return [self.title, *(f"  {line}" for line in (*above, *aligned(cells), *below))]
 
@@ -92,7 +92,7 @@ class Summary(Shown):
 
 
 def aligned(cells: Iterable[Sequence[str]], most: int | None = None) -> list[str]:
-    """Lines of a table, the columns below one another; at most so many, and how many more there are."""
+    """Lines of a table with aligned columns, at most ``most`` rows and a count of the others."""
     cells = list(cells)
     widths = [max(map(len, column)) for column in zip(*cells[:most], strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in cells[:most]]
@@ -100,7 +100,7 @@ def aligned(cells: Iterable[Sequence[str]], most: int | None = None) -> list[str
 
 
 def axes_for(axes: Axes | None) -> Axes:
-    """The axes of matplotlib, or those of a new figure if there are none."""
+    """Axes of matplotlib, by default those of a new figure."""
     from matplotlib.axes import Axes
 
     if axes is None:
@@ -108,12 +108,12 @@ def axes_for(axes: Axes | None) -> Axes:
 
         return pyplot.figure(layout="constrained").add_subplot()
     if not isinstance(axes, Axes):
-        raise ParameterError("is not what is drawn on", field="axes", value=axes, allowed="axes of matplotlib, or None")
+        raise ParameterError("must be axes to draw on", field="axes", value=axes, allowed="axes of matplotlib, or None")
     return axes
 
 
 def block(heading: str, *parts: str) -> str:
-    """HTML that shows one result: its heading, which is escaped, and the parts, which are HTML."""
+    """HTML of one result: its heading as plain text, then the parts as HTML."""
     return f'<div class="chilopod"><p><strong>{escape(heading)}</strong></p>{"".join(parts)}</div>'
 
 
@@ -123,7 +123,7 @@ def words(text: str) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], most: int = 20) -> str:
-    """A table, of which at most so many rows are shown."""
+    """HTML of a table with a limited number of rows."""
     rows = list(rows)
     lines = ["".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows[:most]]
     if len(rows) > most:
@@ -133,12 +133,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], most: int = 20)
 
 
 def folded(summary: str, inside: str) -> str:
-    """HTML that is seen on demand."""
+    """HTML that unfolds on a click."""
     return f"<details><summary>{escape(summary)}</summary>{inside}</details>"
 
 
 def svg(width: float, height: float, inside: str, alt: str) -> str:
-    """A drawing of this size (px), narrower where there is no room; ``alt`` says what is seen."""
+    """SVG of this size (px), scaled down to narrower pages; ``alt`` describes it."""
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
         f'role="img" aria-label="{escape(alt)}" style="max-width:100%;height:auto" font-family="sans-serif" '
@@ -147,13 +147,13 @@ def svg(width: float, height: float, inside: str, alt: str) -> str:
 
 
 def label(x: float, y: float, text: str, anchor: str = "middle", turned: bool = False) -> str:
-    """Text in a drawing, at a place in px."""
+    """Text in a drawing, at a position in px."""
     turn = f' transform="rotate(-90 {x:.1f} {y:.1f})"' if turned else ""
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{INK}"{turn}>{escape(text)}</text>'
 
 
 def picture(draw: Callable[[Axes], object], alt: str, size: tuple[float, float] = (6.0, 3.6)) -> str:
-    """SVG of what a function draws on axes of matplotlib, of a size (inches); ``alt`` says what is seen."""
+    """SVG of a drawing on axes of matplotlib, of a size in inches; ``alt`` describes it."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 

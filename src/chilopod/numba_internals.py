@@ -1,6 +1,6 @@
-"""All of numba and llvmlite that chilopod uses beyond what they document: what a new version of theirs may change.
+"""Undocumented parts of numba and llvmlite that chilopod uses, and that a new version of them may change.
 
-So ``pyproject.toml`` caps numba, and ``tests/test_numba_internals.py`` names what broke.
+Therefore ``pyproject.toml`` caps numba, and ``tests/test_numba_internals.py`` names the parts that changed.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from chilopod import sources
 __all__ = ["COMPILING", "Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
 
 ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "twin")
-"""Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
+"""Subpackages without compiled code, which no compiled code reaches: their changes need no new compilation."""
 
 NOTICED = 1.0
-"""Seconds of compiling after which it is said."""
+"""Seconds of compilation after which a message appears."""
 
 _FOLDER = "chilopod-"
 FOLDERS = 3
-"""Versions whose code is kept: as many as one goes back and forth between."""
+"""Number of versions whose code is kept, for switching between them."""
 
 
 def keep(dispatcher: Any) -> bool:
-    """Keep the machine code of what ``numba.njit`` made on disk; returns whether there is a folder for it.
+    """Keep the machine code of a function of ``numba.njit`` on disk; return True if there is a folder for it.
 
-    Numba alone would run old code: it looks only whether the function's *own* file changed, and a function contains
-    those that it calls. Here code lies in a folder of the package's digest, wherever numba has its folders.
+    Numba alone would run old code: it checks only the function's *own* file, although a function contains the functions
+    that it calls. Here the code lies in a folder named after the package's digest, inside numba's cache folder.
     """
     try:
         dispatcher._cache = _Cache(dispatcher.py_func)
@@ -55,7 +55,7 @@ def pointer_to(kind: Any, builder: Any, place: Any) -> Any:
 
 
 class _Locator:
-    """A folder that numba found, and in it that of this version."""
+    """Cache folder of numba with a subfolder for this version of chilopod."""
 
     def __init__(self, found: Any) -> None:
         self._found = found
@@ -72,7 +72,7 @@ class _Locator:
         if self._folder.exists():
             return
         self._folder.mkdir(parents=True, exist_ok=True)
-        # A process that still runs may have one of these; it makes it anew.
+        # A running process may use one of these folders; it creates the folder again.
         others = {other.stat().st_mtime: other for other in self._folder.parent.glob(f"{_FOLDER}*")}
         for when in sorted(others)[:-FOLDERS]:
             shutil.rmtree(others[when], ignore_errors=True)
@@ -95,7 +95,7 @@ class _File(IndexDataCacheFile):  # type: ignore[misc]
     def _load_index(self) -> Any:
         try:
             return super()._load_index()
-        except Exception:  # damaged: as good as none
+        except Exception:  # damaged: treated as missing
             return {}
 
 
@@ -111,7 +111,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             return None
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # damaged: as good as none
+        except Exception:  # damaged: treated as missing
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -122,7 +122,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
 
 class _Compiling(event.Listener):  # type: ignore[misc]
-    """Time that numba has spent compiling in this process, functions that are called by others within them."""
+    """Time that numba has spent compiling in this process; called functions count with their callers."""
 
     def __init__(self) -> None:
         self._before, self._begun, self._depth, self._said = 0.0, 0.0, 0, parent_process() is not None
@@ -139,7 +139,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
         self._before += 0.0 if self._depth else time.monotonic() - self._begun
 
     def seconds(self) -> float:
-        """So far, s; nothing for what was read from the cache."""
+        """Compile time so far, s; functions read from the cache count 0."""
         return self._before + (time.monotonic() - self._begun if self._depth else 0.0)
 
 

@@ -1,6 +1,6 @@
-"""Writing results: a file is there whole or not at all, replaces nothing it should not, and no result is lost.
+"""Writing of results: files are complete or absent, replace others only on request, and no result is lost.
 
-What cannot be done raises OutputError, in one line that names the file.
+Every failure raises OutputError, in one line that names the file.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _COPIED = 2**24  # bytes at a time
 
 
 def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
-    """Make sure, before any work is done for them, that files can be written; nothing is made or changed.
+    """Check, before any work is done for them, that files can be written; nothing is created or changed.
 
-    With ``replace`` those that are there already may be replaced; what is no regular file never is.
+    With ``replace`` existing regular files may be replaced.
     """
     files = [Path(path) for path in paths]
     for path in files:
@@ -40,7 +40,7 @@ def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
 
 
 def check_folder(path: str | Path) -> Path:
-    """Make sure that files can be written into a folder, or that it can be made; nothing is made."""
+    """Check that a folder can be written into, or can be created; nothing is created."""
     path = Path(path)
     try:
         _check_names(path)
@@ -52,7 +52,7 @@ def check_folder(path: str | Path) -> Path:
 
 
 def check_room(path: Path, needed: float) -> None:
-    """Make sure, before any work is done for it, that there is room (bytes) for a large file, or more in a folder."""
+    """Check, before any work is done for it, that the disk has room (bytes) for a large file or a folder."""
     try:
         free = float(shutil.disk_usage(_nearest(path)).free)
     except (OSError, ValueError) as error:
@@ -78,13 +78,13 @@ def write_atomic(
     path, content
         Path and content of the file.
     replace
-        True if a file that is already there may be replaced; what is no regular file never is.
+        True if an existing regular file may be replaced.
     durable
-        True if it is to outlast a power failure; :func:`sync_folder` makes its name do so.
+        True if the content must survive a power failure; :func:`sync_folder` does the same for the name.
     folders
-        True if its folder is made where there is none.
+        True if a missing folder is created.
     temporary
-        Prefix of its name until it is whole; such a file stays where a process is killed.
+        Prefix of the name while the file is incomplete; such a file remains if the process is killed.
     """
     path = Path(path)
     try:
@@ -106,8 +106,8 @@ def write_atomic(
 def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) -> list[Path]:
     """Write the files of a result, paths and contents, one after the other as they are given; return their paths.
 
-    What cannot be written where it should go is kept under another name in the same folder, or else in the current one,
-    and the error says where.
+    A file that cannot be written at its path is kept under another name in the same folder, or else in the current
+    folder, and the error names that place.
     """
     written: list[Path] = []
     kept: list[Path] = []
@@ -120,12 +120,12 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
             kept += _kept(path, content)
     if failure is None:
         return written
-    where = f"kept instead: {', '.join(map(str, kept))}" if kept else "and no other place could be written"
+    where = f"kept instead: {', '.join(map(str, kept))}" if kept else "no other place could be written"
     raise OutputError(f"{failure.problem}; {where}", source=failure.source)
 
 
 def spool(path: Path, size: int = 0) -> IO[bytes]:
-    """A nameless file for a large result that is still being computed, on the same disk; it vanishes with this process.
+    """Temporary file without a name, on the same disk, for a large result under computation; it ends with this process.
 
     Room is set aside for twice the size (bytes): for the file, and for the copy that :func:`write_atomic` makes of it.
     """
@@ -154,13 +154,13 @@ def sync_folder(path: Path) -> None:
 
 @contextmanager
 def made_folder(path: Path) -> Iterator[None]:
-    """See to it that a folder is there, after a power failure too; what was made for it goes again if the block fails
-    and nothing is in it."""
+    """Create a folder that survives a power failure; if the block fails, folders that were created and are empty go
+    again."""
     made = [each for each in (path, *path.parents) if not _is_there(each)]
     try:
         path.mkdir(parents=True, exist_ok=True)
         for each in made:
-            with suppress(OSError):  # not everybody may look into what is above
+            with suppress(OSError):  # folders above may be unreadable
                 sync_folder(each.parent)
         yield
     except BaseException:
@@ -178,7 +178,7 @@ def _check_replaceable(path: Path, replace: bool) -> None:
     if stat.S_ISDIR(mode):
         raise OutputError("is a folder, not a file", source=str(path))
     if not stat.S_ISREG(mode):
-        what = "a link, no regular file," if stat.S_ISLNK(mode) else "no regular file"
+        what = "a link, not a regular file," if stat.S_ISLNK(mode) else "not a regular file"
         raise OutputError(f"is {what} and is not replaced, even with --force", source=str(path))
     if not replace:
         raise OutputError("exists and is only replaced with --force", source=str(path))
@@ -200,7 +200,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _nearest(folder: Path) -> Path:
-    """The folder, or the nearest above it that is there."""
+    """The folder, or the nearest existing folder above it."""
     return next((each for each in (folder, *folder.parents) if _is_there(each)), folder)
 
 
@@ -218,7 +218,7 @@ def _fill(path: Path, content: Content, durable: bool) -> None:
 
 
 def _kept(path: Path, content: Content) -> list[Path]:
-    """Where else a file could be written; nothing if nowhere."""
+    """Other path at which a file could be written, or None."""
     for folder in (path.parent.resolve, Path.cwd):
         with suppress(OSError):
             return [write_atomic(_free(folder() / path.name), content, replace=False)]
@@ -226,7 +226,7 @@ def _kept(path: Path, content: Content) -> list[Path]:
 
 
 def _free(path: Path) -> Path:
-    """The path, or one like it with a number, at which there is nothing."""
+    """The path itself, or the path with a number, whichever is free."""
     free, number = path, 1
     while _is_there(free):
         number += 1

@@ -1,6 +1,6 @@
-"""Manners of the process of the command line: streams that may fail, an end at any moment.
+"""Streams and signals of the command-line process: output that may fail, and interrupts at any moment.
 
-Nothing is imported here but small modules of Python itself: this comes before everything else.
+Only small modules of Python itself are imported here, because this module is loaded first.
 """
 
 from __future__ import annotations
@@ -26,18 +26,17 @@ INTERRUPTED = 130
 
 _ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # not all systems have all of them
 
-_PATIENCE = 1.0  # s after Ctrl-C until it is said that something is still being stopped
+_PATIENCE = 1.0  # s after Ctrl-C until a message that work is still being stopped
 _SHOW_CURSOR = b"\n\x1b[?25h"  # a progress bar hides it
 
 
 class Stream(io.FileIO):
-    """A file that never fails whoever writes into it: what cannot be written is lost, and the first reason is kept as
-    ``failure``."""
+    """File whose writes never raise: text that cannot be written is lost, and ``failure`` keeps the first reason."""
 
     failure: OSError | None = None
 
     def write(self, data: ReadableBuffer) -> int:
-        """As of any file, or nothing at all; the number of bytes either way."""
+        """Write text if possible, and return its length in any case."""
         if self.failure is None:
             try:
                 return super().write(data)
@@ -47,11 +46,11 @@ class Stream(io.FileIO):
 
 
 def hold_streams() -> Stream:
-    """Make stdout and stderr of this process such that printing never fails, closed or full as they may be.
+    """Replace stdout and stderr of this process by streams that never raise, even if closed or full.
 
     Returns
     -------
-    What is under stdout, to be asked at the end whether all of it was written.
+    The stream under stdout; :func:`unwritten` tells at the end if all of it was written.
     """
     for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:
@@ -59,7 +58,7 @@ def hold_streams() -> Stream:
         except OSError:
             # The next file that is opened would take its place, and what is meant for stderr would land in a result.
             # The system gives the lowest free number, which is this. Nothing can be written into our stdout then, as
-            # if it were closed; what goes to a stderr that is closed nobody wants to see.
+            # if it were closed; output to a closed stderr is dropped.
             os.set_inheritable(os.open(os.devnull, mode), True)
     stdout, stderr = Stream(1, "wb", closefd=False), Stream(2, "wb", closefd=False)
     sys.stdout, sys.stderr = _text(stdout, sys.stdout), _text(stderr, sys.stderr)
@@ -67,7 +66,7 @@ def hold_streams() -> Stream:
 
 
 def _text(stream: Stream, like: TextIO | Any) -> TextIO:
-    # What a robot is called need not fit the terminal's encoding; better an escape than a crash.
+    # A robot's name may not fit the terminal's encoding; an escape is printed instead.
     return io.TextIOWrapper(
         io.BufferedWriter(stream),
         encoding=getattr(like, "encoding", None) or "utf-8",
@@ -78,7 +77,7 @@ def _text(stream: Stream, like: TextIO | Any) -> TextIO:
 
 
 def unwritten(stdout: Stream) -> str | None:
-    """Why something that was printed could not be written; None if it was, or its reader has seen enough."""
+    """Reason why output could not be written; None if all was written or its reader closed the pipe."""
     sys.stdout.flush()
     failure = stdout.failure
     if failure is None or failure.errno == errno.EPIPE:
@@ -89,9 +88,9 @@ def unwritten(stdout: Stream) -> str | None:
 def answer_interrupts() -> None:
     """Let Ctrl-C, SIGTERM and SIGHUP end this process with one line and exit code 128 + signal, whatever it is doing.
 
-    As anywhere in Python they become a KeyboardInterrupt, so that all is left in order. Only while something is being
-    imported (which C code may turn into any other exception, or forget), and at a second Ctrl-C, the process ends on
-    the spot: files are there whole or not at all at any moment. Where stopping takes more than a second, that is said.
+    The signals raise KeyboardInterrupt, so that cleanup runs. During an import (where C code may change or lose the
+    exception) and at a second Ctrl-C the process ends at once; files are complete or absent at any moment. If stopping
+    takes more than a second, a line says so.
     """
     # Ignored in the background of a script, or by nohup, they stay ignored.
     usual = (signal.default_int_handler, signal.SIG_DFL)
@@ -110,14 +109,14 @@ def answer_interrupts() -> None:
 
 
 def ignore_interrupts() -> None:
-    """From the end of the work on there is nothing to stop."""
+    """Ignore interrupts after the end of the work."""
     for each in signal.Signals:
         if each.name in _ENDS:
             signal.signal(each, signal.SIG_IGN)
 
 
 def exit_code() -> int:
-    """Exit code of this process where it was interrupted: 128 + the number of the signal, 130 after Ctrl-C."""
+    """Exit code of an interrupted process: 128 + the number of the signal, 130 after Ctrl-C."""
     return 128 + _pressed[0] if _pressed else INTERRUPTED
 
 
@@ -128,7 +127,7 @@ def leave(words: str = "error: interrupted\n") -> NoReturn:
     for clean_up in reversed(on_leave):
         with suppress(Exception):
             clean_up()
-    # Semaphores that outlive this process are told of on its stderr, by the process that looks after them.
+    # Python's resource tracker reports semaphores that outlive this process on its stderr.
     started = sys.modules.get("multiprocessing.util")
     if started is not None:
         with suppress(Exception):
@@ -137,7 +136,7 @@ def leave(words: str = "error: interrupted\n") -> NoReturn:
 
 
 on_leave: list[Callable[[], object]] = []
-"""Functions to call where this process ends on the spot."""
+"""Functions to call when this process ends at once."""
 
 _pressed: list[int] = []
 
@@ -160,7 +159,7 @@ def _importing(frame: FrameType | None) -> bool:
 
 
 def _unraisable(found: Any) -> None:
-    """Where nothing can be raised (a destructor, a callback) Python would print a KeyboardInterrupt and go on."""
+    """End the process on a KeyboardInterrupt in a destructor or callback, which Python would only print."""
     if found.exc_type is KeyboardInterrupt:
         leave()
     sys.__unraisablehook__(found)
@@ -176,6 +175,6 @@ def _watch(pressed: int) -> None:
 
 
 def _next(pressed: int, *numbers: int) -> None:
-    """Wait for one of some signals; others come the same way."""
+    """Wait for one of some signals."""
     while os.read(pressed, 1)[0] not in numbers:
         pass

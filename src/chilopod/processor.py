@@ -1,4 +1,4 @@
-"""The processor, and the code that was chosen for it: what the last bits of a number depend on."""
+"""Processor and machine code chosen for it, on which the last bits of a number depend."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _CORENAME = [f"{front}openblas_get_corename{end}" for front in ("scipy_", "") fo
 
 
 def processor() -> str:
-    """Name of the processor; its architecture where the system does not say."""
+    """Name of the processor, or its architecture if the system does not tell."""
     with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):

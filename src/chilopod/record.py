@@ -1,4 +1,4 @@
-"""Record of a walk, the same names and units for every engine; what is wrong is a ParameterError that names it."""
+"""Record of a walk, with the same names and units for every engine; errors are ParameterErrors."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ RATE = 100.0
 """Default sampling rate of records, Hz."""
 
 LONGEST = 1e5
-"""s, more than a day: anything longer is a slip of the pen."""
+"""Largest duration, s, more than a day: longer ones are typing errors."""
 
 MOST_NUMBERS = 5e8
 """Largest number of values of a record (4 GB)."""
 
 LARGEST = 1e100
-"""No number in a record is larger, in its unit: sums of squares stay finite."""
+"""Largest number in a record, in its unit: sums of squares stay finite."""
 
 _MOVING, _TOLD = ("time", "robot"), ("event", "robot")
 MOTION = {
@@ -60,8 +60,8 @@ QUANTITIES = MOTION | {
     "seen_bearing": (_TOLD, "rad", "commands"),
     "seen_distance": (_TOLD, "m", "commands"),
 }
-"""All quantities that an engine can record: dimensions, unit, and what they come with, if not always. Springs that
-cannot be adjusted, and targets that stay, are not over time."""
+"""All quantities that an engine can record: dimensions, unit, and the condition of optional ones. Springs that are not
+adjustable, and fixed targets, have no dimension of time."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Recording:
             object.__setattr__(self, "rate", rate)
         for name in ("forces", "poses"):
             if not isinstance(getattr(self, name), bool | np.bool_):
-                raise ParameterError("is neither", field=name, value=getattr(self, name), allowed="True or False")
+                raise ParameterError("must be True or False", field=name, value=getattr(self, name))
             object.__setattr__(self, name, bool(getattr(self, name)))
 
     def samples(self, until: float) -> Array:
@@ -109,11 +109,11 @@ def as_number(name: str, value: object) -> float:
             raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError("is no number", field=name, value=value) from None
+        raise ParameterError("must be a number", field=name, value=value) from None
 
 
 def in_range(name: str, value: object, most: float, unit: str = "") -> float:
-    """A plain number that is positive and within reason, both in this unit."""
+    """A plain number that is positive and at most ``high``, both in this unit."""
     value = as_number(name, value)
     if not 0.0 < value <= most:
         high = f"{most:g} {unit}".strip()
@@ -124,31 +124,34 @@ def in_range(name: str, value: object, most: float, unit: str = "") -> float:
 
 
 def check_size(record: Recording | None, until: float, numbers: int) -> None:
-    """Refuse a record that nobody can hold, of ``numbers`` at every sample, and what is no time."""
+    """Refuse a duration that is not a time, and a record of ``numbers`` at every sample that is too large."""
     if not (isinstance(until, Real) and until >= 0.0):
-        raise ParameterError("is no time", field="expected", value=until, allowed="0 s or more")
+        raise ParameterError("must be a duration in s", field="expected", value=until, allowed="0 s or more")
     if record is not None and (until * record.rate + 1.0) * numbers > MOST_NUMBERS:
         raise ParameterError(
-            "the record would be too large", field="rate", value=record.rate, allowed="fewer robots, samples or seconds"
+            "must be lower: the record would be too large",
+            field="rate",
+            value=record.rate,
+            allowed="fewer robots, samples or seconds",
         )
 
 
 def check_memory(needed: float) -> None:
-    """Refuse records for which memory does not have so many bytes."""
+    """Refuse records that need more bytes than the memory has."""
     if needed > memory.available():
         problem = f"would take {memory.in_words(needed)} of memory, and {memory.in_words(memory.available())} are free"
         raise ParameterError(problem, field="record", allowed="fewer walks, samples or seconds")
 
 
 class Samples:
-    """Rows that grow with a walk, all in one array.
+    """Array of rows that grows with a walk.
 
     Parameters
     ----------
     shape
         Shape of a row.
     expected
-        Rows that are likely to come; more may.
+        Expected number of rows; more may come.
     """
 
     def __init__(self, shape: tuple[int, ...], expected: int = 0) -> None:
@@ -157,13 +160,13 @@ class Samples:
 
     @property
     def rows(self) -> Array:
-        """Those there are, shape (count, ...); a view that cannot be written through."""
+        """Rows so far, shape (count, ...), as a read-only view."""
         rows = self._rows[: self.count]
         rows.flags.writeable = False
         return rows
 
     def grown(self, count: int) -> Array:
-        """Room for ``count`` rows at least, those that are new NaN; a view to write through until the next call."""
+        """Writable view of at least ``count`` rows, new ones NaN, valid until the next call."""
         if count > len(self._rows):
             longer = np.full((max(count, 2 * len(self._rows)), *self._rows.shape[1:]), np.nan)
             longer[: self.count] = self._rows[: self.count]
@@ -173,7 +176,7 @@ class Samples:
 
 
 def bearing_and_distance(position: Array, heading: Array, target: Array) -> tuple[Array, Array]:
-    """Where a target is, seen from module 1.
+    """Bearing and distance of a target, seen from module 1.
 
     Parameters
     ----------
@@ -205,9 +208,7 @@ def walk_record(
 
     Parameters
     ----------
-    time
-        s, shape (T,).
-    position, velocity
+    time position, velocity
         Position and velocity of the centre of module 1, m and m/s, shape (T, robots, 2).
     heading, heading_rate
         Heading and heading rate of module 1, rad and rad/s, shape (T, robots).
@@ -216,7 +217,7 @@ def walk_record(
     leg_yaw
         Leg yaw of the legs of module 1, rad, shape (T, robots, 2).
     """
-    import xarray as xr  # takes a third of a second to load, and not all who know of records make any
+    import xarray as xr  # takes a third of a second to load, and only writers of records need it
 
     values = position, heading, velocity, heading_rate, joint_angle, joint_rate, leg_yaw
     return xr.Dataset(
@@ -235,12 +236,12 @@ def walk_record(
 
 
 def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None) -> None:
-    """Add to a record how the walks ended and where the target was, and blank what robots that failed have no more.
+    """Add status and target to a record, and set the samples after a robot's failure to NaN.
 
     Parameters
     ----------
     data
-        From :func:`walk_record`, with all else that is recorded; changed in place.
+        Record of :func:`walk_record` with all other variables; changed in place.
     statuses
         Labels, one a robot.
     target
@@ -262,10 +263,10 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
 
 
 def spring_work(data: xr.Dataset) -> xr.DataArray:
-    """Work that changing stiffness did on the springs of every robot of a record, J, over (robot).
+    """Work of changing stiffness on the springs of every robot of a record, J, over (robot).
 
     It is the integral of 1/2 theta^2 dk over the motion, by the mean of theta^2 between samples: of second order in the
-    sampling where a spring ramps, of first where it steps. Springs that do not change take none.
+    sampling where a spring ramps, of first order where it steps, and 0 for constant springs.
     """
     if "time" not in data.stiffness.dims:
         return (data.stiffness * 0.0).sum("joint").assign_attrs(units="J")

@@ -1,4 +1,4 @@
-"""A record of many walks as a file that grows with every walk: memory holds one of them, however many there are."""
+"""Record of many walks as a file that grows with every walk; memory holds one walk at a time."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _LONGEST = 2**16  # samples of a chunk of the file
-_ABOUT = 2**20  # bytes of all that is no number of a walk
+_ABOUT = 2**20  # bytes of everything but the numbers of walks
 _A_CHUNK = 200  # bytes that the file needs for knowing where a chunk is, at most
 
 
 class RecordFile:
-    """A netCDF-4 file of many walks of one duration and rate, written as their records come, in any order.
+    """netCDF-4 file of many walks of one duration and rate, written in the order of their records.
 
-    Until :meth:`write` it has no name, and vanishes with this process. What fails meanwhile is said there, so that it
-    does not stop the walks. Used as a context: it is gone when that is left. OutputError at once if there is no room
-    for the bytes that it will have at least.
+    Until :meth:`write` the file has no name and ends with this process or with the context. A failure before that is
+    reported by :meth:`write`, so that it does not stop the walks. The constructor raises OutputError if the disk lacks
+    room for the least size.
     """
 
     def __init__(self, path: Path, robots: int, least: float = 0.0) -> None:
@@ -46,7 +46,7 @@ class RecordFile:
             self._spooled.close()
 
     def add(self, index: int, record: xr.Dataset) -> None:
-        """Put in the record of one walk, with one ``robot``, as robot ``index`` of the file; the ``trial`` of the file
+        """Write the record of one walk, with one ``robot``, as robot ``index`` of the file; the ``trial`` of the file
         is that of robot 0."""
         if self._spooled is None and self._failure is None:
             self._begin(record)
@@ -59,14 +59,14 @@ class RecordFile:
         self._failure = self._medium.failure(self._path)
 
     def write(self, *, replace: bool) -> list[Path]:
-        """Give the file its name, see :func:`chilopod.output.write_all`; OutputError if there was no room for it."""
+        """Give the file its name, see :func:`chilopod.output.write_all`; OutputError if the disk was full."""
         self._finish()
         if self._failure is not None:
             raise self._failure
         return [] if self._spooled is None else write_all([(self._path, self._spooled)], replace=replace)
 
     def _begin(self, record: xr.Dataset) -> None:
-        """Make the file from the first record, which holds all names, dimensions and attributes."""
+        """Create the file with the names, dimensions and attributes of the first record."""
         import h5py
 
         over = [variable for variable in record.variables.values() if "robot" in variable.dims]
@@ -78,7 +78,7 @@ class RecordFile:
             self._failure = error
             return
         self._medium = _Medium(self._spooled.fileno(), "r+b", closefd=False)
-        # A chunk of the file is of one robot: each record is written at a stretch.
+        # A chunk of the file has one robot, so each record is written contiguously.
         shaped = record.copy()
         for variable in shaped.variables.values():
             if "robot" in variable.dims:
@@ -105,7 +105,7 @@ class RecordFile:
 
 
 class _Medium(io.FileIO):
-    """File that HDF5 writes into: it never raises, because HDF5 dies of that; it remembers what failed."""
+    """File that HDF5 writes into; it never raises, because HDF5 would crash, and keeps the first failure."""
 
     _error: OSError | None = None
 
@@ -116,7 +116,7 @@ class _Medium(io.FileIO):
         return OutputError(f"cannot be written ({self._error.strerror})", source=str(path))
 
     def readinto(self, buffer: Any) -> int:
-        # What could not be written is zeros.
+        # Bytes that could not be written read as zeros.
         found = super().readinto(buffer) or 0
         buffer[found:] = bytes(len(buffer) - found)
         return len(buffer)

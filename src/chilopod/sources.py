@@ -1,4 +1,4 @@
-"""The sources of chilopod as they lie here: which code it is, whatever its version number says."""
+"""Identity of the installed sources of chilopod, beyond the version number."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ _PACKAGE = Path(__file__).parent
 
 @functools.cache
 def checkout() -> str:
-    """Commit of the checkout that this is, or was built of, such as ``g29a026a.dirty``; empty for a release."""
+    """Commit of the checkout that this package is or was built from, such as ``g29a026a.dirty``; empty for a
+    release."""
     with suppress(OSError):
         return (_PACKAGE / "checkout.txt").read_text(encoding="utf-8").strip()
     root = _PACKAGE.parent.parent
@@ -25,7 +26,7 @@ def checkout() -> str:
 
     command = ["git", "-C", str(root), "describe", "--always", "--tags", "--match=v*", "--dirty=.dirty", "--abbrev=7"]
     try:
-        # To say so is not worth a lock on somebody's repository, nor waiting.
+        # The question is not worth a lock on the repository, nor waiting.
         quiet = {**os.environ, "GIT_OPTIONAL_LOCKS": "0"}
         done = subprocess.run(command, env=quiet, capture_output=True, text=True, check=True, timeout=5.0)
     except (OSError, subprocess.SubprocessError):
@@ -52,9 +53,9 @@ def digest(without: Sequence[str] = ()) -> str:
 
 
 def edited(without: Sequence[str] = ()) -> bool:
-    """True if a Python file that counts was changed, added or removed since this process began: it may run both.
+    """True if a Python file that counts was changed, added or removed since this process began.
 
-    The files are looked at once a second at most.
+    The files are checked once a second at most.
     """
     changed = _changed(int(time.monotonic()))
     return any(name.partition("/")[0] not in without for name in changed)

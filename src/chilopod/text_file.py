@@ -12,10 +12,10 @@ _LARGEST: Final = 1_000_000
 
 
 def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
-    """Read a file that may be anything, in no more time and memory than a text by hand takes.
+    """Read a small text file, with bounded time and memory whatever the path leads to.
 
-    Raises ``refused`` if it is missing, a folder or anything else that is no regular file, too large, empty, or no
-    text; ``kind`` says what was expected, such as ``robot file``.
+    Raises ``refused`` if the path is missing or not a regular file, or the file is too large, empty or not text;
+    ``kind`` is the expected content, such as ``robot file``.
     """
     source = str(path)
     try:
@@ -23,7 +23,7 @@ def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
             raise refused(f"is a folder, not a {kind}", source=source)
         if os.path.exists(path) and not os.path.isfile(path):
             raise refused("is not a regular file", source=source)
-        # Some files that the system makes up call themselves regular, and keep waiting for news.
+        # Some virtual files of the system claim to be regular and block.
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
             content = file.read(_LARGEST + 1) or b""
     except (OSError, ValueError) as error:

@@ -140,7 +140,7 @@ def test_only_its_own_branch_is_resumed(tmp_path):
     for robot, parameter, side, match in (
         (ROBOT.with_value("ground.friction", 200.0), K1, None, "another robot: ground"),
         (ROBOT, "springs.stiffness[1]", None, "saved branch varies"),
-        (ROBOT, K1, -1, "other side"),
+        (ROBOT, K1, -1, "the side to which"),
     ):
         with pytest.raises(ParameterError, match=match):
             resumed(data, robot, parameter, side=side)
@@ -161,7 +161,7 @@ def test_a_damaged_or_edited_file_is_refused(tmp_path):
         with pytest.raises(ParameterError, match="is damaged or was edited"):
             read_walks(path)
     path.write_bytes(sealed(netcdf(data.assign_attrs(version=0))))
-    with pytest.raises(ParameterError, match="another version"):
+    with pytest.raises(ParameterError, match="of this version of chilopod"):
         read_walks(path)
     path.unlink()
     for make in (lambda path: None, os.mkfifo):

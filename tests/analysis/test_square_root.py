@@ -43,9 +43,9 @@ def test_error_bars_are_calibrated(noise):
 def test_trials_that_determine_no_point_are_refused():
     with pytest.raises(AnalysisError, match="two springs"):
         square_root_fit([0.1, 0.1, 0.1], [1.0, 1.1, 0.9])
-    with pytest.raises(AnalysisError, match="determine no point"):
+    with pytest.raises(AnalysisError, match="must fall to zero as a square root"):
         square_root_fit([0.10, 0.12, 0.14], [1.0, 1.0, 1.0])
-    with pytest.raises(ParameterError, match="one for each"):
+    with pytest.raises(ParameterError, match="one value for each"):
         square_root_fit([0.10, 0.12], [1.0])
     with pytest.raises(ParameterError, match="finite"):
         square_root_fit([0.10, 0.12, 0.14], [1.0, np.nan, 1.0])

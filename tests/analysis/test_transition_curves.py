@@ -67,7 +67,7 @@ def test_oscillation_of_all_springs_together():
 
 
 def test_what_is_no_plane_of_parameters():
-    with pytest.raises(ParameterError, match="must be two"):
+    with pytest.raises(ParameterError, match="must be two parameters"):
         family2(ROBOT, (K1, K1))
     with pytest.raises(ParameterError, match="whole number"):
         family2(ROBOT, (K1, "body.modules"))

@@ -220,28 +220,28 @@ def _halts_for_a_moment(original):
     ("broken", "promise"),
     [
         (_forgets_to_record_units, "records under the names"),
-        (_draws_at_random, "gives the same bits twice"),
-        (_counts_advances, "however it is advanced"),
-        (_is_changed_by_looking, "however it is advanced"),
+        (_draws_at_random, "repeats a walk to the bit"),
+        (_counts_advances, "for any advances and observations"),
+        (_is_changed_by_looking, "for any advances and observations"),
         (_looks_at_its_neighbours, "alone and in a batch"),
-        (_forgets_ramps, "saved and resumed"),
-        (_sees_in_degrees, "sees in the units"),
-        (_gives_its_own_arrays, "sees in the units"),
-        (_obeys_before_it_refuses, "refuses what is no command"),
+        (_forgets_ramps, "when saved and resumed"),
+        (_sees_in_degrees, "observes in the units"),
+        (_gives_its_own_arrays, "observes in the units"),
+        (_obeys_before_it_refuses, "refuses invalid commands"),
         (_ignores_its_limits, "keeps springs within"),
         (_ignores_torques, "turns joints"),
-        (_has_no_halt, "sees in the units.*it has no halt"),
-        (_is_changed_by_a_look_at_its_pose, "says where robots are"),
-        (_goes_where_it_is_aimed, "shows targets that are moved"),
-        (_aims_all_alike, "shows targets that are moved"),
-        (_halts_everybody, "halts robots for good"),
-        (_halts_for_a_moment, "halts robots for good"),
-        (_counts_its_states_from_elsewhere, "gives its states"),
-        (_restarts_everybody, "puts robots on the floor anew"),
-        (_restarts_as_it_was_told, "puts robots on the floor anew"),
-        (_never_fails, "ends a robot that fails"),
-        (_stops_everybody, "ends a robot that fails"),
-        (_records_robots_that_failed, "ends a robot that fails"),
+        (_has_no_halt, "observes in the units.*missing: halt"),
+        (_is_changed_by_a_look_at_its_pose, "returns poses without a change"),
+        (_goes_where_it_is_aimed, "moves targets without a change"),
+        (_aims_all_alike, "moves targets without a change"),
+        (_halts_everybody, "halts robots finally"),
+        (_halts_for_a_moment, "halts robots finally"),
+        (_counts_its_states_from_elsewhere, "returns states from which"),
+        (_restarts_everybody, "restarts robots without effect"),
+        (_restarts_as_it_was_told, "restarts robots without effect"),
+        (_never_fails, "stops a failed robot"),
+        (_stops_everybody, "stops a failed robot"),
+        (_records_robots_that_failed, "stops a failed robot"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
@@ -255,10 +255,10 @@ def test_a_broken_promise_is_named(docs, monkeypatch, broken, promise):
 def test_traits_and_noise_are_held_to(docs):
     engine = docs["Sketch"]()
     engine.traits = Traits(name="", sentence="nothing")
-    with pytest.raises(AnalysisError, match="says what it is"):
+    with pytest.raises(AnalysisError, match="has valid traits"):
         check_engine(engine, ROBOT)
     engine.traits = Traits(name="sketch", sentence="noisy, it says", noisy=True)
-    with pytest.raises(AnalysisError, match="draws noise from its seeds alone"):
+    with pytest.raises(AnalysisError, match="draws noise only from its seeds"):
         check_engine(engine, ROBOT)
 
 

@@ -399,7 +399,7 @@ def test_a_thread_is_refused_while_another_is_within_a_verb(engine, robot, verb,
     other = threading.Thread(target=walk.aim, args=((1.0, 1.0),))
     other.start()
     assert within.wait(10.0)
-    with pytest.raises(ThreadError, match=f"walk.{verb}: another thread") as caught:
+    with pytest.raises(ThreadError, match=f"walk.{verb}: must not run while another thread") as caught:
         getattr(walk, verb)(*arguments.get(verb, ()))
     assert "\n" not in str(caught.value)
     assert walk.time == 0.05
@@ -471,5 +471,5 @@ def test_events_that_never_end_are_refused():
         def act(self, event, seen):
             return Command()
 
-    with pytest.raises(ParameterError, match=r"Endless.events.*are too many.*10000 in a gait cycle"):
+    with pytest.raises(ParameterError, match=r"Endless.events.*must be fewer.*10000 in a gait cycle"):
         steer(planar.start(load_robot("aoi2022-planar")), 1.0, Endless())

@@ -252,7 +252,7 @@ def test_time_that_is_over_truncates():
     steps = [env.step(np.ones(3, dtype=np.float32)) for _ in range(54)]
     assert [each[3] for each in steps] == [False] * 53 + [True]
     assert steps[-1][4]["verdict"] == "out of time"
-    with pytest.raises(ParameterError, match="the episode is over"):
+    with pytest.raises(ParameterError, match="must not be called after the end of an episode"):
         env.step(np.zeros(3, dtype=np.float32))
 
 
@@ -306,7 +306,7 @@ def test_wrappers_of_gymnasium_go_with_both():
 )
 def test_an_action_that_is_none_is_one_line(action, words):
     env = gymnasium.make(TURN, disable_env_checker=True).unwrapped
-    with pytest.raises(ParameterError, match="there is no episode yet"):
+    with pytest.raises(ParameterError, match="must not be called before the first reset"):
         env.step(np.zeros(3, dtype=np.float32))
     other = gymnasium.make(TURN, disable_env_checker=True).unwrapped
     env.reset(seed=0)
@@ -325,7 +325,7 @@ def test_an_action_that_is_none_is_one_line(action, words):
         ({"robot": "aoi2021"}, "aoi2021"),
         ({"robot": "aoi2022-planar", "engine": "twin"}, "twin"),
         ({"springs": "second"}, "first or all"),
-        ({"patience": 3.0}, "too short"),
+        ({"patience": 3.0}, "long enough"),
         ({"render_mode": "human"}, "rgb_array"),
         *(({"targets": targets}, "targets.*1 to 1000") for targets in (10**9, -1, 0, 1.5, "1", None)),
         ({"patience": np.nan}, "patience"),
@@ -334,9 +334,9 @@ def test_an_action_that_is_none_is_one_line(action, words):
         ({"robot": 5}, "robot = 5"),
         ({"disturbance": 5}, "disturbance = 5: must be a Disturbance"),
         ({"rewards": 5}, "rewards = 5: must be a Rewards"),
-        ({"task": "Tern"}, "there is no such task; did you mean 'Turn'. allowed: Turn, Course, TaskA, TaskB"),
-        ({"task": 5}, "task = 5: there is no such task"),
-        ({"task": "TaskA", "targets": 2}, "targets = 2: is no attribute of a OneTarget; allowed: rewards, target"),
+        ({"task": "Tern"}, "must be one of the tasks; did you mean 'Turn'. allowed: Turn, Course, TaskA, TaskB"),
+        ({"task": 5}, "task = 5: must be one of the tasks"),
+        ({"task": "TaskA", "targets": 2}, "targets = 2: must be a field of OneTarget; allowed: rewards, target"),
         ({"task": "TaskA", "target": 5}, "target = 5: must be a Target"),
     ],
 )
@@ -350,7 +350,7 @@ def test_springs_without_an_actuator_or_a_range_are_refused():
     robot = load_robot("aoi2022-planar")
     fixed = robot.override("springs.adjustable[1]", True)
     narrow = robot.set_from_text(["springs.adjustable[0]=true", "springs.softest=99 N*mm/deg"])
-    for each, words in ((fixed, "no actuator"), (narrow, "no range")):
+    for each, words in ((fixed, "must be true"), (narrow, "a range")):
         with pytest.raises(ParameterError, match=words):
             Episodes(each)
 

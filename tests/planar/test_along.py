@@ -44,7 +44,7 @@ def test_each_state_is_carried_by_its_own_robot(other):
 
 
 def test_as_many_states_as_models():
-    with pytest.raises(ParameterError, match="one for each model"):
+    with pytest.raises(ParameterError, match="one row for each model"):
         FollowedModel.flow_each([FollowedModel(robot(0.6))], np.array([BENT, BENT]), 0.0, 0.6)
 
 

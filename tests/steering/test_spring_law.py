@@ -101,10 +101,10 @@ def test_what_the_actuator_keeps_from_it_is_said():
     assert "circles of 0.5" in said
     assert soft.tightest == pytest.approx(LAW.radius(0.55))
     (said,) = SpringLaw.of(ROBOT.override("springs.softest", 0.75), LAW).remarks(LAW)
-    assert "bends no straight walk" in said
+    assert "does not bend the straight walk" in said
     (said,) = SpringLaw.of(ROBOT.override("springs.stiffest", 0.65), LAW).remarks(LAW)
-    assert "holds no straight walk" in said
-    with pytest.raises(ParameterError, match="no range"):
+    assert "does not keep the walk straight" in said
+    with pytest.raises(ParameterError, match="a range to steer"):
         SpringLaw.of(ROBOT.override("springs.softest", 3.0), LAW)
 
 

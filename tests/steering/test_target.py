@@ -31,14 +31,14 @@ def test_straight_ahead_is_a_circle_without_end():
 @pytest.mark.parametrize(
     ("bearing", "distance", "match"),
     [
-        (math.radians(91.0), 1.0, "behind"),
-        (-math.pi, 1.0, "behind"),
-        (math.nan, 1.0, "behind"),
-        (0.5, 0.0, "no way"),
-        (0.5, -1.0, "no way"),
-        (0.5, 0.15, "no way"),  # on the robot already
-        (0.5, math.inf, "no way"),
-        (0.5, math.nan, "no way"),
+        (math.radians(91.0), 1.0, "in front"),
+        (-math.pi, 1.0, "in front"),
+        (math.nan, 1.0, "in front"),
+        (0.5, 0.0, "a distance"),
+        (0.5, -1.0, "a distance"),
+        (0.5, 0.15, "a distance"),  # on the robot already
+        (0.5, math.inf, "a distance"),
+        (0.5, math.nan, "a distance"),
     ],
 )
 def test_targets_that_there_is_no_circle_to(bearing, distance, match):
@@ -47,7 +47,7 @@ def test_targets_that_there_is_no_circle_to(bearing, distance, match):
 
 
 def test_texts_that_are_no_targets():
-    with pytest.raises(ParameterError, match=r"is no target.*45 deg, 1\.3 m"):
+    with pytest.raises(ParameterError, match=r"must be a target.*45 deg, 1\.3 m"):
         Target.parse("45 deg")
     for text in ("45 deg, 1.3 s", "45 m, 1.3 m", "here, there"):
         with pytest.raises(UnitError, match="target"):

@@ -118,14 +118,20 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
     named = ["springs.adjustable[0]=true", "springs.softest=9 N*mm/deg"]
     found = driver(ROBOT.set_from_text(named), VARIABLE)
     assert found.controller.softest == pytest.approx(0.5157, abs=1e-4)
-    assert ["out of its reach" in each for each in found.remarks] == [True]
+    assert ["are out of reach" in each for each in found.remarks] == [True]
     assert ["no actuator" in each for each in ready.remarks] == [True]
 
 
 @pytest.mark.parametrize(
     ("changed", "strategy", "spring", "error", "words"),
     [
-        (["springs.adjustable=false"], "variable", None, ParameterError, "the first spring has no actuator"),
+        (
+            ["springs.adjustable=false"],
+            "variable",
+            None,
+            ParameterError,
+            "must be true: strategy variable sets the first spring",
+        ),
         (
             ["legs.half_width=0.3 m"],
             "variable",
@@ -135,7 +141,7 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
         ),
         (["legs.half_width=0.3 m"], "actuated", None, AnalysisError, "no pitchfork"),
         ([], "pitchfork", None, ParameterError, "strategy pitchfork needs one stiffness"),
-        ([], "variable", 0.3, ParameterError, "no spring to choose"),
+        ([], "variable", 0.3, ParameterError, "sets its own springs"),
     ],
 )
 def test_what_cannot_be_driven_is_refused(changed, strategy, spring, error, words):
@@ -177,7 +183,7 @@ def test_a_strategy_of_ones_own_is_a_class(ready):
     assert mine.remarks == ("a softer second spring", f"circles of {ready.law.tightest:.1f} m")
     (record,) = drive(mine, NEAR).records
     assert 0.0 < np.abs(record.leg_yaw).max() <= 0.5 * LegYawController().limit
-    with pytest.raises(ParameterError, match="strategy mine needs the robot's radius law"):
+    with pytest.raises(ParameterError, match="must be the radius law of the robot for strategy mine"):
         mine.strategy.prepare(ROBOT)
     own = mine.strategy.prepare(ROBOT, controller=LegYawController())
     assert own.controller == LegYawController()

@@ -71,10 +71,10 @@ def test_a_twin_that_cannot_stand_has_no_creep():
     ("more", "match"),
     [
         ({"repeats": 0}, "must be positive"),
-        ({"repeats": 2}, "alike without a seed"),
-        ({"joint_angles": (0.1, 0.2)}, "are 2 angles; allowed: 5, or one for all"),
-        ({"joint_angles": (-1.6,)}, "bent too far"),
-        ({"joint_angles": (float("nan"),)}, "bent too far"),
+        ({"repeats": 2}, "must be 1 without a seed"),
+        ({"joint_angles": (0.1, 0.2)}, "must be one angle for each joint, not 2; allowed: 5, or one for all"),
+        ({"joint_angles": (-1.6,)}, "must be smaller"),
+        ({"joint_angles": (float("nan"),)}, "must be smaller"),
         ({"engine": "plana"}, "did you mean 'planar'"),
     ],
 )

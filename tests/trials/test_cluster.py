@@ -232,9 +232,9 @@ def test_records_are_the_same_to_the_bit_wherever_they_walk(cluster, tmp_path):
 def test_a_stranger_on_this_machine_is_refused(cluster):
     address = cluster._client.cluster.scheduler_address
     assert address.startswith("tls://127.0.0.1:")
-    with pytest.raises(ClusterError, match=r"does not answer|is none"):
+    with pytest.raises(ClusterError, match=r"does not answer|must be a dask scheduler"):
         Cluster(address)
-    with pytest.raises(ClusterError, match=r"does not answer|is none"):
+    with pytest.raises(ClusterError, match=r"does not answer|must be a dask scheduler"):
         Cluster(address.replace("tls:", "tcp:"))
     with pytest.raises((OSError, RuntimeError)):
         distributed.Client(address, security=distributed.Security.temporary(), timeout=2)
@@ -248,7 +248,7 @@ def test_a_worker_with_another_text_of_a_controller_is_refused(cluster, controll
     own = importlib.import_module(name)
     file.write_text(file.read_text().replace("gain = 1", "gain = 2"))
     asked = [replace(BASE, duration=0.7, controller=own.Another(str(tmp_path / "log")))]
-    with pytest.raises(ClusterError, match=rf"the code of {name}:Another, or of what it imports, is another"):
+    with pytest.raises(ClusterError, match=rf"the code of {name}:Another, or of what it imports, differs between"):
         run(asked, tmp_path / "kept" if folder else None, executor=cluster)
     assert not list(tmp_path.glob("kept/*"))
 
@@ -322,7 +322,7 @@ def test_a_scheduler_that_is_killed_ends_in_one_line_and_loses_nothing(scheduler
             process.kill()
             process.wait()
 
-    with waited_for_workers(address) as there, pytest.raises(ClusterError, match="the scheduler went away"):
+    with waited_for_workers(address) as there, pytest.raises(ClusterError, match="the scheduler was lost"):
         run(TRIALS, folder, kill, there)
     assert resumed_as_if_nothing_was(folder, uninterrupted) > moment * len(TRIALS)
 
@@ -332,7 +332,7 @@ def waited_for_workers(address):
         try:
             return Cluster(address)
         except ClusterError as error:
-            if "has no workers" not in str(error):
+            if "must have at least one worker" not in str(error):
                 raise
             return None
 
@@ -360,7 +360,7 @@ def test_an_interrupted_client_says_so_and_leaves_no_process(tmp_path):
 
 def test_a_batch_that_kills_its_workers_is_named_when_all_else_is_done(cluster, controllers, tmp_path):
     deadly = replace(BASE, duration=3.0, seed=77, controller=controllers.Deadly(""))
-    with pytest.raises(ClusterError, match=r"again and again.*planar, aoi2022-planar, 3 s, seeds 77$"):
+    with pytest.raises(ClusterError, match=r"repeatedly.*planar, aoi2022-planar, 3 s, seeds 77$"):
         run([deadly, *TRIALS[:20]], tmp_path, executor=cluster)
     assert set(written(tmp_path)) == {trial.file_name for trial in TRIALS[:20]}
 

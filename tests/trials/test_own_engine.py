@@ -116,14 +116,14 @@ def test_it_walks_and_turns_from_the_command_line(folder):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("own_engines:Sketch", "is a class"),
-        ("own_engines:silent", "its traits are no chilopod.engine.Traits"),
-        ("own_engines:three", "it has no traits"),
+        ("own_engines:Sketch", "must be an object, not a class"),
+        ("own_engines:silent", "its traits must be a chilopod.engine.Traits"),
+        ("own_engines:three", "attribute traits is missing"),
         ("own_engines:three.x", "has no three.x"),
         ("own_engines:thre", "did you mean 'three'"),
         ("leaves:engine", "cannot be imported: SystemExit: 3"),
         ("nowhere:engine", "cannot be imported: ModuleNotFoundError"),
-        ("own_engines", "there is no such engine"),
+        ("own_engines", "must be one of the engines"),
     ],
 )
 def test_an_engine_that_is_none_is_named(folder, name, words):
@@ -135,9 +135,9 @@ def test_an_engine_that_is_none_is_named(folder, name, words):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("lazy", "start gave no"),
-        ("old", "it has no aim, halt"),
-        ("shared", "no hash"),
+        ("lazy", "start must return a"),
+        ("old", "missing: aim, halt"),
+        ("shared", "a hashable value"),
         ("raising", "ZeroDivisionError: no floor"),
     ],
 )

@@ -73,7 +73,7 @@ def test_what_cannot_be_described_walks_and_is_not_kept(tmp_path, caplog):
     assert [record.attrs.get("not kept") for record in run(asked, tmp_path)] == [None] * 3
     assert not tmp_path.exists() or not list(tmp_path.iterdir())
     (said,) = [each.message for each in caplog.records]
-    assert "Locked: its trials walk and are not kept: Locked.lock: an object of type lock, which cannot be" in said
+    assert "Locked: its trials run but are not kept: Locked.lock: an object of type lock, which cannot be" in said
 
 
 COUNT, STATE = [0], [0.0]
@@ -99,7 +99,11 @@ def test_a_controller_that_does_not_repeat_itself_is_not_kept(controller, tmp_pa
     assert [each.status.item() for each in records] == ["walked"] * 2
     assert list(tmp_path.iterdir()) == []
     (said,) = [each.message for each in caplog.records]
-    reason = "changes while it steers" if isinstance(controller, Remembering) else "when it sees the same again"
+    reason = (
+        "changes while it steers"
+        if isinstance(controller, Remembering)
+        else "equal observations give different commands"
+    )
     assert reason in said
 
 
@@ -118,7 +122,9 @@ def test_a_controller_whose_state_changes_after_the_first_cycle_is_not_kept(tmp_
     for seed in range(2):
         run([Trial(PLANAR, 2.0, seed, controller=Late())], tmp_path)
     assert list(tmp_path.iterdir()) == []
-    assert {"what its code can reach changes while it steers" in each.message for each in caplog.records} == {True}
+    assert {"an object that its code can reach changes while it steers" in each.message for each in caplog.records} == {
+        True
+    }
 
 
 CHANCE = """
@@ -201,7 +207,7 @@ def test_what_answers_otherwise_in_every_process_walks_and_is_not_kept(body, tmp
     assert record.status.item() == "walked"
     assert len(list((tmp_path / "kept").iterdir())) == (body in DETERMINED)
     (said,) = [each.message for each in caplog.records] or [""]
-    assert (f": {BY_CHANCE[body]}, which answers otherwise every time" in said) if body in BY_CHANCE else said == ""
+    assert (f": {BY_CHANCE[body]}, whose result varies from call to call" in said) if body in BY_CHANCE else said == ""
 
 
 @dataclass(frozen=True)

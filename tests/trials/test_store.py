@@ -172,7 +172,7 @@ def test_a_link_is_followed_and_itself_moved_aside(store, record, tmp_path):
     assert elsewhere.read_bytes() == b"mine"
     path.symlink_to(tmp_path / "nowhere")
     assert store.read(BASE) is None
-    assert "leads nowhere" in store.told[-1]
+    assert "is a link to a missing file" in store.told[-1]
     assert names(store) == [f"{path.name}.aside", f"{path.name}.aside2"]
 
 
@@ -197,7 +197,7 @@ def test_what_this_process_cannot_read_for_a_moment_stays(store, record, monkeyp
 
 
 def test_a_record_of_another_trial_is_not_written(store, record):
-    with pytest.raises(OutputError, match="another trial"):
+    with pytest.raises(OutputError, match="must belong to this trial"):
         store.write(dataclasses.replace(BASE, seed=4), record)
     assert not store.folder.exists()
 

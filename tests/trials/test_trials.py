@@ -78,7 +78,7 @@ def test_a_trial_of_the_twin_is_not_one_of_the_planar_model():
 def test_an_engine_that_is_not_there_or_does_not_know_the_robot_is_refused():
     with pytest.raises(ParameterError, match="did you mean 'twin'"):
         Trial(WHOLE, 1.0, engine="twn")
-    with pytest.raises(ParameterError, match="this robot has none"):
+    with pytest.raises(ParameterError, match="must be given in the robot file"):
         Trial(ROBOT, 1.0, engine="twin")
     with pytest.raises(ParameterError, match="poses"):
         Trial(ROBOT, 1.0, poses=True)

@@ -1,4 +1,4 @@
-"""The robot's verbs in the planar theory: when the straight walk holds, what it gives way to, and how that turns."""
+"""Analyses in the planar theory: stability of the straight walk, its bifurcations, and the curved walks beyond them."""
 
 from typing import TYPE_CHECKING
 

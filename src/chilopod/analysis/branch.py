@@ -1,6 +1,6 @@
-"""Curved walks: the branch of periodic orbits that leaves the straight walk at its pitchfork, and how it turns.
+"""Curved walks: the branch of periodic orbits that leaves the straight walk at its pitchfork.
 
-The paper's linear analysis ends at the pitchfork; this follows the nonlinear model beyond it.
+The paper's linear analysis ends at the pitchfork; this module follows the nonlinear model beyond it.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from chilopod.stability.spectrum.errors import VERDICTS
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
-"""Tolerance of the nonlinear flow along a branch; orbits are good to 1e-10 (the tests hold 1e-9 against 1e-14)."""
+"""Tolerance of the nonlinear flow along a branch; orbits are accurate to 1e-10 (the tests compare 1e-9 with 1e-14)."""
 
 VERSION = 2
-"""Version of the file of a branch: goes up whenever its data mean something else, or would go on in another way."""
+"""Version of the file of a branch, increased whenever the meaning of its data or their continuation changes."""
 
 GRAVITY = 9.80665
-"""m/s^2, standard."""
+"""Standard gravity, m/s^2."""
 
 _SUFFIX = {
     "axis_radius": "m",
@@ -49,7 +49,13 @@ _SUFFIX = {
 }
 _STABLE = {VERDICTS[stable]: stable for stable in VERDICTS}
 
-_SAME = ("body", "springs", "legs", "gait", "ground")  # what must agree for a branch to go on; names may differ
+_SAME = (
+    "body",
+    "springs",
+    "legs",
+    "gait",
+    "ground",
+)  # properties that must agree to continue a branch; names may differ
 
 
 def curved_walks(
@@ -69,14 +75,14 @@ def curved_walks(
     robot, parameter
         Robot, and dotted path of a spring, such as ``springs.stiffness[0]``.
     between
-        Interval in SI units; the pitchfork must lie in it, and the branch ends where it leaves it.
+        Interval in SI units that contains the pitchfork; the branch ends where it leaves the interval.
     points, longest
-        At most so many points along the branch, special ones not counted, and largest distance between two of them
-        along the curve, over orbit (SI units) and parameter (over the width of the interval).
+        Largest number of points along the branch, without special ones, and largest distance between two of them along
+        the curve, over orbit (SI units) and parameter (over the width of the interval).
     side
         +1: positive joint angles, a right turn; -1: the mirror image.
     progress
-        Called with the part done (0 to 1) and a few words.
+        Function of the fraction done (0 to 1) and a few words.
 
     Returns
     -------
@@ -89,9 +95,9 @@ def curved_walks(
     ``leg_power`` (means over a period), ``cost_of_transport`` (leg power over weight times speed), ``orbit`` over
     (point, state) and ``tangent`` over (point, component).
 
-    Attributes hold what the branch goes on from (:func:`resumed`), and of the pitchfork its ``criticality`` by the
-    normal form, its ``coefficient`` (1/rad^2), the ``direction`` in which the branch leaves it, and whether that
-    ``direction_confirms`` the verdict.
+    Attributes hold the state for :func:`resumed`, and for the pitchfork its ``criticality`` by the normal form, its
+    ``coefficient`` (1/rad^2), the ``direction`` in which the branch leaves it, and ``direction_confirms``, True if that
+    agrees with the verdict.
 
     Raises
     ------
@@ -131,30 +137,34 @@ def resumed(
     side: int | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Follow a branch on from where it ends.
+    """Continue a branch from its end.
 
     Parameters
     ----------
     data
-        From :func:`curved_walks`, from here, or from :func:`read_walks`.
+        Branch from :func:`curved_walks`, :func:`resumed` or :func:`read_walks`.
     robot, parameter, side
-        Those of the branch (``side`` None is not compared); what the robot has for the parameter does not matter.
+        Robot, parameter and side of the branch (``side`` None is not compared); the robot's own value of the parameter
+        does not matter.
     between, points, longest, progress
         As for :func:`curved_walks`; the interval is by default that of the branch.
 
     Returns
     -------
-    The dataset with the new points behind; the same points as if they had been followed at once.
+    Dataset with the new points at its end, equal to those of a single run.
 
     Raises
     ------
     ParameterError
-        If the branch is another robot's, of another parameter or side, or has left the interval.
+        If the branch belongs to another robot, parameter or side, or has left the interval.
     """
     saved = Robot(**tomllib.loads(data.attrs["robot_toml"]))
     if data.attrs["varied"] != parameter:
         raise ParameterError(
-            "is not what the saved branch varies", field="parameter", value=parameter, allowed=data.attrs["varied"]
+            "must be the parameter that the saved branch varies",
+            field="parameter",
+            value=parameter,
+            allowed=data.attrs["varied"],
         )
     value = float(data.parameter_si[0])
     here, there = robot.with_value(parameter, value), saved.with_value(parameter, value)
@@ -164,17 +174,17 @@ def resumed(
                 f"the saved branch belongs to another robot: {name} differs", field="robot", value=robot.name
             )
     if side is not None and side != data.attrs["side"]:
-        raise ParameterError("the saved branch turns to the other side", field="side")
+        raise ParameterError("must be the side to which the saved branch turns", field="side")
     between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
     (low, high), end = sorted(between), float(data.parameter_si[-1])
     ended = data.attrs["ending"] == Ending.LEFT_INTERVAL.label and end in (low, high)
     if ended or not low <= end <= high:
         unit = robot.unit_of(parameter)
         raise ParameterError(
-            "does not hold the saved branch's last point, beyond which nothing is left to follow",
+            "must contain the last point of the saved branch",
             field="between",
             value=interval_text(robot, parameter, (low, high)),
-            allowed=f"an interval with {units.format(end, unit, digits=6)} in it",
+            allowed=f"an interval that contains {units.format(end, unit, digits=6)}",
         )
     branch = proceed(
         _followed(saved, parameter),
@@ -191,12 +201,12 @@ def resumed(
 
 
 def read_walks(path: str | Path) -> xr.Dataset:
-    """A branch from the netCDF file that it was written to.
+    """Read a branch from its netCDF file.
 
     Raises
     ------
     ParameterError
-        If there is no such file, it is not as it was written, or another version wrote it.
+        If the file is missing, damaged or edited, or written by another version.
     """
     path = Path(path)
     try:
@@ -206,7 +216,7 @@ def read_walks(path: str | Path) -> xr.Dataset:
     except UnsoundError as error:
         raise ParameterError(str(error), source=str(path)) from None
     if data.attrs.get("version") != VERSION:
-        raise ParameterError("holds no branch of curved walks, or that of another version", source=str(path))
+        raise ParameterError("must hold a branch of curved walks of this version of chilopod", source=str(path))
     return data
 
 
@@ -255,7 +265,7 @@ def _shown(robot: Robot, parameter: str, points: int, progress: Progress) -> Cal
 
 
 def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch) -> dict[str, Any]:
-    """The normal form's verdict on the pitchfork, and whether the branch goes that way."""
+    """The normal form's verdict on the pitchfork, and the check against the direction of the branch."""
     make, critical = family(robot, parameter), fork.point.value
     gone = next((point.value for point in branch.points[1:] if point.value != critical), critical)
 
@@ -265,7 +275,7 @@ def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch
         nu = found.values if found.half_period is None else found.half_period
         return float(np.abs(nu[np.abs(nu - fork.point.multiplier).argmin()]))
 
-    # Supercritical: the curved walks are where the straight one has given way.
+    # Supercritical: the curved walks exist where the straight one is unstable.
     beyond = largest(gone) > largest(2.0 * critical - gone)
     direction = Criticality.SUPERCRITICAL if beyond else Criticality.SUBCRITICAL
     verdict = fork.point.criticality
@@ -278,7 +288,7 @@ def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch
 
 
 def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
-    """The branch that a dataset was made from, to the last bit."""
+    """Branch of a dataset, to the last bit."""
     kinds = {kind.label: kind for kind in Kind}
     multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
     units = np.append(sizes, float(data.attrs["scale"]))
@@ -308,7 +318,7 @@ def _walked(
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
     verdicts = [
-        # At a special point a multiplier is 1, to which side of it round-off has it says nothing.
+        # At a special point a multiplier is 1, and round-off decides its side.
         Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[None if point.special else point.stable]
         for most, point in zip(means.most_bent, points, strict=True)
     ]

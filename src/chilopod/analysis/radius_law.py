@@ -1,4 +1,4 @@
-"""The radius of the settled curved walk over the first spring, of any robot whose straight walk ends in a pitchfork."""
+"""Radius of the settled curved walk over the first spring, for a robot whose straight walk ends in a pitchfork."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
 
 _BETWEEN = (1.0 / 20.0, 3.0)
-"""Interval, relative to the stiffest spring, in which the pitchfork of the first one is looked for."""
+"""Interval, relative to the stiffest spring, in which the pitchfork of the first spring is searched."""
 
 
 @dataclass(frozen=True)
 class RadiusLaws(Short):
-    """Radii over k1 by the paper's measure (N-1) L / sum |theta|, with mean angles (``axis``), and by the path that
-    module 1 really walks; and the branch that they come from, of left turns."""
+    """Radii over k1 by the paper's measure (N-1) L / sum |theta|, with mean angles (``axis``), and by the actual path
+    of module 1; and the branch of left turns that they come from."""
 
     axis: RadiusLaw
     path: RadiusLaw
     walks: xr.Dataset
 
     def k_hat(self, radius: float) -> tuple[float, float]:
-        """The springs for a radius (m) by both laws, N*mm/deg."""
+        """Springs for a radius (m) by both laws, N*mm/deg."""
         by_axis, by_path = (units.from_si(law.value(radius), PAPER_UNIT) for law in (self.axis, self.path))
         return by_axis, by_path
 
@@ -44,12 +44,12 @@ class RadiusLaws(Short):
 
 
 def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
-    """The laws from the branch of curved walks, from the pitchfork down to where a joint bends by a right angle.
+    """Compute the laws from the branch of curved walks, from the pitchfork down to a bend of a right angle in a joint.
 
     Raises
     ------
     AnalysisError
-        If the straight walk has no pitchfork in the first spring, or the curved walks beside it are no law.
+        If the straight walk has no pitchfork in the first spring, or the curved walks beside it give no law.
     """
     stiffest = max(robot.springs.stiffness)
     low, high = (part * stiffest for part in _BETWEEN)

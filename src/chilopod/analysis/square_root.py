@@ -1,8 +1,8 @@
-"""Where a pitchfork is, from trials beside it: the square-root law that the paper fits to its robot's walks.
+"""Location of a pitchfork from trials beside it, by the square-root law that the paper fits to its robot's walks.
 
 Beside a supercritical pitchfork the bend grows as |angle| = a sqrt(1/k - 1/kc). The law is the first term of a series:
-it holds near the point only, so a fit over a wide range of springs is off however many trials there are, and what its
-error bars say of repeated trials does not cover that.
+it holds near the point only, so a fit over a wide range of springs has a systematic error, which the error bars of
+repeated trials do not cover.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from chilopod.errors import AnalysisError, ParameterError
 Array = NDArray[np.float64]
 
 RESAMPLED = 1000
-"""Sets of trials that the bootstrap draws by default."""
+"""Default number of bootstrap samples."""
 
 _GRID = 2000
 _CLOSEST, _FARTHEST = 1e-3, 0.999  # to the springs fitted: of their distance, and on the way to an infinite kc
@@ -31,11 +31,11 @@ class SquareRootFit:
     Attributes
     ----------
     critical, error
-        The spring kc, in the unit of the springs that were fitted; its standard error from the covariance of the least
-        squares: what the residuals say, lack of fit included, as if they were independent and of one size.
+        The spring kc, in the unit of the fitted springs; its standard error from the covariance of the least squares,
+        which treats the residuals, lack of fit included, as independent and of equal variance.
     bootstrap_error
-        Its standard error from drawing trials anew at every spring: how well another set of trials at the same springs
-        would repeat it, whatever the law; NaN where every spring has one trial only, or none are drawn.
+        Standard error of kc by resampling the trials at every spring: the reproducibility for another set of trials at
+        the same springs, whatever the law; NaN if every spring has only one trial, or without resampling.
     amplitude, residual
         Amplitude, in the unit of the angles times the root of that of the springs; root mean square of the residuals.
     trials
@@ -50,7 +50,7 @@ class SquareRootFit:
     trials: int
 
     def angle(self, inverse: ArrayLike) -> Array:
-        """The law at values of 1/k; zero on the stiff side."""
+        """Angle of the law at values of 1/k; zero on the stiff side."""
         return self.amplitude * _root(np.asarray(inverse, dtype=np.float64), 1.0 / self.critical)
 
 
@@ -63,30 +63,32 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
         1/k of every trial, positive, equal for trials at one spring, and their mean angles, whose sign is ignored,
         shape (trials,).
     resampled, seed
-        Number of times that trials are drawn anew for the bootstrap, 0 for none, and seed of the drawing.
+        Number of bootstrap samples, 0 for none, and their seed.
 
     Raises
     ------
     ParameterError
-        If the arrays do not go together.
+        If the arrays differ in shape or are not finite.
     AnalysisError
         If the trials do not determine the point: fewer than three, at fewer than two springs that bend, or with angles
         that do not fall towards it.
     """
     x, y = np.asarray(inverse, dtype=np.float64), np.abs(np.asarray(angle, dtype=np.float64))
     if x.ndim != 1 or x.shape != y.shape:
-        raise ParameterError("must be one for each spring", field="angle", value=y.shape, allowed=f"{x.shape}")
+        raise ParameterError("must have one value for each spring", field="angle", value=y.shape, allowed=f"{x.shape}")
     if not (np.isfinite(y).all() and (x > 0.0).all() and np.isfinite(x).all()):
-        raise ParameterError("must be finite, and the springs positive", field="angle")
+        raise ParameterError("must be finite, and every spring must be positive", field="angle")
     bent = np.unique(x[y > 0.0])
     if x.size < 3 or bent.size < 2:
-        raise AnalysisError("two springs that bend and three trials are the least", field="angle", value=bent.size)
+        raise AnalysisError(
+            "must come from at least two springs that bend the robot and three trials", field="angle", value=bent.size
+        )
     # Given 1/kc the amplitude follows, so only 1/kc is searched: at least two springs have to lie beyond it.
     grid = bent[-2] - np.geomspace(_CLOSEST * (bent[-1] - bent[-2]), _FARTHEST * bent[-2], _GRID)
     basis = _root(x, grid[:, None])
     best = int(_lost(basis, y[:, None])[:, 0].argmin())
     if best in (0, len(grid) - 1):
-        raise AnalysisError("the angles do not fall to zero as a square root: they determine no point", field="angle")
+        raise AnalysisError("must fall to zero as a square root of the distance to the pitchfork", field="angle")
     found = minimize_scalar(
         lambda at: _lost(_root(x, at)[None], y[:, None])[0, 0],
         bounds=(grid[best + 1], grid[best - 1]),
@@ -99,7 +101,7 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
     residuals = y - amplitude * root
     beyond = root > 0.0
     slopes = np.stack([root[beyond], -0.5 * amplitude / root[beyond]], axis=1)
-    # Trials on the stiff side say nothing of how far the law is off: they do not count.
+    # Trials on the stiff side carry no information about the error of the law and do not count.
     spread = float(residuals[beyond] @ residuals[beyond]) / max(int(beyond.sum()) - 2, 1)
     covariance = spread * np.linalg.inv(slopes.T @ slopes)
     return SquareRootFit(
@@ -117,13 +119,13 @@ def _root(inverse: Array, critical: ArrayLike) -> Array:
 
 
 def _lost(basis: Array, angles: Array) -> Array:
-    """Sum of squares that the best amplitude leaves, shape (values of 1/kc, sets of trials), for the law without its
+    """Sum of squared residuals for the best amplitude, shape (values of 1/kc, sets of trials), for the law without its
     amplitude, shape (values, trials), and angles, shape (trials, sets)."""
     return (angles**2).sum(axis=0) - (basis @ angles) ** 2 / (basis**2).sum(axis=1, keepdims=True)
 
 
 def _bootstrap(x: Array, y: Array, grid: Array, basis: Array, resampled: int, seed: int) -> float:
-    """Standard error of kc when trials are drawn anew at every spring."""
+    """Bootstrap standard error of kc, with trials resampled at every spring."""
     if resampled < 2:
         return float("nan")
     rng = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""Stability of the straight walk of a robot, and where it changes with a parameter, in the robot's own terms."""
+"""Stability of the straight walk of a robot, and its bifurcations as a parameter varies."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
 
     @property
     def moduli(self) -> NDArray[np.float64]:
-        """By what every mode has grown after one period, shape (2N+1,)."""
+        """Growth factor of every mode over one period, shape (2N+1,)."""
         return read_only(np.exp(self.exponents.values.real * self.robot.gait.period))
 
     def as_json(self) -> dict[str, Any]:
@@ -129,7 +129,7 @@ class WalkBifurcation(Summary, ReadOnlyArrays):
     @property
     def error_bound(self) -> float:
         """Bound on the error of ``value``, in ``unit``."""
-        # The difference of two values, in case a unit had an offset, is what an error is.
+        # An error is a difference of two values, even in a unit with an offset.
         return abs(units.from_si(self.point.error_bound, self.unit))
 
     def as_json(self) -> dict[str, Any]:
@@ -185,11 +185,11 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
     Raises
     ------
     AnalysisError
-        If it is expected to take longer than ``longest`` (s), as of a hundred modules or of very light ones.
+        If the expected time exceeds ``longest`` (s), as for a hundred modules or very light ones.
     """
     model = PlanarModel(robot)
     # The period is cut into parts that contract by a factor of 1e6 at most, and matrices of this size are split along
-    # them: an estimate of the time that this takes, good to a factor of two on a desk of today.
+    # them: this estimates the time within a factor of two on a present desktop.
     # Of a long chain the estimate itself takes minutes; one of fewer, heavier modules contracts less.
     enough = min(robot.body.modules, _ENOUGH)
     contraction = PlanarModel(robot.with_value("body.modules", float(enough))).contraction
@@ -200,7 +200,7 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
             f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
             f"out {contraction:.3g} e-folds a period or more"
         )
-        allowed = f"what takes about {_duration(longest)}: fewer modules, or longer and heavier ones"
+        allowed = f"about {_duration(longest)}: fewer modules, or longer and heavier ones"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules, allowed=allowed)
     found = stability.exponents(model)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
@@ -221,9 +221,9 @@ def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
     ParameterError
         If the parameter does not vary continuously.
     """
-    robot.unit_of(parameter)  # refuses what is no parameter
+    robot.unit_of(parameter)  # refuses an unknown parameter
     if parameter == "body.modules":
-        raise ParameterError("is a whole number, not a continuous parameter", field="parameter", value=parameter)
+        raise ParameterError("must be a continuous parameter, not a whole number", field="parameter", value=parameter)
     # Where the symmetry of the gait itself changes, only the full period means the same on both sides.
     symmetric = parameter != "gait.side_phase"
     return lambda value: PlanarModel(robot.with_value(parameter, value), use_symmetry=symmetric)
@@ -248,9 +248,10 @@ def bifurcations(
     normal_form
         True to compute the coefficients and verdicts.
     remark
-        Called with a sentence for what leaves open whether these are all points.
+        Function that receives a sentence for every reason why points may be missing.
     seconds
-        Time after which the search ends with what it has; motion far from a robot's scales may be slow to follow.
+        Time after which the search ends with the points found so far; motion far from a robot's scales may be slow to
+        follow.
 
     Returns
     -------
@@ -275,12 +276,12 @@ def bifurcations(
 def first_loss(
     robot: Robot, parameter: str, between: tuple[float, float], kind: Kind, normal_form: bool = True
 ) -> WalkBifurcation:
-    """The bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down.
+    """Bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down.
 
     Raises
     ------
     AnalysisError
-        If it is not of the kind asked for, or there is none.
+        If there is no bifurcation, or it is of another kind.
     """
     for low in np.geomspace(between[1], between[0], 5)[1:]:
         # From the stiff end down, so that points far below, where the walk is unstable anyway, cost nothing.
@@ -303,7 +304,7 @@ def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) ->
 
 
 def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:
-    """The pitchfork in k1, searched where the paper's springs are."""
+    """Pitchfork in k1, searched in the range of the paper's springs."""
     return first_loss(robot, K1, (stiffness(2.0), stiffness(75.0)), Kind.PITCHFORK, normal_form)
 
 

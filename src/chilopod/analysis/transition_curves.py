@@ -1,4 +1,4 @@
-"""Where the straight walk of a robot changes, in the plane of two of its parameters, and in their units."""
+"""Curves of bifurcations of the straight walk in the plane of two parameters, in their units."""
 
 from __future__ import annotations
 
@@ -80,11 +80,11 @@ def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float
         If one does not vary continuously, or both are the same.
     """
     if parameters[0] == parameters[1]:
-        raise ParameterError("must be two", field="parameters", value=parameters)
+        raise ParameterError("must be two parameters", field="parameters", value=parameters)
     for parameter in parameters:
-        robot.unit_of(parameter)  # refuses what is no parameter
+        robot.unit_of(parameter)  # refuses an unknown parameter
         if parameter == "body.modules":
-            raise ParameterError("is a whole number, not a continuous parameter", field="parameters", value=parameter)
+            raise ParameterError("must be continuous, not a whole number", field="parameters", value=parameter)
     symmetric = "gait.side_phase" not in parameters
     first, second = parameters
     return lambda p, q: PlanarModel(robot.with_value(first, p).with_value(second, q), use_symmetry=symmetric)
@@ -101,8 +101,7 @@ def transition_curve(
     longest: float = 0.05,
     progress: Progress = silent,
 ) -> TransitionCurve:
-    """The curve on which the straight walk changes, through the topmost such point at one value of the second
-    parameter.
+    """Follow the curve of bifurcations through the topmost such point at one value of the second parameter.
 
     Parameters
     ----------
@@ -113,14 +112,14 @@ def transition_curve(
     kind, second
         Kind of the bifurcation; value of the second parameter (SI) at which the first is searched.
     points, longest
-        At most so many points in each direction; largest step, in units of ``between``.
+        Largest number of points in each direction; largest step, in units of ``between``.
     progress
-        Called with how many points there are.
+        Function that receives the number of points so far.
 
     Raises
     ------
     AnalysisError
-        If there is no such bifurcation to start from.
+        If there is no such bifurcation at the start.
     """
     family = family2(robot, parameters)
     there = robot.with_value(parameters[1], second)

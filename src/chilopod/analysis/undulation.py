@@ -1,9 +1,9 @@
-"""Undulating walks: what the straight walk gives way to when all springs are softened together.
+"""Undulating walks, which replace the straight walk when all springs are softened together.
 
 At the Neimark-Sacker point a pair of multipliers leaves the unit circle and the body begins to swing at a second
-frequency. Here the nonlinear model runs until that has settled, for several springs below the point, and is held
-against what the normal form predicts there: an amplitude that grows as the square root of the distance, and a
-frequency that moves in proportion to it.
+frequency. The nonlinear model runs until the undulation has settled, for several springs below the point. The result is
+compared with the normal form: the amplitude grows as the square root of the distance, and the frequency changes in
+proportion to it.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 DISTANCES = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
-"""1 - k/k* of the springs looked at by default."""
+"""Default distances 1 - k/k* of the springs."""
 
 TOLERANCE = 1e-8
-"""Tolerance of the nonlinear flow; orbits are good to about a tenth of it, and the amplitude is a few degrees."""
+"""Tolerance of the nonlinear flow; orbits are accurate to about a tenth of it, and the amplitude is a few degrees."""
 
 _SETTLING = 6.0  # e-folds of the slowest disturbance, that of the amplitude
 _MEASURED = 1000  # periods
@@ -48,7 +48,7 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     robot, distances
         Robot, whose springs do not matter; 1 - k/k* of the springs, each above 0 and below 1.
     progress
-        Called as the simulation goes on.
+        Function that receives the progress.
 
     Returns
     -------
@@ -68,11 +68,11 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     """
     for distance in distances:
         if not 0.0 < distance < 1.0:
-            raise ParameterError("must be above 0 and below 1", field="distances", value=distance)
+            raise ParameterError("must be more than 0 and less than 1", field="distances", value=distance)
     loss = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER)
     point = loss.point
     if point.criticality is not Criticality.SUPERCRITICAL:
-        raise AnalysisError("is not supercritical: no small undulation grows from it", field="Neimark-Sacker point")
+        raise AnalysisError("must be supercritical for an undulation to grow from it", field="Neimark-Sacker point")
     ks = [point.value * (1.0 - distance) for distance in distances]
     models = [FollowedModel(robot.with_value(ALL, k), TOLERANCE) for k in ks]
     expected = [_expected(model, point) for model in models]
@@ -121,7 +121,7 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
 
 @dataclass(frozen=True)
 class _Expected:
-    """The normal form at a spring: fixed radius and turn per period, and the mode they are measured along."""
+    """Normal form at a spring: fixed radius and turn per period, and the mode along which they are measured."""
 
     orbit: Array
     multiplier: complex
@@ -142,7 +142,7 @@ def _expected(model: FollowedModel, point: BifurcationPoint) -> _Expected:
     mu = complex(spec.values[index])
     square = (1.0 - abs(mu)) / point.coefficient
     if not square > 0.0:
-        raise AnalysisError("the straight walk is stable here", field=ALL)
+        raise AnalysisError("the straight walk must be unstable for an undulation to grow", field=ALL)
     turn = float(np.angle(mu)) + point.rotation * square
     return _Expected(orbit, mu, spec.right[:, index], spec.left[:, index], float(np.sqrt(square)), turn)
 
@@ -156,7 +156,7 @@ def _settled(models: list[FollowedModel], expected: list[_Expected], progress: P
     slowest = min(2.0 * np.log(abs(each.multiplier)) for each in expected)
     settling = int(np.ceil(_SETTLING / slowest))
     if settling > _LONGEST:
-        raise AnalysisError("too close to the point: the undulation takes too long to settle", field="distances")
+        raise AnalysisError("must be larger: near the point the undulation settles too slowly", field="distances")
     recorded = np.empty((len(models), _MEASURED, models[0].dimension))
     for count in range(-settling, _MEASURED):
         if count >= 0:

@@ -1,8 +1,9 @@
-"""The contract between what walks and what steers: engines, walks that go on step by step, controllers.
+"""Contract between engines and controllers: engines start walks, which advance step by step, and controllers steer
+them.
 
-``contract`` says what everybody may rely on, ``actuators`` does what a command asks for within the robot's limits,
-``targets`` knows where targets are and were, ``loop`` lets a controller steer a walk, ``named`` finds engines and
-controllers by name, ``one_thread`` keeps a walk to one thread at a time, ``check`` tries an engine's promises.
+``contract`` defines the contract, ``actuators`` carries out commands within the robot's limits, ``targets`` keeps the
+positions of targets, ``loop`` lets a controller steer a walk, ``named`` finds engines and controllers by name,
+``one_thread`` keeps a walk to one thread at a time, and ``check`` tests an engine against the contract.
 """
 
 from chilopod.engine.actuators import Actuators

@@ -1,4 +1,4 @@
-"""Commands of a batch of robots, and what its actuators make of them: limits, ramps, lag, and a log of it all.
+"""Actuators of a batch of robots under commands: limits, ramps, lag, and a log of the setpoints.
 
 One object serves one walk of any engine. It knows the stiffness of every spring at every moment in closed form, so that
 an engine can integrate the ramp itself: a commanded stiffness is first held within the range of its actuator, then
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SINCE, FROM, SLOPE, UNTIL, GOAL, RAMPING, SETTLING = range(7)
-"""Rows of :attr:`Actuators.profile`: when the command came (s), where the ramp began (N*m/rad), its slope (N*m/rad/s),
-when it ends (s) and where; and what is left of the lag at its beginning and at its end (N*m/rad)."""
+"""Rows of :attr:`Actuators.profile`: time of the command (s), start of the ramp (N*m/rad), its slope (N*m/rad/s), its
+end in time (s) and in stiffness (N*m/rad); and the remaining lag at its start and at its end (N*m/rad)."""
 
 _MOST_YAW = 0.5 * np.pi
 _SAME_INSTANT = 1e-9  # s
-_SAME = 1e-9  # relative: a spring that is told the stiffness it has
+_SAME = 1e-9  # relative tolerance of the stiffness commanded to a spring that is not adjustable
 
 
 class Actuators:
@@ -47,12 +47,12 @@ class Actuators:
     robots
         One a walk.
     keep
-        True to keep what was commanded, for :meth:`add_to`.
+        True to log the setpoints, for :meth:`add_to`.
 
     Attributes
     ----------
     joint_torque
-        Commanded, N*m, shape (robots, N-1).
+        Commanded joint torque, N*m, shape (robots, N-1).
     profile
         Stiffness over time since the last command: the rows named above, shape (7, robots, N-1).
     lag
@@ -86,39 +86,43 @@ class Actuators:
 
     @property
     def leg_yaw(self) -> Array:
-        """Last commanded, rad, shape (robots, 2)."""
+        """Leg yaw that was last commanded, rad, shape (robots, 2)."""
         return self._leg_yaw.goal
 
     @property
     def adjustable(self) -> bool:
-        """True if any spring of any robot is."""
+        """True if any spring of any robot is adjustable."""
         return bool(self._adjustable.any())
 
     def command(self, time: float, command: Command, walking: NDArray[np.bool_]) -> None:
-        """Obey, from now on; robots that no longer walk do not. What is no command raises ParameterError and changes
-        nothing.
+        """Follow a command from now on, for robots that still walk; an invalid command raises ParameterError and
+        changes nothing.
 
         Parameters
         ----------
         time
-            s, not before that of the last command.
+            Time of the command, s, not before the last one.
         command
             Command of each actuator.
         walking
             Shape (robots,).
         """
         if not isinstance(command, Command):
-            raise ParameterError("is no chilopod.engine.Command", field="command", value=type(command).__name__)
+            raise ParameterError("must be a chilopod.engine.Command", field="command", value=type(command).__name__)
         within = as_number("command.within", command.within)
         if not 0.0 <= within <= LONGEST:
-            raise ParameterError("is no time", field="command.within", value=within, allowed=f"0 to {LONGEST:g} s")
+            raise ParameterError(
+                "must be a duration in s", field="command.within", value=within, allowed=f"0 to {LONGEST:g} s"
+            )
         within = within if within >= _SAME_INSTANT else 0.0
         yaw = self._rows("leg_yaw", command.leg_yaw, 2, walking)
         stiffness = self._rows("stiffness", command.stiffness, self.lag.shape[1], walking)
         torque = self._rows("joint_torque", command.joint_torque, self.lag.shape[1], walking)
         if yaw is not None and (np.abs(yaw[walking]) > _MOST_YAW).any():
             worst = float(np.abs(yaw[walking]).max())
-            raise ParameterError("is too far", field="command.leg_yaw", value=worst, allowed="up to a right angle, rad")
+            raise ParameterError(
+                "must be at most a right angle", field="command.leg_yaw", value=worst, allowed="-pi/2 to pi/2 rad"
+            )
         if stiffness is not None:
             self._check(stiffness, walking)
             self._soften(time, stiffness, walking, within)
@@ -134,7 +138,7 @@ class Actuators:
             self._log.append(when | what)
 
     def restart(self, which: NDArray[np.bool_]) -> None:
-        """Let some robots, shape (robots,), be as at the start; only where nothing is kept of what was commanded."""
+        """Reset some robots, shape (robots,), to the start; only without a log of setpoints."""
         profile, driven = self.profile.copy(), self.driven & ~which
         profile[:, which] = 0.0
         profile[FROM, which] = profile[GOAL, which] = self._start[which]
@@ -156,7 +160,7 @@ class Actuators:
         return _rate(self.profile, self.lag, time)
 
     def add_to(self, data: xr.Dataset) -> None:
-        """Add to a record, in place, what was commanded, and the springs: over time if any of them can be adjusted."""
+        """Add setpoints and springs to a record, in place; springs over time if any spring is adjustable."""
         over = ("robot", "joint")
         if not self.adjustable:
             data["stiffness"] = (over, self._start.copy(), {"units": "N*m/rad"})
@@ -172,18 +176,18 @@ class Actuators:
         data["command_torque"] = (("event", *over), self._logged("command_torque"), {"units": "N*m"})
 
     def leg_yaw_over(self, times: Array) -> Array:
-        """Leg yaw as commanded at any times of the walk, rising, rad, shape (times, robots, 2)."""
+        """Leg yaw on its ramps at any rising times of the walk, rad, shape (times, robots, 2)."""
         return self._leg_yaw.over(times)
 
     def leg_yaw_told(self, times: Array) -> Array:
-        """Leg yaw that was last commanded before any times of the walk, rad, shape (times, robots, 2)."""
-        told = np.concatenate(
+        """Setpoint of leg yaw at any rising times of the walk, rad, shape (times, robots, 2)."""
+        setpoints = np.concatenate(
             [np.zeros((1, *self.leg_yaw.shape)), self._logged("command").reshape(-1, *self.leg_yaw.shape)]
         )
-        return told[np.searchsorted(self._logged("event"), times, side="left")]
+        return setpoints[np.searchsorted(self._logged("event"), times, side="left")]
 
     def state(self) -> dict[str, Array]:
-        """All there is to it, for :meth:`restore`."""
+        """Complete state, for :meth:`restore`."""
         logged = {f"log_{name}": self._logged(name) for name in (self._log[0] if self._log else ())}
         history = {
             "profile_times": np.array([time for time, _ in self._profiles]),
@@ -194,7 +198,7 @@ class Actuators:
         return {**now, **yaw, **history, **logged}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Become as another was, of the same robots."""
+        """Take over the state of actuators of the same robots."""
         self.joint_torque, self.driven, self.profile = state["joint_torque"], state["driven"], state["profile"]
         self._leg_yaw.restore(part(state, "yaw_"))
         self._profiles = list(zip(state["profile_times"].tolist(), state["profiles"], strict=True))
@@ -213,7 +217,9 @@ class Actuators:
             raise ParameterError("has the wrong shape", field=f"command.{name}", value=array.shape, allowed=str(shape))
         rows = np.array(np.broadcast_to(array, shape))
         if not np.isfinite(rows[walking]).all():
-            raise ParameterError("must be finite", field=f"command.{name}", allowed="numbers for all that still walk")
+            raise ParameterError(
+                "must be finite", field=f"command.{name}", allowed="finite numbers for every robot that still walks"
+            )
         return rows
 
     def _check(self, stiffness: Array, walking: NDArray[np.bool_]) -> None:
@@ -237,7 +243,7 @@ class Actuators:
         reference = _reference(self.profile, time)
         length = np.maximum(within, np.abs(wanted - reference) / self._fastest)
         length[length < _SAME_INSTANT] = 0.0
-        # What is told the goal that it has already goes on, but is there no later than it is now told to be.
+        # A ramp that is given its old goal again goes on, and arrives no later than the new command demands.
         changed = self._adjustable & walking[:, None] & ((wanted != present) | (time + length < self.profile[UNTIL]))
         if not changed.any():
             return
@@ -248,7 +254,7 @@ class Actuators:
         if self.lag.any():
             now = self.stiffness(time)
             begun[RAMPING] = now - reference + slope * self.lag
-            # As exactly for a lag much longer than the ramp.
+            # This form is as exact for a lag much longer than the ramp.
             caught_up = slope * self.lag * _decay_less_one(length, self.lag)
             begun[SETTLING] = np.where(moves, (now - reference) * _decay(length, self.lag) + caught_up, now - goal)
         self.profile = np.where(changed, begun, self.profile)
@@ -261,7 +267,7 @@ class Actuators:
 
     def _stiffness_over(self, times: Array) -> Array:
         values = np.repeat(self._start[None], len(times), axis=0)
-        # A sample at the very moment of a command is from before it.
+        # A sample at the time of a command precedes the command.
         edges = np.searchsorted(times, [start for start, _ in self._profiles] + [np.inf], side="right")
         for (_, profile), first, last in zip(self._profiles, edges[:-1], edges[1:], strict=True):
             if last > first:
@@ -285,13 +291,13 @@ def _decay_less_one(time: Array, lag: Array) -> Array:
 
 
 def _reference(profile: Array, time: Any) -> Array:
-    """Where the ramp is."""
+    """Value of the ramp."""
     ramp = profile[FROM] + profile[SLOPE] * (time - profile[SINCE])
     return np.where(time < profile[UNTIL], ramp, profile[GOAL])
 
 
 def _behind(profile: Array, lag: Array, time: Any) -> Array:
-    """How far the stiffness is from where it would be had the ramp always been as it is."""
+    """Transient of the stiffness: its distance from the steady response to the ramp."""
     ramping = time < profile[UNTIL]
     since = time - np.where(ramping, profile[SINCE], profile[UNTIL])
     return np.where(ramping, profile[RAMPING], profile[SETTLING]) * _decay(since, lag)

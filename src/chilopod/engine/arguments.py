@@ -1,4 +1,4 @@
-"""Checks of arguments that all engines share; each raises ParameterError, naming the argument, where it is wrong."""
+"""Checks of arguments that all engines share; each raises a ParameterError that names the argument."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from chilopod.robot import Robot
 Array = NDArray[np.float64]
 
 BEGINNING = 1e-9
-"""Part of a gait cycle by which a time may miss its beginning: rounding of whole multiples of the period."""
+"""Tolerance of a time at the beginning of a gait cycle, relative to the cycle: rounding of whole multiples of the
+period."""
 
 
 def as_array(name: str, value: object) -> Array:
@@ -27,11 +28,11 @@ def as_array(name: str, value: object) -> Array:
             raise TypeError
         return array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError("is no array of numbers", field=name, value=value) from None
+        raise ParameterError("must be an array of numbers", field=name, value=value) from None
 
 
 def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
-    """Whole numbers, zero or more; None for None."""
+    """Seeds as a list of whole numbers, zero or more; None for None."""
     if seeds is None:
         return None
     try:
@@ -39,18 +40,18 @@ def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
     except TypeError:
         whole = []
     if not whole or min(whole) < 0:
-        raise ParameterError("must be whole numbers, one a walk", field=name, value=seeds, allowed="0 or more")
+        raise ParameterError("must be whole numbers, one for each walk", field=name, value=seeds, allowed="0 or more")
     return whole
 
 
 def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
-    """An array of True and False, one each; a copy."""
+    """Copy of an array of truth values, one for each robot."""
     try:
         marks = np.array(value)
     except (TypeError, ValueError):
         marks = np.empty(0)
     if marks.dtype != np.bool_ or marks.shape != (count,):
-        raise ParameterError("marks nothing", field=name, value=value, allowed=f"True or False, {count} of them")
+        raise ParameterError("must be truth values", field=name, value=value, allowed=f"{count} of True or False")
     return marks
 
 
@@ -58,26 +59,28 @@ def as_robots(robots: object) -> list[Robot]:
     """One robot or several as a list."""
     given = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(each, Robot) for each in given):
-        raise ParameterError("is no robot, nor several of them", field="robots", value=type(robots).__name__)
+        raise ParameterError("must be a Robot or a sequence of Robots", field="robots", value=type(robots).__name__)
     if not given:
-        raise ParameterError("there are none", field="robots", allowed="at least one")
+        raise ParameterError("must not be empty", field="robots", allowed="at least one robot")
     return list(given)
 
 
 def as_robot(robot: object) -> Robot:
     """One robot."""
     if not isinstance(robot, Robot):
-        raise ParameterError("is no robot", field="robot", value=type(robot).__name__, allowed="a chilopod Robot")
+        raise ParameterError("must be a Robot", field="robot", value=type(robot).__name__, allowed="a chilopod Robot")
     return robot
 
 
 def check_wishes(record: object, expected: object) -> float:
     """Duration of a walk, s, checked together with what an engine is to record."""
     if not isinstance(record, Recording | None):
-        raise ParameterError("is none", field="record", value=record, allowed="a chilopod.record.Recording, or None")
+        raise ParameterError(
+            "must be a Recording or None", field="record", value=record, allowed="a chilopod.record.Recording, or None"
+        )
     seconds = as_number("expected", expected)
     if not 0.0 <= seconds <= LONGEST:
-        raise ParameterError("is no time", field="expected", value=expected, allowed=f"0 to {LONGEST:g} s")
+        raise ParameterError("must be a duration in s", field="expected", value=expected, allowed=f"0 to {LONGEST:g} s")
     return seconds
 
 
@@ -95,7 +98,7 @@ def standing(
     ):
         if not fits:
             raise ParameterError(
-                "has the wrong shape", field=name, value=array.shape, allowed=f"{allowed}, or one each"
+                "has the wrong shape", field=name, value=array.shape, allowed=f"{allowed}, or one for each walk"
             )
         if not (np.abs(array) <= LARGEST).all():
             raise ParameterError("must be finite", field=name, allowed=f"numbers up to {LARGEST:g}")
@@ -104,7 +107,7 @@ def standing(
     try:
         (count,) = np.broadcast_shapes(angles.shape[:1], headings.shape, places.shape[:1])
     except ValueError:
-        raise ParameterError("do not agree in number", field="joint_angles, heading, position") from None
+        raise ParameterError("must have the same number of walks", field="joint_angles, heading, position") from None
     return (
         np.array(np.broadcast_to(angles, (count, joints))),
         np.array(np.broadcast_to(headings, (count,))),
@@ -122,15 +125,15 @@ def rows_of(
     Parameters
     ----------
     robots
-        One, or one a walk.
+        One robot, or one for each walk.
     arguments
-        By name: what was given, and the shape of one row. What is called ``friction`` must be positive.
+        Value given and shape of one row, by name. The argument ``friction`` must be positive.
     seeds
-        One, or one a walk.
+        One seed, or one for each walk.
 
     Returns
     -------
-    Number of walks, and the arrays, each its own copy; None for what was not given.
+    Number of walks, and copies of the arrays; None for an argument that was not given.
     """
     counts = {"robots": len(robots), "seeds": len(seeds) if seeds else 1}
     arrays: dict[str, Array | None] = {}
@@ -142,7 +145,9 @@ def rows_of(
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
             allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
             raise ParameterError("has the wrong shape", field=name, value=array.shape, allowed=allowed)
-        largest = np.finfo(float).max if name == "initial" else LARGEST  # a state may be one that diverges
+        largest = (
+            np.finfo(float).max if name == "initial" else LARGEST
+        )  # the state of a walk that diverges may be larger
         if not (np.abs(array) <= largest).all():
             raise ParameterError("must be finite", field=name, allowed=f"numbers up to {largest:g}")
         if name == "friction" and not (array > 0.0).all():
@@ -167,7 +172,7 @@ def rows_anew(
     arguments: Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]],
     seeds: object = None,
 ) -> tuple[NDArray[np.bool_], dict[str, Array | None]]:
-    """Arguments of ``restart`` as arrays with one row for each robot that is put on the floor anew.
+    """Arguments of ``restart`` as arrays with one row for each restarted robot.
 
     Parameters
     ----------
@@ -180,16 +185,18 @@ def rows_anew(
 
     Returns
     -------
-    Which robots, and the arrays; None for what was not given, or if there are no such robots.
+    Mask of the robots, and the arrays; None for an argument that was not given, or if the mask is empty.
     """
     marked, cycles = as_marks("which", which, len(robots)), time / robots[0].gait.period
     if record is not None:
         raise ParameterError(
-            "a record is of one walk", field="restart", allowed="a walk that was started with record=None"
+            "must be False for a walk that is recorded: a record covers one walk",
+            field="restart",
+            allowed="a walk that was started with record=None",
         )
     if abs(cycles - round(cycles)) > BEGINNING:
         allowed = f"a whole multiple of the period, {robots[0].gait.period:g} s"
-        raise ParameterError("is in the middle of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
+        raise ParameterError("must be the end of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
     count, own = int(marked.sum()), as_seeds(seeds)
     if own is not None and len(own) != count:
         raise ParameterError("has the wrong length", field="seeds", value=len(own), allowed=str(count))
@@ -202,10 +209,10 @@ def rows_anew(
 
 
 def check_time(until: float, now: float) -> float:
-    """The time to walk on to, s; refuses to walk back, and beyond all reason."""
+    """Time to advance to, s; refuses times in the past and times beyond ``LONGEST``."""
     until = as_number("until", until)
     if not now <= until <= LONGEST:
-        problem = "has passed" if until < now else "is no time"
+        problem = "must not lie before the time of the walk" if until < now else "must be a time in s"
         raise ParameterError(
             problem, field="until", value=f"{until:g} s", allowed=f"{now:g} s or later, at most {LONGEST:g} s"
         )

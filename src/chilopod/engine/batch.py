@@ -1,4 +1,4 @@
-"""Part of a walk that our own engines share: how it begins, its robots, actuators and targets, and how it is saved."""
+"""Part of a walk that the engines of chilopod share: its beginning, robots, actuators, targets and saving."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _Kind = TypeVar("_Kind", bound="BatchWalk")
 
 
 class Beginning(NamedTuple):
-    """Beginning of a batch of walks: robots and states, one a walk, shape (walks, n); factors on the friction of every
-    foot, shape (walks, N, 2); targets, m, shape (walks, 2), and seeds, or None."""
+    """Beginning of a batch of walks: robots, states, shape (walks, n), factors on the friction of every foot, shape
+    (walks, N, 2), and targets, m, shape (walks, 2), and seeds, or None for either."""
 
     robots: Sequence[Robot]
     states: Array
@@ -44,10 +44,10 @@ def begin(
     target: ArrayLike | None,
     seeds: Sequence[int] | None,
 ) -> Beginning:
-    """Arguments of ``start``, see :class:`chilopod.engine.Engine`, with one row a walk.
+    """Arguments of ``start``, see :class:`chilopod.engine.Engine`, with one row for each walk.
 
-    Robots that go together are one, or one a walk. ``standing`` is the state of a robot that has none given, shape (1,
-    n), ``size`` the length of one that has.
+    ``robots`` has one robot, or one for each walk. ``standing`` is the default state, shape (1, n), and ``size`` the
+    length of a state.
     """
     feet, noise = (robots[0].body.modules, 2), as_seeds(seeds)
     arguments = {"initial": (initial, (size,)), "friction": (friction, feet), "target": (target, (2,))}
@@ -63,7 +63,7 @@ def begin(
 
 
 def resumed(traits: Traits, saved: bytes, make: Callable[[Beginning, Recording | None, float], _Kind]) -> _Kind:
-    """A walk that :meth:`BatchWalk.save` saved; ``make`` is called with beginning, record and tolerance."""
+    """Walk that :meth:`BatchWalk.save` saved; ``make`` builds it from beginning, record and tolerance."""
     robots, settings, arrays = unpack(traits, saved)
     with read_back():
         begun = Beginning(robots, arrays["states"], arrays["factors"], None, as_seeds(settings.get("seeds")))
@@ -74,7 +74,7 @@ def resumed(traits: Traits, saved: bytes, make: Callable[[Beginning, Recording |
 
 
 class BatchWalk(Walk):
-    """Robots, actuators, targets and time of a walk; a sample of its record takes so many ``numbers``."""
+    """Robots, actuators, targets and time of a walk; a sample of its record has ``numbers`` numbers."""
 
     def __init__(
         self,
@@ -96,12 +96,12 @@ class BatchWalk(Walk):
 
     @property
     def robots(self) -> tuple[Robot, ...]:
-        """One a walk."""
+        """Robots of the batch, one for each walk."""
         return self._robots
 
     @property
     def time(self) -> float:
-        """Time that was asked for, s."""
+        """Time that the walk has been advanced to, s."""
         return self._time
 
     def save(self) -> bytes:
@@ -117,7 +117,7 @@ class BatchWalk(Walk):
         return pack(self.traits, self._robots, settings, arrays)
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
-        """Become as the walk was that was saved, of the same robots."""
+        """Take over the state of a saved walk of the same robots."""
         self._time = as_number("time", settings["time"])
         self._actuators.restore(part(arrays, "told_"))
         self._targets.restore(part(arrays, "target_"))
@@ -126,7 +126,7 @@ class BatchWalk(Walk):
         return resumed, (self.traits, self.save(), self._maker())
 
     def _maker(self) -> Any:
-        """Function that makes such a walk of beginning, record and tolerance."""
+        """Function that builds such a walk from beginning, record and tolerance."""
         return type(self)
 
     def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -134,10 +134,12 @@ class BatchWalk(Walk):
         raise NotImplementedError
 
     def _observation(self, bearing: Array, distance: Array, joint_angles: Array) -> Observation:
-        told = self._actuators
-        return Observation(self._time, bearing, distance, joint_angles, told.leg_yaw.copy(), told.stiffness(self._time))
+        actuators = self._actuators
+        return Observation(
+            self._time, bearing, distance, joint_angles, actuators.leg_yaw.copy(), actuators.stiffness(self._time)
+        )
 
     def _finish(self, data: xr.Dataset, times: Array) -> None:
-        """Add outcome, target and attributes to a record with all else."""
+        """Add outcome, target and attributes to a record that has everything else."""
         add_outcome(data, [each.label for each in self.status], self._targets.recorded(times))
         data.attrs = {"engine": self.traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}

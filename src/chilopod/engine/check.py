@@ -1,4 +1,4 @@
-"""Tries the promises of the contract on any engine, as Gymnasium's ``check_env`` does for environments."""
+"""Checker of the engine contract, comparable to Gymnasium's ``check_env`` for environments."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from chilopod.errors import AnalysisError
 from chilopod.record import MOTION, QUANTITIES
 from chilopod.robot import Robot
 
-_HUGE = 1e4  # N*m: no joint withstands it
+_HUGE = 1e4  # N*m: beyond what any joint withstands
 
 
 def check_engine(engine: Engine, robot: Robot, seed: int = 0) -> tuple[str, ...]:
-    """Try whether an engine keeps what :mod:`chilopod.engine.contract` promises; takes a few walks of two seconds.
+    """Check an engine against the promises of :mod:`chilopod.engine.contract` with a few walks of two seconds.
 
     Parameters
     ----------
     engine
         A module such as :mod:`chilopod.planar`, or an object.
     robot
-        One that it knows. Its springs are made adjustable for some of the walks.
+        A robot that the engine can walk. Its springs are made adjustable for some of the walks.
     seed
-        Seed of the odd instants at which the walks are interrupted.
+        Seed of the random instants at which the walks are interrupted.
 
     Returns
     -------
-    The promises that were tried, and kept.
+    Promises that were tested and kept.
 
     Raises
     ------
     AnalysisError
-        At the first that is broken: which, and what was seen instead.
+        At the first broken promise; the message says what happened instead.
     """
     trial = Trial(engine, robot, np.random.default_rng(seed))
     for promise, attempt in _PROMISES.items():
@@ -51,8 +51,8 @@ def check_engine(engine: Engine, robot: Robot, seed: int = 0) -> tuple[str, ...]
 def _traits(trial: Trial) -> None:
     traits = trial.engine.traits
     expect(isinstance(traits, Traits), f"traits are a {type(traits).__name__}")
-    expect(traits.name and traits.sentence, "it has no name or no sentence")
-    expect(traits.a_core >= 1 and traits.a_round >= 1 and traits.haste > 0.0, "numbers of traits are not positive")
+    expect(traits.name and traits.sentence, "name and sentence must not be empty")
+    expect(traits.a_core >= 1 and traits.a_round >= 1 and traits.haste > 0.0, "numbers of traits must be positive")
     expect(trial.engine.common(trial.robot) == trial.engine.common(trial.robot), "common changes from call to call")
     hash(trial.engine.common(trial.robot))
 
@@ -60,23 +60,26 @@ def _traits(trial: Trial) -> None:
 def _sight(trial: Trial) -> None:
     walk = trial.start(seeds=None)
     missing = missing_parts(walk)
-    expect(not missing, f"start gives no Walk: it has no {', '.join(missing)}")
-    expect(walk.robots == trial.robots, "robots are not those it was given")
-    expect(walk.time == 0.0 and set(walk.status) == {Status.WALKED}, "a walk does not begin at 0 s, all walking")
+    expect(not missing, f"start must return a Walk; missing: {', '.join(missing)}")
+    expect(walk.robots == trial.robots, "robots differ from the given ones")
+    expect(walk.time == 0.0 and set(walk.status) == {Status.WALKED}, "a walk must begin at 0 s with the status WALKED")
     seen, count, joints = walk.observe(), len(trial.robots), trial.robot.body.modules - 1
     shapes = {"bearing": (count,), "distance": (count,), "leg_yaw": (count, 2)}
     shapes |= {"joint_angles": (count, joints), "stiffness": (count, joints)}
     for name, shape in shapes.items():
         array = getattr(seen, name)
         expect(array.shape == shape and array.dtype == np.float64, f"{name} has shape {array.shape}, not {shape}")
-    expect_near(seen.joint_angles, trial.bends, 1e-6, "joint_angles are not those it started with, rad")
+    expect_near(seen.joint_angles, trial.bends, 1e-6, "joint_angles at the start, rad")
     expect_near(seen.stiffness, np.array([each.springs.stiffness for each in trial.robots]), 1e-9, "stiffness, N*m/rad")
-    expect_near(seen.leg_yaw, np.zeros((count, 2)), 0.0, "leg_yaw is not 0 before a command")
+    expect_near(seen.leg_yaw, np.zeros((count, 2)), 0.0, "leg_yaw before a command, rad")
     away = np.array([0.9, 0.4]) - [0.2, -0.1]
     expect_near(seen.distance, np.full(count, np.hypot(*away)), 0.02, "distance of the target, m")
     expect_near(seen.bearing, np.full(count, np.arctan2(away[1], away[0]) - 0.3), 0.02, "bearing of the target, rad")
     nothing = trial.engine.start(trial.robot).observe()
-    expect(np.isnan(nothing.bearing).all() and np.isnan(nothing.distance).all(), "a target is seen where there is none")
+    expect(
+        np.isnan(nothing.bearing).all() and np.isnan(nothing.distance).all(),
+        "bearing or distance is finite without a target",
+    )
     for name in shapes:
         getattr(seen, name)[:] = 123.0
     again = walk.observe()
@@ -91,20 +94,25 @@ def _records(trial: Trial) -> None:
     named = *MOTION, "stiffness", "distance", "bearing", "command", "command_stiffness"
     for name, (dims, units, _) in ((name, QUANTITIES[name]) for name in named):
         expect(name in data, f"{name} is missing")
-        expect(data[name].dims == dims, f"{name} is over {data[name].dims}, not {dims}")
-        expect(data[name].attrs.get("units") == units, f"{name} is in {data[name].attrs.get('units')}, not {units}")
-    expect((data.sizes["robot"], data.sizes["joint"]) == (count, joints), "the record has other robots or joints")
+        expect(data[name].dims == dims, f"{name} has dimensions {data[name].dims}, not {dims}")
+        expect(data[name].attrs.get("units") == units, f"{name} has unit {data[name].attrs.get('units')}, not {units}")
+    expect(
+        (data.sizes["robot"], data.sizes["joint"]) == (count, joints),
+        "the record has a wrong number of robots or joints",
+    )
     expect_near(data.time.values, np.arange(101) / 50.0, 0.02, "time: 50 samples a second up to the end, s")
     expect_near(data.position.values[0], np.tile([0.2, -0.1], (count, 1)), 1e-6, "position at the start, m")
     expect_near(data.heading.values[0], np.full(count, 0.3), 1e-6, "heading at the start, rad")
     expect(data.status.values.tolist() == ["walked"] * count, f"status is {data.status.values.tolist()}")
     expect_near(data.event.values, np.array(TIMES), 1e-9, "event: the times of commands, s")
-    expect(data.attrs.get("engine") == trial.engine.traits.name, "the attribute engine is not the engine's name")
+    expect(data.attrs.get("engine") == trial.engine.traits.name, "the attribute engine differs from the engine's name")
     length = float(np.linalg.norm(data.position[-1, 0] - data.position[0, 0]))
     usual = END * trial.robot.gait.speed
-    expect(0.1 * usual < length < 3.0 * usual, f"in {END:g} s it went {length:.3g} m, the straight walk {usual:.3g} m")
+    expect(
+        0.1 * usual < length < 3.0 * usual, f"displacement in {END:g} s: {length:.3g} m, straight walk {usual:.3g} m"
+    )
     nothing = trial.walked(trial.start(record=None))
-    expect(nothing.sizes["time"] == 0, "without a record there are samples")
+    expect(nothing.sizes["time"] == 0, "a walk without a record has samples")
 
 
 def _determinism(trial: Trial) -> None:
@@ -115,7 +123,7 @@ def _splitting(trial: Trial) -> None:
     whole = trial.walked(trial.start())
     stops = np.round(trial.random.uniform(0.0, END, 40), 4)
     expect_same(
-        whole, trial.walked(trial.start(), stops=stops.tolist()), "in one piece and in forty, with looks between"
+        whole, trial.walked(trial.start(), stops=stops.tolist()), "one advance, and forty with observations between"
     )
 
 
@@ -130,16 +138,16 @@ def _batching(trial: Trial) -> None:
 def _saving(trial: Trial) -> None:
     def again(walk: Walk) -> Walk:
         same = trial.engine.resume(walk.save())
-        expect(same.time == walk.time, f"saved at {walk.time} s, it goes on at {same.time} s")
+        expect(same.time == walk.time, f"saved at {walk.time} s, resumed at {same.time} s")
         return same
 
     whole, times = trial.walked(trial.start()), np.round(trial.random.uniform(0.0, END, 5), 4).tolist()
     walk = trial.led(trial.start(), dict.fromkeys((*TIMES, *times, END), again))
     saved = walk.save()
-    expect_same(whole, walk.to_dataset(), "in one piece and saved and resumed")
+    expect_same(whole, walk.to_dataset(), "one run, and saved and resumed ones")
     expect_refused("a saved walk with a changed byte", lambda: trial.engine.resume(saved[:-9] + b"?" + saved[-8:]))
     expect_refused("half a saved walk", lambda: trial.engine.resume(saved[: len(saved) // 2]))
-    expect_refused("a saved walk that is none", lambda: trial.engine.resume(b"walk"))
+    expect_refused("bytes that are not a saved walk", lambda: trial.engine.resume(b"walk"))
 
 
 def _noise(trial: Trial) -> None:
@@ -149,10 +157,15 @@ def _noise(trial: Trial) -> None:
         return walk.observe().bearing
 
     none, some, same, others = seen(None), seen((1, 2, 3)), seen((1, 2, 3)), seen((4, 5, 6))
-    expect(np.array_equal(some, same, equal_nan=True), "the same seeds give another bearing")
+    expect(np.array_equal(some, same, equal_nan=True), "equal seeds give different bearings")
     noisy = trial.engine.traits.noisy
-    expect(np.array_equal(some, others, equal_nan=True) != noisy, f"noisy is {noisy}, and seeds say otherwise")
-    expect(np.array_equal(none, some, equal_nan=True) != noisy, f"noisy is {noisy}, and without seeds it is otherwise")
+    expect(
+        np.array_equal(some, others, equal_nan=True) != noisy,
+        f"noisy is {noisy}, which contradicts walks with different seeds",
+    )
+    expect(
+        np.array_equal(none, some, equal_nan=True) != noisy, f"noisy is {noisy}, which contradicts a walk without seeds"
+    )
 
 
 def _refusals(trial: Trial) -> None:
@@ -160,9 +173,9 @@ def _refusals(trial: Trial) -> None:
     walk.advance(TIMES[0])
     count, joints = len(trial.robots), trial.robot.body.modules - 1
     stiffness = np.array([each.springs.stiffness for each in trial.robots])
-    expect_refused("walking back", lambda: walk.advance(0.1))
-    expect_refused("walking on to NaN", lambda: walk.advance(float("nan")))
-    expect_refused("walking on for ever", lambda: walk.advance(float("inf")))
+    expect_refused("advancing to a past time", lambda: walk.advance(0.1))
+    expect_refused("advancing to NaN", lambda: walk.advance(float("nan")))
+    expect_refused("advancing to infinity", lambda: walk.advance(float("inf")))
     wrong: dict[str, Any] = {
         "three leg yaws": Command(leg_yaw=np.zeros((count, 3))),
         "leg yaw NaN": Command(leg_yaw=np.full((count, 2), np.nan)),
@@ -178,7 +191,7 @@ def _refusals(trial: Trial) -> None:
     }
     for what, command in wrong.items():
         expect_refused(what, partial(walk.command, command))
-    expect_same(whole, trial.walked(walk), "without and with commands that were refused")
+    expect_same(whole, trial.walked(walk), "without and with refused commands")
     fixed = trial.engine.start(trial.robot.override("springs.adjustable", False))
     softer = Command(stiffness=stiffness[:1] * 0.9)
     expect_refused("softening a spring that is not adjustable", lambda: fixed.command(softer))
@@ -201,7 +214,7 @@ def _springs(trial: Trial) -> None:
     walk.advance(1.5)
     expect_near(walk.observe().stiffness[:, 0], np.array([0.5 * first]), 1e-9, "softest 0.5 k after a command of 0.1 k")
     data = walk.to_dataset()
-    expect_near(data.command_stiffness.values[0], wanted, 1e-12, "command_stiffness: what was asked for")
+    expect_near(data.command_stiffness.values[0], wanted, 1e-12, "command_stiffness, N*m/rad")
     ramp = first * np.maximum(1.0 - 0.5 * data.time.values, 0.5)
     expect_near(data.stiffness.values[:, 0, 0], ramp, 1e-9, "stiffness over time, N*m/rad")
 
@@ -215,12 +228,14 @@ def _driving(trial: Trial) -> None:
     walk.advance(END)
     seen = walk.observe()
     expect(seen.joint_angles[0, 0] > 0.02, f"a torque of 0.2 k bends joint 1 by {seen.joint_angles[0, 0]:.3g} rad")
-    expect_near(seen.leg_yaw, np.array([[0.1, -0.05]]), 0.0, "leg_yaw is not what was commanded last")
+    expect_near(seen.leg_yaw, np.array([[0.1, -0.05]]), 0.0, "leg_yaw after the last command, rad")
     free = trial.engine.start(trial.robot)
     free.command(Command(joint_torque=push))
     free.command(Command(joint_torque=np.zeros((1, joints))))
     free.advance(END)
-    expect_near(free.observe().joint_angles, np.zeros((1, joints)), 0.05, "a torque that was taken back bends joints")
+    expect_near(
+        free.observe().joint_angles, np.zeros((1, joints)), 0.05, "joint_angles after a torque was set back to 0, rad"
+    )
 
 
 def _failures(trial: Trial) -> None:
@@ -241,40 +256,40 @@ def _failures(trial: Trial) -> None:
         return walk, before
 
     (good, _), (walk, before) = walked(0.0 * breaking), walked(breaking)
-    expect(walk.status[1] is not Status.WALKED, "joints were torn round by 10 kN*m and more, and it walks on")
-    expect(walk.status[0] is walk.status[2] is Status.WALKED, "the others of the batch have not walked to the end")
+    expect(walk.status[1] is not Status.WALKED, "a robot still walks after a joint torque of 10 kN*m and more")
+    expect(walk.status[0] is walk.status[2] is Status.WALKED, "the other robots of the batch must walk to the end")
     seen = walk.observe()
     for name in ("bearing", "distance", "joint_angles"):
-        expect(np.isnan(getattr(seen, name)[1]).all(), f"a robot that failed has {name}")
-    expect(np.array_equal(seen.leg_yaw[1], before.leg_yaw[1]), "a robot that failed obeys")
+        expect(np.isnan(getattr(seen, name)[1]).all(), f"a failed robot has a finite {name}")
+    expect(np.array_equal(seen.leg_yaw[1], before.leg_yaw[1]), "a failed robot follows commands")
     data, undisturbed = walk.to_dataset(), good.to_dataset()
     for name in [str(name) for name, values in data.data_vars.items() if values.dims[:2] == ("time", "robot")]:
         values = data[name].values[:, 1].reshape(data.sizes["time"], -1)
         known = np.isfinite(values).all(axis=1)
-        expect(known[: int(BREAKS * 50)].all(), f"{name} is NaN before it failed")
-        expect(np.isnan(values[~known]).all() and not known[-1], f"{name} is not NaN from where it failed on")
-        expect((np.diff(known.astype(int)) <= 0).all(), f"{name} comes back after it failed")
+        expect(known[: int(BREAKS * 50)].all(), f"{name} is NaN before the failure")
+        expect(np.isnan(values[~known]).all() and not known[-1], f"{name} is finite after the failure")
+        expect((np.diff(known.astype(int)) <= 0).all(), f"{name} is finite again after the failure")
         for i in (0, 2):
             same = np.array_equal(data[name].values[:, i], undisturbed[name].values[:, i], equal_nan=True)
-            expect(same, f"{name} of robot {i} is another where robot 1 fails")
+            expect(same, f"{name} of robot {i} changes when robot 1 fails")
 
 
 _PROMISES: dict[str, Callable[[Trial], None]] = {
-    "says what it is": _traits,
-    "sees in the units and shapes of the contract": _sight,
+    "has valid traits": _traits,
+    "observes in the units and shapes of the contract": _sight,
     "records under the names, units and dimensions of the contract": _records,
-    "gives the same bits twice": _determinism,
-    "gives the same bits however it is advanced and looked at": _splitting,
+    "repeats a walk to the bit": _determinism,
+    "gives the same bits for any advances and observations": _splitting,
     "gives the same bits alone and in a batch": _batching,
-    "goes on to the bit when saved and resumed": _saving,
-    "draws noise from its seeds alone": _noise,
-    "refuses what is no command, and is as before": _refusals,
-    "keeps springs within range and rate, and says so": _springs,
-    "turns joints and legs the way it is told": _driving,
-    "ends a robot that fails with a status and NaN, and walks on with the others": _failures,
-    "says where robots are, and looking changes nothing": places,
-    "shows targets that are moved, and walks on to the same bits": aims,
-    "halts robots for good, and walks on with the others to the same bits": halts,
-    "gives its states, from which another walk goes on as it does": states,
-    "puts robots on the floor anew, and walks on with the others to the same bits": restarts,
+    "continues to the bit when saved and resumed": _saving,
+    "draws noise only from its seeds": _noise,
+    "refuses invalid commands without a change": _refusals,
+    "keeps springs within range and rate, and records them": _springs,
+    "turns joints and legs as commanded": _driving,
+    "stops a failed robot with a status and NaN, without effect on the others": _failures,
+    "returns poses without a change of the walk": places,
+    "moves targets without a change of the motion": aims,
+    "halts robots finally, without effect on the others": halts,
+    "returns states from which another walk continues": states,
+    "restarts robots without effect on the others": restarts,
 }

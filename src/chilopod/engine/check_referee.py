@@ -1,4 +1,4 @@
-"""Tries what the contract promises to referees, who set tasks and steer nothing."""
+"""Checks of the promises of the contract to referees, which set tasks and do not steer."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from chilopod.engine.contract import Array, Command, Observation, Status, Walk
 from chilopod.record import Recording
 
 BREAKS = 0.6
-"""s: when something happens in the middle of trials."""
+"""Time of the event in the middle of the walks, s."""
 
 _STOPS = 0.98  # s: on a sample, on no command
-_NEAR = 1e-4  # rad and m, of what agrees to the tolerance of an integrator or solver, after two gait cycles
+_NEAR = 1e-4  # rad and m, after two gait cycles, of states that agree to the tolerance of an integrator or solver
 
 
 def places(trial: Trial) -> None:
-    """Where robots are, and were by their record."""
+    """Check that poses agree with the record."""
     walk = trial.start(target=None)
     start = np.tile([0.2, -0.1, 0.3], (len(trial.robots), 1))
     expect_near(walk.pose(), start, 1e-6, "pose at the start, m and rad")
@@ -33,12 +33,12 @@ def places(trial: Trial) -> None:
 
 
 def aims(trial: Trial) -> None:
-    """Targets that are moved, taken away and put up."""
+    """Check targets that are moved, removed and set."""
     here, there, nowhere = np.array([0.9, 0.4]), np.array([0.8, -0.5]), np.full(2, np.nan)
     where = np.stack([there, nowhere, here])
 
     def aimed(walk: Walk) -> Walk:
-        expect(np.isnan(walk.observe().bearing).all(), "a target is seen where there is none")
+        expect(np.isnan(walk.observe().bearing).all(), "the bearing is finite without a target")
         wrong: Any = (here[:1], np.full((len(where) + 1, 2), 1.0), here * np.inf, [np.nan, 1.0], "there", None)
         for target in wrong:
             expect_refused(f"the target {target}", partial(walk.aim, target))
@@ -49,29 +49,29 @@ def aims(trial: Trial) -> None:
         seen, pose = walk.observe(), walk.pose()
         away = where - pose[:, :2]
         bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[:, 2]
-        # A scanner's last look is from a moment ago.
+        # The last look of a scanner is older than the observation.
         expect_near(seen.distance, np.hypot(away[:, 0], away[:, 1]), 0.03, "distance of a target that was moved, m")
         expect_near(seen.bearing, bearing, 0.05, "bearing of a target that was moved, rad")
         expect_near(seen.distance[2:], before.distance[2:], 0.0, "distance of a target that stayed, m")
         return walk
 
     still = trial.walked(trial.start())
-    expect("target" not in trial.walked(trial.start(target=None)), "the record has a target where there is none")
+    expect("target" not in trial.walked(trial.start(target=None)), "the record of a walk without a target has one")
     data = trial.led(trial.start(target=None), {BREAKS: aimed}).to_dataset()
     over = ("time", "robot", "axis")
     expect("target" in data, "the record has no target")
-    expect(data.target.dims == over, f"target is over {data.target.dims}, not {over}")
+    expect(data.target.dims == over, f"target has dimensions {data.target.dims}, not {over}")
     count = int((data.time.values <= BREAKS).sum())
     moved = np.concatenate([np.full((count, *where.shape), np.nan), np.tile(where, (data.sizes["time"] - count, 1, 1))])
     expect_near(data.target.values, moved, 0.0, "target over time, m")
     away = moved - data.position.values
     expect_near(data.distance.values, np.hypot(away[..., 0], away[..., 1]), 1e-9, "distance over time, m")
     for name in ("position", "heading", "joint_angle", "stiffness"):
-        expect(data[name].equals(still[name]), f"{name} is another where the target is moved")
+        expect(data[name].equals(still[name]), f"{name} changes when the target is moved")
 
 
 def halts(trial: Trial) -> None:
-    """One of three, then all."""
+    """Check a halt of one robot of three, then of all."""
 
     def halted(walk: Walk) -> Walk:
         wrong: Any = ([1], np.ones(len(trial.robots)), np.ones(len(trial.robots) + 1, dtype=bool), None)
@@ -92,29 +92,27 @@ def halts(trial: Trial) -> None:
     last = round(_STOPS * 50.0)
     for name in ("position", "heading", "joint_angle", "distance"):
         found, wanted = data[name].values, free[name].values
-        expect(np.array_equal(found[:last, 1], wanted[:last, 1]), f"{name} is another before it was halted")
-        # At the very moment, or in the step of it, it may be either.
-        expect(np.isnan(found[last + 2 :, 1]).all(), f"{name} is not NaN from where it was halted on")
+        expect(np.array_equal(found[:last, 1], wanted[:last, 1]), f"{name} of a halted robot changes before the halt")
+        # At the time of the move, or within its step, either target is valid.
+        expect(np.isnan(found[last + 2 :, 1]).all(), f"{name} is finite after the halt")
         for i in (0, 2):
-            expect(np.array_equal(found[:, i], wanted[:, i]), f"{name} of robot {i} is another where 1 is halted")
+            expect(np.array_equal(found[:, i], wanted[:, i]), f"{name} of robot {i} changes when robot 1 is halted")
     walk.halt(np.ones(len(trial.robots), dtype=bool))
     walk.advance(END + 0.1)
     expect(set(walk.status) == {Status.HALTED}, "robots walk on that were halted")
-    expect(np.isnan(walk.to_dataset().heading.values[-1]).all(), "robots that were halted are recorded")
+    expect(np.isnan(walk.to_dataset().heading.values[-1]).all(), "halted robots have finite records")
 
 
 def states(trial: Trial) -> None:
-    """They are what ``start`` takes."""
+    """Check that ``start`` accepts the states of a walk."""
     walk, period = trial.start(seeds=None), trial.robot.gait.period
     walk.advance(period)
     walk.halt(np.array([False, True, False]))
     now = walk.states()
     expect(len(now) == len(trial.robots) and now.ndim == 2, f"states have shape {now.shape}")
-    expect(
-        np.isnan(now[1]).all() and np.isfinite(now[[0, 2]]).all(), "states of who was halted, and only theirs, are NaN"
-    )
+    expect(np.isnan(now[1]).all() and np.isfinite(now[[0, 2]]).all(), "states must be NaN for halted robots only")
     again = trial.engine.start(trial.robots[2], initial=now[2], target=(0.9, 0.4), record=None)
-    expect(again.time == 0.0 and again.states().shape == (1, now.shape[1]), "states of the new walk have another shape")
+    expect(again.time == 0.0 and again.states().shape == (1, now.shape[1]), "states of the new walk have a wrong shape")
     for ahead in (0.0, 2.0 * period):
         walk.advance(period + ahead)
         again.advance(ahead)
@@ -124,38 +122,38 @@ def states(trial: Trial) -> None:
 
 
 def restarts(trial: Trial) -> None:
-    """One of three that are under way, after it was halted."""
+    """Check a restart of one robot of three that walk, after it was halted."""
     free, walk = (trial.start(seeds=None, record=None) for _ in range(2))
     period, one, none = trial.robot.gait.period, np.array([False, True, False]), np.zeros(3, dtype=bool)
     begin = trial.engine.initial_states(trial.robot, -trial.bends[1], 1.0, (0.5, 0.2))
-    firm, told = np.full((trial.robot.body.modules, 2), 1.2), trial.commands()
-    for number, command in enumerate(told):
+    firm, commands = np.full((trial.robot.body.modules, 2), 1.2), trial.commands()
+    for number, command in enumerate(commands):
         for each in (free, walk):
             each.advance((number + 0.4) * period)
             each.command(command)
-    expect_refused("putting robots on the floor in the middle of a cycle", partial(walk.restart, one, begin))
+    expect_refused("a restart in the middle of a gait cycle", partial(walk.restart, one, begin))
     recorded = trial.start(record=Recording(rate=50.0))
-    expect_refused("putting robots on the floor of a walk with a record", partial(recorded.restart, one, begin))
+    expect_refused("a restart of a walk with a record", partial(recorded.restart, one, begin))
     for each in (free, walk):
-        each.advance(len(told) * period)
+        each.advance(len(commands) * period)
     walk.halt(one)
     wrong: Any = (([1], begin), (one, begin[:, :-1]), (one, np.nan * begin), (one, np.tile(begin, (2, 1))))
     for which, initial in wrong:
         expect_refused(f"{which}, {initial} for a restart", partial(walk.restart, which, initial))
     expect_refused("friction 0", partial(walk.restart, one, begin, friction=0.0 * firm))
     walk.restart(none, begin)
-    expect(walk.status[1] is Status.HALTED, "a robot walks that was not put on the floor anew")
+    expect(walk.status[1] is Status.HALTED, "a robot walks that was not restarted")
     walk.restart(one, begin, firm)
     walk = trial.engine.resume(walk.save())
     fresh = trial.engine.start(trial.robots[1], initial=begin, friction=firm, target=(0.9, 0.4), record=None)
     later: list[Command | None] = [None, *trial.commands()[:2]]
     for number, then in enumerate(later):
-        for each, when in ((free, len(told)), (walk, len(told)), (fresh, 0)):
+        for each, when in ((free, len(commands)), (walk, len(commands)), (fresh, 0)):
             each.advance((number + when) * period)
             if then is not None:
                 each.command(_for_one(then) if each is fresh else then)
         expect(set(walk.status) == {Status.WALKED}, f"status is {walk.status}")
-        _expect_alike(walk, 1, fresh, "of a robot that was put on the floor anew and of one that has just started")
+        _expect_alike(walk, 1, fresh, "of a restarted robot and a freshly started one")
     for name in ("joint_angles", "leg_yaw", "stiffness", "bearing"):
         here, there = (getattr(each.observe(), name)[[0, 2]] for each in (walk, free))
         expect(np.array_equal(here, there), f"{name} of the others is another")
@@ -175,7 +173,7 @@ def _for_one(command: Command) -> Command:
 
 
 def _expect_alike(walk: Walk, robot: int, alone: Walk, whose: str) -> None:
-    """A robot of a batch that is where another is that walks alone."""
+    """Check that a robot of a batch is at the position of a robot that walks alone."""
     seen, other = walk.observe(), alone.observe()
     for name, unit in (("joint_angles", "rad"), ("leg_yaw", "rad"), ("stiffness", "N*m/rad")):
         expect_near(getattr(seen, name)[robot], getattr(other, name)[0], _NEAR, f"{name} {whose}, {unit}")

@@ -1,4 +1,4 @@
-"""The walks with which an engine's promises are tried, and what is expected of them."""
+"""Walks that test an engine's promises, and comparisons of their results."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TIMES = (0.35, 0.8, 1.3)
-"""s, of the commands that every trial gets."""
+"""Times of the commands of every walk, s."""
 
 END = 2.0
-"""s, of every trial."""
+"""Duration of every walk, s."""
 
 _BENT = 0.2  # rad in all at the start
 
 
 class Broken(Exception):
-    """A broken promise: what was seen where something else was promised."""
+    """A broken promise; the message says what happened instead."""
 
 
 class Trial:
-    """An engine and the walks that it is tried with."""
+    """An engine and the walks that test it."""
 
     def __init__(self, engine: Engine, robot: Robot, random: np.random.Generator) -> None:
         self.engine, self.random = engine, random
@@ -44,7 +44,7 @@ class Trial:
     def start(
         self, which: Sequence[int] = (0, 1, 2), seeds: Sequence[int] | None = (7, 8, 9), **options: object
     ) -> Walk:
-        """Some of the robots, bent, with a target."""
+        """Start some of the robots, bent, with a target."""
         given = {"target": (0.9, 0.4), "record": Recording(rate=50.0), "expected": END, **options}
         headings, places = np.full(len(which), 0.3), np.tile([0.2, -0.1], (len(which), 1))
         initial = self.engine.initial_states(self.robot, self.bends[list(which)], headings, places)
@@ -52,7 +52,7 @@ class Trial:
         return self.engine.start([self.robots[i] for i in which], initial=initial, seeds=chosen, **given)  # type: ignore[arg-type]
 
     def commands(self, which: Sequence[int] = (0, 1, 2)) -> list[Command]:
-        """Commands of every walk, at :data:`TIMES`."""
+        """Commands of every walk at :data:`TIMES`."""
         count, joints = len(which), self.robot.body.modules - 1
         stiffness = np.array([self.robots[i].springs.stiffness for i in which])
         stiffness[:, 0] *= 0.6
@@ -65,18 +65,19 @@ class Trial:
         ]
 
     def led(self, walk: Walk, at: Mapping[float, Callable[[Walk], Walk]], which: Sequence[int] = (0, 1, 2)) -> Walk:
-        """A walk up to the end with the commands, going on at some times, before a command, as what is made of it."""
-        told = dict(zip(TIMES, self.commands(which), strict=True))
+        """Walk to the end with the commands; at some times, before a command, continue with the result of a function of
+        the walk."""
+        commands_at = dict(zip(TIMES, self.commands(which), strict=True))
         for time in sorted({*TIMES, *at, END}):
             if time > walk.time:
                 walk.advance(time)
             walk = at[time](walk) if time in at else walk
-            if time in told:
-                walk.command(told[time])
+            if time in commands_at:
+                walk.command(commands_at[time])
         return walk
 
     def walked(self, walk: Walk, which: Sequence[int] = (0, 1, 2), stops: Sequence[float] = ()) -> xr.Dataset:
-        """The record of a walk with the commands, interrupted and looked at besides."""
+        """Record of a walk with the commands that is also interrupted and observed."""
         return self.led(walk, dict.fromkeys((*TIMES, *stops, END), _looked_at), which).to_dataset()
 
 
@@ -86,7 +87,7 @@ def _looked_at(walk: Walk) -> Walk:
 
 
 def expect_same(a: xr.Dataset, b: xr.Dataset, what: str) -> None:
-    """Two records that are the same to the bit."""
+    """Expect two records that are equal to the bit."""
     if set(a.variables) != set(b.variables):
         raise Broken(f"{what}: variables {sorted(set(a.variables) ^ set(b.variables), key=str)} are in one record only")
     for name in a.variables:
@@ -95,23 +96,23 @@ def expect_same(a: xr.Dataset, b: xr.Dataset, what: str) -> None:
 
 
 def expect(condition: object, otherwise: str) -> None:
-    """Something that holds, or what else was seen."""
+    """Expect a condition; otherwise raise with the observed fact."""
     if not condition:
         raise Broken(otherwise)
 
 
 def expect_refused(what: str, attempt: Callable[[], object]) -> None:
-    """An attempt that ends in an error of ours."""
+    """Expect that a call raises an error of chilopod."""
     try:
         attempt()
     except ChilopodError:
         return
     except Exception as error:
-        raise Broken(f"{what} ends in {type(error).__name__}, not in a ChilopodError") from None
+        raise Broken(f"{what} raises {type(error).__name__}, not a ChilopodError") from None
     raise Broken(f"{what} is accepted")
 
 
 def expect_near(found: Array, wanted: Array, within: float, what: str) -> None:
-    """Numbers that are as wanted within so much; NaN where NaN is wanted."""
+    """Expect numbers within a tolerance, and NaN where NaN is expected."""
     if found.shape != wanted.shape or not np.allclose(found, wanted, rtol=0.0, atol=within, equal_nan=True):
         raise Broken(f"{what}: {np.array2string(found.ravel()[:6], precision=6)} instead of {wanted.ravel()[:6]}")

@@ -1,8 +1,8 @@
-"""The contract of an engine: it starts walks that go on step by step, see, and obey.
+"""Contract of an engine: it starts walks, which advance step by step, return observations and follow commands.
 
-A controller knows neither the engine nor the robot's place on the floor: at instants of the gait it sees what the
-robot's sensors give, and answers with a command. Everything comes as arrays with the robots of a batch in front, so one
-object steers one robot or ten thousand, a model or a machine.
+A controller knows neither the engine nor the robot's position: at instants of the gait it receives an observation of
+the robot's sensors and returns a command. Everything comes as arrays with the robots of a batch in front, so one object
+steers one robot or ten thousand, a model or a machine.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ Array = NDArray[np.float64]
 
 
 class Status(Labelled):
-    """How a walk ended; each member's ``sentence`` says it in words."""
+    """Status of a walk; each member's ``sentence`` explains it."""
 
     WALKED = "walked", "walked to the end"
     DIVERGED = "diverged", "the motion became too fast to follow or infinite"
     OUT_OF_RANGE = "out of range", "a yaw joint bent by more than a right angle, where modules run into each other"
     FALLEN = "fallen", "module 1 tipped over"
-    HALTED = "halted", "stopped where it was told to"
+    HALTED = "halted", "stopped by a command"
 
 
 @dataclass(frozen=True)
 class Event:
-    """An instant of every gait cycle at which a controller is asked.
+    """An instant of every gait cycle at which a controller is called.
 
     Attributes
     ----------
     name
-        For the controller to know it by.
+        Name by which the controller recognizes the event.
     phase
         Time since the start of the cycle over its period, in [0, 1).
     window
-        Time there is to act, s.
+        Time available for the action, s.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Observation:
     Attributes
     ----------
     time
-        s.
+        Time of the observation, s.
     bearing
         Direction of the target relative to the heading of module 1, left positive, rad in [-pi, pi); NaN where it is
         not seen. Shape (robots,).
@@ -85,9 +85,9 @@ class Observation:
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """Setpoints of the actuators, one row for all robots or one a robot; None leaves an actuator as it is.
+    """Setpoints of the actuators, one row for all robots or one for each robot; None leaves an actuator as it is.
 
-    What the robot's actuators allow (``[springs]`` of its file) is seen to by :class:`chilopod.engine.Actuators`.
+    :class:`chilopod.engine.Actuators` enforces the limits of the robot's actuators (``[springs]`` of its file).
 
     Attributes
     ----------
@@ -110,35 +110,35 @@ class Command:
 
 
 class Controller(Protocol):
-    """Anything that steers: asked at its events, in order of time.
+    """Steering law, called at its events in order of time.
 
-    For trials it must be a frozen dataclass, whose class and fields then are part of what the trial is.
+    For trials it must be a frozen dataclass; class and fields then are part of the trial.
     """
 
     def events(self, gait: Gait) -> Sequence[Event]:
         """Instants of the cycle at which :meth:`act` is to be called."""
 
     def act(self, event: Event, seen: Observation) -> Command:
-        """Command for the robots, given what is seen."""
+        """Command for the robots, given an observation."""
 
 
 @runtime_checkable
 class Walk(Protocol):
-    """Robots under way, each alone, all at the same time.
+    """Walk of a batch of robots that do not interact.
 
-    The same bits come out whether a minute is one :meth:`advance` or a thousand, however often is looked, alone or in a
-    batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk, and
+    The results are equal to the bit for any division into calls of :meth:`advance`, any number of observations, alone
+    or in a batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk, and
     :meth:`halt` ends it; :meth:`restart` begins another in its place.
 
-    What is given wrongly raises :class:`chilopod.errors.ParameterError` and leaves the walk as it is.
+    A wrong argument raises :class:`chilopod.errors.ParameterError` and leaves the walk unchanged.
 
-    A walk belongs to one thread at a time. Threads may take turns; while one is within a verb (a method, not a
-    property), every verb of the same walk raises :class:`chilopod.errors.ThreadError` in another, and changes nothing.
+    A walk belongs to one thread at a time. Threads may take turns; while one thread runs a method, every method of the
+    same walk raises :class:`chilopod.errors.ThreadError` in another thread, and changes nothing. Properties are exempt.
     """
 
     @property
     def robots(self) -> tuple[Robot, ...]:
-        """One a walk."""
+        """Robots of the walk, one for each row of the batch."""
 
     @property
     def time(self) -> float:
@@ -146,15 +146,15 @@ class Walk(Protocol):
 
     @property
     def status(self) -> tuple[Status, ...]:
-        """One a robot: ``WALKED`` while it walks."""
+        """Status of each robot: ``WALKED`` while it walks."""
 
     def observe(self) -> Observation:
         """Observation of the robots now."""
 
     def pose(self) -> Array:
-        """Where the robots are now: x and y of the centre of module 1, m, and its heading, rad, up to whole turns.
+        """Poses of the robots now: x and y of the centre of module 1, m, and its heading, rad, up to whole turns.
 
-        For referees and pages; controllers see no more than :meth:`observe` gives.
+        Referees and displays use them; controllers receive only :meth:`observe`.
 
         Returns
         -------
@@ -162,29 +162,30 @@ class Walk(Protocol):
         """
 
     def aim(self, target: ArrayLike) -> None:
-        """Put the targets of the robots elsewhere, from now on. The robots walk on as they would.
+        """Move the targets of the robots from now on. The motion of the robots does not change.
 
         Parameters
         ----------
         target
-            m, shape (robots, 2) or (2,); a row of NaN: there is none, so nothing is seen.
+            Positions on the floor, m, shape (robots, 2) or (2,); a row of NaN removes the target of a robot.
         """
 
     def halt(self, which: NDArray[np.bool_]) -> None:
-        """Stop some robots for good, now, with ``HALTED``; the others walk on to the same bits.
+        """Stop some robots finally, with ``HALTED``; the results of the others do not change.
 
         Parameters
         ----------
         which
-            Shape (robots,). Those that no longer walk stay as they are.
+            Mask of the robots, shape (robots,). Robots that no longer walk keep their status.
         """
 
     def states(self) -> Array:
-        """The robots as they are now, for ``initial`` of :meth:`Engine.start` or :meth:`restart`.
+        """States of the robots now, for ``initial`` of :meth:`Engine.start` or :meth:`restart`.
 
-        At the beginning of a gait cycle another walk can so begin where this one is. What actuators were told is no
-        part of it, nor what integrator or solver keep in mind: it goes on as this one to their tolerance.
-        Shape (robots, n), with n the engine's affair; NaN for robots that no longer walk.
+        At the beginning of a gait cycle another walk can start from these states. They contain neither setpoints nor
+        the memory of integrator or solver, so the walks agree to their tolerance.
+
+        Shape (robots, n), with n defined by the engine; NaN for robots that no longer walk.
         """
 
     def restart(
@@ -194,34 +195,34 @@ class Walk(Protocol):
         friction: ArrayLike | None = None,
         seeds: Sequence[int] | None = None,
     ) -> None:
-        """Put some robots on the floor anew, at the beginning of a gait cycle; the others walk on to the same bits.
+        """Start some robots again, at the beginning of a gait cycle; the results of the others do not change.
 
-        Whatever became of them, they walk on as if freshly started, up to the rounding of times: springs of the file,
-        legs straight, no torque. Their targets stay where they are. A walk with a record has no such thing.
+        Whatever their status, they walk as if freshly started, up to the rounding of times: springs of the file, legs
+        straight, no torque. Their targets stay in place. A walk with a record cannot be restarted.
 
         Parameters
         ----------
         which
-            Shape (robots,).
+            Mask of the robots, shape (robots,).
         initial
-            As of :meth:`Engine.start`, one row for all of them or one each.
+            States as for :meth:`Engine.start`, one row for all of them or one each.
         friction
-            Likewise; None: as it is.
+            Factors as for :meth:`Engine.start`; None keeps those of the walk.
         seeds
-            Seeds of the noise of their sensors, counted from now, one each; None: it goes on.
+            Seeds of the noise of their sensors from now on, one each; None continues the noise.
         """
 
     def command(self, command: Command) -> None:
-        """Tell the actuators, from now on."""
+        """Command the actuators from now on."""
 
     def advance(self, until: float) -> None:
-        """Walk on to a time, s. Robots that fail stop there, with a status; the others go on."""
+        """Advance the walk to a time, s. Robots that fail stop with a status; the others go on."""
 
     def save(self) -> bytes:
-        """Everything that it takes to go on, the record so far included."""
+        """Complete state of the walk as bytes, the record so far included."""
 
     def to_dataset(self) -> xr.Dataset:
-        """The record so far; robots are NaN from where they stopped.
+        """Record so far, NaN for robots from the time at which they stopped.
 
         Trials keep a record only if it has all of this, and nothing else:
 
@@ -239,7 +240,7 @@ class Walk(Protocol):
 
 
 def missing_parts(walk: object) -> list[str]:
-    """Names of what an object lacks to be a :class:`Walk`."""
+    """Names of the attributes of :class:`Walk` that an object lacks."""
     return [name for name in vars(Walk) if not name.startswith("_") and not hasattr(walk, name)]
 
 
@@ -250,7 +251,7 @@ class Traits:
     Attributes
     ----------
     name
-        As it is typed and recorded.
+        Name of the engine on the command line and in records.
     sentence
         Description of the engine in a sentence.
     exact
@@ -260,13 +261,13 @@ class Traits:
     poses
         True if it can record the positions of all joints, to be drawn.
     a_core
-        Robots that one core should walk at a time: a few seconds' work.
+        Number of robots that one core should walk at a time: a few seconds of work.
     a_round
-        Walks that a search may spend on one round of trials.
+        Number of walks that a search may spend on one round of trials.
     haste
-        Duration of a task, over its duration at the speed of the straight walk without slip.
+        Ratio of a task's duration to its duration at the speed of the straight walk without slip.
     version
-        Version of whatever else than chilopod decides what its records hold; empty for nothing.
+        Version of the software besides chilopod that determines the records; empty if there is none.
     """
 
     name: str
@@ -281,9 +282,9 @@ class Traits:
 
 
 class Engine(Protocol):
-    """Something that starts walks: a module such as :mod:`chilopod.planar`, or an object.
+    """Engine that starts walks: a module such as :mod:`chilopod.planar`, or an object.
 
-    What is given wrongly raises :class:`chilopod.errors.ParameterError`.
+    A wrong argument raises :class:`chilopod.errors.ParameterError`.
     """
 
     @property
@@ -291,8 +292,8 @@ class Engine(Protocol):
         """Properties of the engine."""
 
     def common(self, robot: Robot) -> Hashable:
-        """Properties that robots must have in common to walk in one batch; ParameterError for a robot that the engine
-        cannot walk at all."""
+        """Properties that all robots of one batch must share; ParameterError for a robot that the engine cannot
+        walk."""
 
     def initial_states(
         self,
@@ -331,7 +332,7 @@ class Engine(Protocol):
         expected: float = 0.0,
         **options: Any,
     ) -> Walk:
-        """Put robots on the floor.
+        """Start a batch of walks.
 
         Parameters
         ----------
@@ -343,28 +344,28 @@ class Engine(Protocol):
         friction
             Factor on the friction coefficient of every foot, positive, shape (N, 2) or (walks, N, 2).
         target
-            Its place on the floor, m, shape (2,) or (walks, 2), for the robots to see.
+            Position of the target on the floor, m, shape (2,) or (walks, 2).
         seeds
-            Seeds of the noise of the sensors, one a walk; without them there is none.
+            Seeds of the noise of the sensors, one for each walk; None for no noise.
         record
             Variables and rate of the record; by default the motion, :data:`chilopod.record.RATE` times a second. None:
             no record.
         expected
             Expected duration of the walk, s, so that memory may be taken at once; 0: not known.
         options
-            The engine's own.
+            Options of this engine.
         """
 
     def resume(self, saved: bytes) -> Walk:
-        """A walk that was saved by this engine and version, to the bit."""
+        """Walk that this engine and version saved, continued to the bit."""
 
 
 class FootCreep(Protocol):
-    """How firmly a floor holds standing feet."""
+    """Creep of standing feet on a floor."""
 
     @property
     def across(self) -> float:
-        """Coefficient of the viscous friction that lets a foot creep as much, across the way, N*s/m."""
+        """Coefficient of the viscous friction that gives the same creep across the way, N*s/m."""
 
 
 @runtime_checkable
@@ -372,4 +373,4 @@ class HasFootCreep(Protocol):
     """An engine on whose floor standing feet creep."""
 
     def foot_creep(self, robot: Robot) -> FootCreep:
-        """Measure it, for every run to show."""
+        """Measure the creep of standing feet."""

@@ -1,4 +1,4 @@
-"""The loop that lets a controller steer a walk: walk on to its next event, look, ask, command."""
+"""Control loop: advance the walk to the next event, observe, call the controller, command."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from chilopod.progress import Progress, silent
 _T = TypeVar("_T")
 
 _MOMENT = 0.3
-"""s, for which a walk goes on without a word, about: that long Ctrl-C may have to wait too."""
+"""Approximate time between two reports of progress, s; Ctrl-C may wait as long."""
 
 _MOST_EVENTS = 10_000
-"""In a gait cycle: more come from a generator that never ends."""
+"""Largest number of events in a gait cycle: more would come from an endless generator."""
 
 _FIRST, _SHORTEST = 0.02, 1e-3
-"""s of the walk, at first and at least, that it goes on for at a time."""
+"""First and least stretch of a walk that is advanced at a time, s."""
 
 
 @dataclass
 class Spent:
-    """Where the time of walks went, s: in controllers, and in all; ``progress`` is told how far the walks are."""
+    """Time spent on walks, s: in controllers, and in all; ``progress`` receives the fraction done."""
 
     controller: float = 0.0
     total: float = 0.0
@@ -51,8 +51,7 @@ _watching: list[Spent] = []
 
 @contextmanager
 def watched(progress: Progress = silent) -> Iterator[Spent]:
-    """Sum up where the time of all walks goes that :func:`steer` steers in this process meanwhile, and tell how far
-    they are."""
+    """Sum up the time of all walks that :func:`steer` steers in this process within the block, and report progress."""
     spent = Spent(progress=progress)
     _watching.append(spent)
     try:
@@ -62,40 +61,42 @@ def watched(progress: Progress = silent) -> Iterator[Spent]:
 
 
 class Referee(Protocol):
-    """Somebody who looks at a walk while it is steered: knows where the robots are, and stands between what they sense
-    and their controller."""
+    """Observer of a steered walk: it knows the poses of the robots and filters the observations of their controller."""
 
     @property
     def every(self) -> float:
-        """Between two looks, s; the first is at the beginning."""
+        """Time between two looks, s; the first is at the beginning."""
 
     def look(self, walk: Walk) -> bool:
-        """Look, aim, halt, and say whether the walk is to go on."""
+        """Observe, aim and halt the walk; return True if it goes on."""
 
     def through(self, index: int, seen: Observation) -> Observation:
-        """Part of an observation that gets through to the controller at the event of that number."""
+        """Observation that the controller receives at the event of that number."""
 
 
 def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:
-    """All instants in [0, duration) at which a controller is asked, in order, one after the other; ParameterError or
-    AnalysisError if the controller's events are none."""
+    """All instants in [0, duration) at which a controller is called, in order; ParameterError or AnalysisError for
+    invalid events."""
     return ((time, event) for time, _, event in _numbered(controller, gait, 0.0, duration))
 
 
 def _numbered(controller: Controller, gait: Gait, since: float, until: float) -> Iterator[tuple[float, int, Event]]:
-    """As :func:`event_times`, with the number of each event; without those of cycles that were over at ``since`` (s):
-    who walks a moment at a time need not count from the beginning every time."""
+    """Instants of :func:`event_times` with the number of each event, without the cycles that were over at ``since``
+    (s), so that short advances need not count from the beginning."""
     events = _asked(controller, "events", lambda: list(islice(controller.events(gait), _MOST_EVENTS + 1)))
     if len(events) > _MOST_EVENTS:
         raise ParameterError(
-            "are too many", field=_of(controller, "events"), allowed=f"at most {_MOST_EVENTS} in a gait cycle"
+            "must be fewer", field=_of(controller, "events"), allowed=f"at most {_MOST_EVENTS} in a gait cycle"
         )
     for event in events:
         if not isinstance(event, Event):
-            raise ParameterError("is no chilopod.engine.Event", field=_of(controller, "events"), value=event)
+            raise ParameterError("must be a chilopod.engine.Event", field=_of(controller, "events"), value=event)
         if not 0.0 <= as_number(_of(controller, "events"), event.phase) < 1.0:
             raise ParameterError(
-                "is no phase", field=_of(controller, "events"), value=event.phase, allowed="0 to less than 1"
+                "must be a phase of the gait cycle",
+                field=_of(controller, "events"),
+                value=event.phase,
+                allowed="0 to less than 1",
             )
     events.sort(key=lambda event: event.phase)
     first = _whole(since, gait.period)
@@ -108,7 +109,7 @@ def _numbered(controller: Controller, gait: Gait, since: float, until: float) ->
 
 
 def _whole(time: float, period: float) -> int:
-    """How many periods are over at a time; one less beside their ends, where round-off may count one too many."""
+    """Number of periods that are over at a time; one less beside their ends, because of round-off."""
     return max(0, math.ceil(time / period) - 1)
 
 
@@ -121,31 +122,31 @@ def steer(
     referee: Referee | None = None,
     progress: Progress = silent,
 ) -> None:
-    """Walk on to a time, commanded by a controller at its events; or until its referee says that it is over.
+    """Advance a walk to a time, commanded by a controller at its events, or until its referee ends it.
 
     Parameters
     ----------
     walk, until
-        Changed in place, up to a time, s.
+        Walk, changed in place, and the time to advance it to, s.
     controller
-        Without one the robots walk on as they were told.
+        Controller; None keeps the last setpoints.
     bearing_noise
         Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events from the start of the walk.
     progress
-        Called with the part done (0 to 1) and a few words.
+        Function of the fraction done (0 to 1) and a few words.
 
     Raises
     ------
     ParameterError
-        If the controller's events or commands are none, naming it.
+        For invalid events or commands; the message names the controller.
     AnalysisError
         If the controller raises, with its exception as the cause.
     """
     gait, begun = walk.robots[0].gait, walk.time
     until = check_time(until, begun)
     if not callable(progress):
-        raise ParameterError("cannot be called", field="progress", value=progress, allowed="a function of two")
+        raise ParameterError("must be a function of two arguments", field="progress", value=progress)
     noise = None
     if controller is not None and bearing_noise is not None:
         walks, events = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))
@@ -155,7 +156,7 @@ def steer(
             raise ParameterError("has the wrong shape", field="bearing_noise", value=noise.shape, allowed=allowed)
 
     def tell() -> None:
-        # Where there is nowhere to go, a referee ends the walk before it begins.
+        # Without a target a referee ends the walk before it begins.
         done, words = walk.time / until if until > 0.0 else 1.0, f"{walk.time:.1f} of {until:g} s"
         for each in (progress, *(spent.progress for spent in _watching)):
             each(done, words)
@@ -177,9 +178,9 @@ def steer(
         if referee is not None:
             seen = referee.through(index, seen)
         assert controller is not None
-        asked = clock.perf_counter()
+        called_at = clock.perf_counter()
         command = _answer(controller, event, seen)
-        thought += clock.perf_counter() - asked
+        thought += clock.perf_counter() - called_at
         try:
             walk.command(command)
         except ParameterError as error:
@@ -196,28 +197,28 @@ def steer(
 def _instants(
     controller: Controller | None, gait: Gait, referee: Referee | None, since: float, until: float
 ) -> Iterator[tuple[float, int, Event | None]]:
-    """Instants before ``until`` (s) at which somebody looks, some of them before ``since``: the number of the event and
-    the event; no event where it is the referee, who looks first."""
-    asked: Iterator[tuple[float, int, Event | None]] = iter(())
+    """Instants before ``until`` (s) at which the controller or the referee observes, some of them before ``since``:
+    number of the event, and the event or None for the referee, which comes first."""
+    events: Iterator[tuple[float, int, Event | None]] = iter(())
     if controller is not None:
-        asked = _numbered(controller, gait, since, until)
+        events = _numbered(controller, gait, since, until)
     looks: Iterator[tuple[float, int, Event | None]] = iter(())
     if referee is not None:
         every = referee.every
         times = (n * every for n in count(_whole(since, every)))
         looks = ((time, -1, None) for time in takewhile(lambda time: time < until, times))
-    return merge(asked, looks, key=lambda each: each[:2])
+    return merge(events, looks, key=lambda each: each[:2])
 
 
 @dataclass
 class _Pace:
-    """Walks on in stretches that take a moment each, the next one ``stretch`` s long."""
+    """Pace of a walk in short stretches, the next one ``stretch`` s long."""
 
     stretch: float = _FIRST
 
     def advance(self, walk: Walk, until: float, tell: Callable[[], None]) -> None:
         there = walk.time + self.stretch
-        # What is left shall not be a stretch of nearly nothing.
+        # Avoid a last stretch of nearly zero length.
         while there + 0.5 * self.stretch < until:
             begun = clock.perf_counter()
             walk.advance(there)
@@ -237,7 +238,7 @@ def _asked(controller: Controller, name: str, ask: Callable[[], _T]) -> _T:
         return ask()
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # whatever somebody else's code does
+    except BaseException as error:  # foreign code may raise anything
         raise AnalysisError(f"raised {in_words(error)}", field=_of(controller, name)) from error
 
 

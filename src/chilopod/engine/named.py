@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 _MODULES: Final[Mapping[str, str]] = {"planar": "chilopod.planar", "twin": "chilopod.twin"}
 
 ENGINES: Final = tuple(_MODULES)
-"""Engines by name: the planar model, or the whole robot in three dimensions."""
+"""Engines by name: the planar model, and the robot in three dimensions."""
 
 _PARTS: Final = ("traits", "common", "initial_states", "start", "resume")
 _SAME_TIME: Final = 1e-9  # s
@@ -24,10 +24,10 @@ _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
 
 def engine_named(name: str) -> Engine:
-    """An engine by its name, one of :data:`ENGINES`; or one of your own as ``package.module:object``. ParameterError if
-    there is none.
+    """Return an engine by its name, one of :data:`ENGINES` or ``package.module:object``; ParameterError for an unknown
+    name.
 
-    It is imported now, not before: MuJoCo takes a moment to load.
+    The engine is imported here, because MuJoCo takes a moment to load.
     """
     engine: Engine
     if not isinstance(name, str):
@@ -36,25 +36,27 @@ def engine_named(name: str) -> Engine:
         engine = import_module(_MODULES[name])  # a module is an engine
         return engine
     if ":" not in name:
-        problem = "there is no such engine"
+        problem = "must be one of the engines"
         allowed = f"{', '.join(ENGINES)}, or package.module:object"
         raise ParameterError(problem, field="engine", value=name, allowed=allowed, nearest=nearest_name(name, ENGINES))
     return _Own(name, _imported("engine", name))
 
 
 class _Own:
-    """An engine of somebody else's: what goes wrong in it is said to be its own fault."""
+    """Engine from outside chilopod; errors in it name the engine."""
 
     def __init__(self, name: str, engine: Any) -> None:
         if isinstance(engine, type):
             raise ParameterError(
-                "is a class", field="engine", value=name, allowed="an object, such as one of that class"
+                "must be an object, not a class", field="engine", value=name, allowed="an instance of that class"
             )
         missing = [each for each in _PARTS if not hasattr(engine, each)]
         if missing:
-            raise ParameterError(f"is no engine: it has no {missing[0]}", field="engine", value=name)
+            raise ParameterError(f"must be an engine: attribute {missing[0]} is missing", field="engine", value=name)
         if not isinstance(engine.traits, Traits):
-            raise ParameterError("is no engine: its traits are no chilopod.engine.Traits", field="engine", value=name)
+            raise ParameterError(
+                "must be an engine: its traits must be a chilopod.engine.Traits", field="engine", value=name
+            )
         self._name, self._engine = f"engine {name}", engine
         self.traits: Traits = engine.traits
 
@@ -63,7 +65,7 @@ class _Own:
         try:
             hash(shared)
         except TypeError:
-            raise AnalysisError("common gave what has no hash", field=self._name) from None
+            raise AnalysisError("common must return a hashable value", field=self._name) from None
         return shared
 
     def initial_states(self, *arguments: Any, **named: Any) -> Array:
@@ -79,13 +81,15 @@ class _Own:
         walk: Any = _theirs(self._name, how, getattr(self._engine, how), *arguments, **named)
         missing = _theirs(self._name, how, missing_parts, walk)
         if missing:
-            raise AnalysisError(f"{how} gave no chilopod.engine.Walk: it has no {', '.join(missing)}", field=self._name)
+            raise AnalysisError(
+                f"{how} must return a chilopod.engine.Walk; missing: {', '.join(missing)}", field=self._name
+            )
         wrapped: Any = _OwnWalk(self._name, walk)
         return wrapped
 
 
 class _OwnWalk:
-    """A walk of somebody else's engine, the same way."""
+    """Walk of an engine from outside chilopod; errors in it name the engine."""
 
     def __init__(self, name: str, walk: Any) -> None:
         self._name, self._walk = name, walk
@@ -105,11 +109,11 @@ class _OwnWalk:
     def advance(self, until: float) -> None:
         _theirs(self._name, "advance", self._walk.advance, until)
         if not abs(self.time - until) <= _SAME_TIME:
-            raise AnalysisError(f"advance({until:g}) went to {self.time} s", field=self._name)
+            raise AnalysisError(f"advance({until:g}) must end at that time, not at {self.time} s", field=self._name)
 
 
 def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Any:
-    """Result of somebody else's code; what goes wrong in it is said to be its own fault."""
+    """Result of a call of foreign code; an error in it names the code."""
     try:
         return call(*arguments, **named)
     except (ChilopodError, KeyboardInterrupt):
@@ -120,15 +124,15 @@ def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, *
 
 def controller_named(path: str) -> Controller:
     """An instance of a controller's class, given as ``package.module:Class``, with the defaults of all its fields;
-    ParameterError if it cannot be imported or is no controller, see :func:`check_controller`."""
+    ParameterError if it cannot be imported or is not a controller, see :func:`check_controller`."""
     made = _imported("controller", path)
     if not isinstance(made, type):
-        raise ParameterError("is no class", field="controller", value=path, allowed="package.module:Class")
+        raise ParameterError("must name a class", field="controller", value=path, allowed="package.module:Class")
     try:
         controller: Controller = made()
     except (ParameterError, KeyboardInterrupt):
         raise
-    except BaseException as error:  # it is somebody else's code
+    except BaseException as error:  # foreign code
         problem = f"cannot be made: {in_words(error)}"
         allowed = "a class whose fields all have defaults"
         raise ParameterError(problem, field="controller", value=path, allowed=allowed) from error
@@ -142,10 +146,12 @@ def check_controller(controller: Controller) -> None:
     kind = type(controller)
     for name in ("events", "act"):
         if not callable(getattr(controller, name, None)):
-            raise ParameterError(f"has no {name}", field="controller", value=kind.__name__, allowed="events and act")
+            raise ParameterError(
+                f"must have a method {name}", field="controller", value=kind.__name__, allowed="events and act"
+            )
     frozen = dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen
     if not frozen:
-        problem = "can change, so nobody could tell trials apart"
+        problem = "must be immutable, because its fields name the trial"
         allowed = "a frozen dataclass: @dataclass(frozen=True)"
         raise ParameterError(problem, field="controller", value=kind.__name__, allowed=allowed)
 
@@ -158,13 +164,13 @@ def path_of(kind: type) -> str:
 def _imported(field: str, path: str) -> Any:
     if not _PATH.fullmatch(path):
         kind = "Class" if field == "controller" else "object"
-        raise ParameterError("names nothing", field=field, value=path, allowed=f"package.module:{kind}")
+        raise ParameterError("must name an object", field=field, value=path, allowed=f"package.module:{kind}")
     module_name, _, name = path.partition(":")
     try:
         found: Any = import_module(module_name)
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # whatever somebody else's module does when it is imported
+    except BaseException as error:  # importing a foreign module may raise anything
         raise ParameterError(f"cannot be imported: {in_words(error)}", field=field, value=path) from error
     for part in name.split("."):
         if not hasattr(found, part):

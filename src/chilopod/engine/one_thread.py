@@ -1,4 +1,4 @@
-"""A walk belongs to one thread at a time: held here, once for every engine."""
+"""Guard that keeps a walk to one thread at a time, for every engine."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _INSIDE: Final = "_thread_inside"
 
 
 def one_thread(kind: _Kind) -> _Kind:
-    """Make a class of walks refuse a thread while another is within one of the verbs of :class:`Walk`.
+    """Make a class of walks refuse a thread while another thread runs a method of :class:`Walk`.
 
-    Threads may take turns: nobody owns a walk between two verbs. A verb may call others.
+    Threads may take turns: no thread owns a walk between two calls. A method may call others.
     """
     for name in _VERBS:
         setattr(kind, name, _alone(name, getattr(kind, name)))
@@ -36,8 +36,8 @@ def _alone(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
             return verb(self, *arguments, **named)
         # One step for the interpreter, so that of two threads one is first.
         if state.setdefault(_INSIDE, me) != me:
-            allowed = "one thread at a time: a walk each, or a lock"
-            raise ThreadError("another thread is within a verb of this walk", field=f"walk.{name}", allowed=allowed)
+            allowed = "one thread at a time: give each thread its own walk, or use a lock"
+            raise ThreadError("must not run while another thread uses the walk", field=f"walk.{name}", allowed=allowed)
         try:
             return verb(self, *arguments, **named)
         finally:

@@ -1,4 +1,4 @@
-"""Values that ramp to where they are told."""
+"""Values that ramp to setpoints."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ Array = NDArray[np.float64]
 
 
 class Ramps:
-    """Values that move to where they are told at constant rate, each on its own.
+    """Values that move to their setpoints at constant rate, each on its own.
 
-    What is told the goal that it has already goes on as it was, but is there no later than it is now told to be.
+    A value that is given its old setpoint again goes on, and arrives no later than the new command demands.
 
     Parameters
     ----------
     start
         Values before any command, any shape.
     keep
-        True to keep what was told, for :meth:`over`.
+        True to log the setpoints, for :meth:`over`.
     """
 
     def __init__(self, start: Array, keep: bool = False) -> None:
         begun = np.array(start, dtype=np.float64)
-        # Where each ramp begins and ends, and when; never written into, only replaced.
+        # Start and end of each ramp, and their times; never written into, only replaced.
         self._ramps = np.stack([begun, begun, 0.0 * begun, 0.0 * begun])
         self._told: list[tuple[float, Array]] | None = [(0.0, self._ramps)] if keep else None
 
@@ -35,7 +35,7 @@ class Ramps:
         return self._ramps[1]
 
     def to(self, goal: Array, now: float, within: float) -> None:
-        """Move to ``goal`` (NaN: as before), from a time on, within a time, both of any unit."""
+        """Move to ``goal`` (NaN: unchanged), from a time on and within a duration, both in any unit."""
         changed = ~np.isnan(goal) & ((goal != self.goal) | (now + within < self._ramps[3]))
         if changed.any():
             begun = np.empty_like(self._ramps)
@@ -49,13 +49,13 @@ class Ramps:
         return _at(self._ramps, times.reshape(-1, *[1] * self.goal.ndim))
 
     def restart(self, which: NDArray[np.bool_]) -> None:
-        """Let some be 0 from now on, whatever they were told; only without what was told (``keep``)."""
+        """Set some values to 0 from now on, whatever their setpoints; only without a log (``keep``)."""
         ramps = self._ramps.copy()
         ramps[:, which] = 0.0
         self._ramps = ramps
 
     def over(self, times: Array) -> Array:
-        """Values at any times (T,), rising, shape (T, ...); at the moment of a command they are those before it."""
+        """Values at any rising times (T,), shape (T, ...); at the time of a command, the values before it."""
         history = self._told or [(0.0, self._ramps)]
         values = np.empty((len(times), *self.goal.shape))
         ends = np.searchsorted(times, [when for when, _ in history[1:]] + [np.inf], side="right")
@@ -67,14 +67,14 @@ class Ramps:
         return values
 
     def state(self) -> dict[str, Array]:
-        """All there is to it, for :meth:`restore`."""
+        """Complete state, for :meth:`restore`."""
         if self._told is None:
             return {"now": self._ramps}
         history = np.array([each for _, each in self._told])
         return {"now": self._ramps, "times": np.array([when for when, _ in self._told]), "history": history}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Become as another was."""
+        """Take over the state of other ramps."""
         self._ramps = state["now"]
         if self._told is not None:
             self._told = list(zip(state["times"].tolist(), state["history"], strict=True))

@@ -1,4 +1,4 @@
-"""A walk that is put aside, as bytes: plain arrays and text in numpy's zip format, with a checksum, no pickles."""
+"""Saved walks as bytes: plain arrays and text in numpy's zip format, with a checksum and without pickles."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _DIGEST = 32  # bytes
 
 
 def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
-    """The bytes of a walk: the traits of its engine, its robots, settings that are plain data (numbers, text, lists,
-    None), and arrays by name."""
+    """Pack the traits of the engine, the robots, settings of plain data (numbers, text, lists, None) and named arrays
+    as bytes."""
     written = {id(robot): robot.to_toml() for robot in {id(robot): robot for robot in robots}.values()}
     texts = [written[id(robot)] for robot in robots]
     distinct = list(dict.fromkeys(texts))
@@ -37,16 +37,16 @@ def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], a
 
 
 def unpack(traits: Traits, saved: object) -> tuple[list[Robot], dict[str, Any], dict[str, Any]]:
-    """Robots, settings and arrays of a walk that :func:`pack` made; ParameterError if it is no such thing, damaged, or
-    another engine's or version's."""
+    """Return robots, settings and arrays from bytes of :func:`pack`; ParameterError for other bytes, damaged ones, or
+    those of another engine or version."""
     if not isinstance(saved, bytes | bytearray | memoryview):
-        raise ParameterError("is no saved walk", field="saved", value=type(saved).__name__, allowed="bytes")
+        raise ParameterError("must be a saved walk", field="saved", value=type(saved).__name__, allowed="bytes")
     saved = bytes(saved)
     content = saved[len(_MAGIC) + _DIGEST :]
     if saved[: len(_MAGIC)] != _MAGIC:
-        raise ParameterError("is no saved walk", field="saved", allowed="what save() gave")
+        raise ParameterError("must be a saved walk", field="saved", allowed="bytes that save() returned")
     if hashlib.sha256(content).digest() != saved[len(_MAGIC) : len(_MAGIC) + _DIGEST]:
-        raise ParameterError("is damaged", field="saved", allowed="what save() gave, every byte of it")
+        raise ParameterError("is damaged", field="saved", allowed="all bytes that save() returned")
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as read:
             arrays: dict[str, Any] = dict(read)
@@ -61,24 +61,25 @@ def unpack(traits: Traits, saved: object) -> tuple[list[Robot], dict[str, Any], 
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError, zipfile.BadZipFile) as error:
         if isinstance(error, ParameterError):
             raise
-        raise ParameterError(f"cannot be read ({error})", field="saved", allowed="what save() gave") from None
+        raise ParameterError(f"cannot be read ({error})", field="saved", allowed="bytes that save() returned") from None
 
 
 def part(arrays: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Those of the arrays whose names begin so, by the rest of their names."""
+    """Arrays whose names begin with a prefix, by the rest of their names."""
     return {name.removeprefix(prefix): each for name, each in arrays.items() if name.startswith(prefix)}
 
 
 @contextmanager
 def read_back() -> Iterator[None]:
-    """While a walk is made from what was unpacked: whatever is missing, or of another kind or shape, is a
-    ParameterError."""
+    """Turn errors from missing or misshapen parts of an unpacked walk into ParameterErrors."""
     try:
         yield
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, ParameterError):
             raise
-        raise ParameterError(f"does not fit together ({error})", field="saved", allowed="what save() gave") from None
+        raise ParameterError(
+            f"does not fit together ({error})", field="saved", allowed="bytes that save() returned"
+        ) from None
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Where the targets of a batch of robots are, and were: one object serves one walk of any engine."""
+"""Positions of the targets of a batch of robots over time; one object serves one walk of any engine."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ Array = NDArray[np.float64]
 
 
 class Targets:
-    """Targets on the floor, one a robot, that may be put elsewhere while the robots walk.
+    """Targets on the floor, one for each robot, that may be moved while the robots walk.
 
     Parameters
     ----------
     robots
         Number of robots.
     start
-        Places at the start, m, shape (robots, 2), or None.
+        Positions at the start, m, shape (robots, 2), or None.
     keep
-        True to keep where they were, for :meth:`recorded`.
+        True to log the positions, for :meth:`recorded`.
 
     Attributes
     ----------
     present
-        Places now, m, shape (robots, 2), NaN for a robot without one; never written into, only replaced.
+        Positions now, m, shape (robots, 2), NaN for a robot without a target; never written into, only replaced.
     """
 
     def __init__(self, robots: int, start: Array | None = None, keep: bool = True) -> None:
@@ -43,21 +43,23 @@ class Targets:
         return there
 
     def move(self, time: float, target: ArrayLike) -> None:
-        """Put them elsewhere from now on; what is told at time 0 is where they are at the start.
+        """Move the targets from now on; a move at time 0 changes the start.
 
         Parameters
         ----------
         time
-            s, not before that of the last move.
+            Time of the move, s, not before the last one.
         target
-            m, shape (robots, 2) or (2,); a row of NaN where there is none.
+            New positions, m, shape (robots, 2) or (2,); a row of NaN for a robot without a target.
         """
         given, shape = as_array("target", target), self.present.shape
         if given.shape not in (shape, (2,)):
             raise ParameterError("has the wrong shape", field="target", value=given.shape, allowed=f"(2,) or {shape}")
         none = np.isnan(given)
         if np.isinf(given).any() or (none.any(axis=-1) != none.all(axis=-1)).any():
-            raise ParameterError("is no place", field="target", allowed="x and y in m, or NaN for both: no target")
+            raise ParameterError(
+                "must be a finite position", field="target", allowed="x and y in m, or NaN for both without a target"
+            )
         places = np.array(np.broadcast_to(given, shape))
         if np.array_equal(places, self.present, equal_nan=True):
             return
@@ -68,20 +70,21 @@ class Targets:
             self._log.append((time, places))
 
     def over(self, times: Array) -> Array:
-        """Places at any times of the walk, rising, m, shape (times, robots, 2); at a move they are those before it."""
+        """Positions at any rising times of the walk, m, shape (times, robots, 2); at a move, the positions before
+        it."""
         log = self._log or [(0.0, self.present)]
         moves = np.array([when for when, _ in log[1:]])
         return np.array([places for _, places in log])[np.searchsorted(moves, times, side="left")]
 
     def recorded(self, times: Array) -> Array | None:
-        """For :func:`chilopod.record.add_outcome`: as :meth:`over`; without times if they stayed where they were at the
-        start, None if there never were any."""
+        """Positions for :func:`chilopod.record.add_outcome`: as of :meth:`over`, without times if no target moved, None
+        if there never was one."""
         if not self._given:
             return None
         return self.over(times) if self._moved else self.present
 
     def state(self) -> dict[str, Array]:
-        """All there is to it, for :meth:`restore`."""
+        """Complete state, for :meth:`restore`."""
         state: dict[str, Array] = {"present": self.present, "known": np.array([self._given, self._moved])}
         if self._log is not None:
             state["times"] = np.array([when for when, _ in self._log])
@@ -89,7 +92,7 @@ class Targets:
         return state
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Become as another was, of as many robots."""
+        """Take over the state of targets of as many robots."""
         self.present = as_array("target", state["present"])
         self._given, self._moved = (bool(each) for each in state["known"])
         if self._log is not None:

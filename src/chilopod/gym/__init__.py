@@ -1,4 +1,4 @@
-"""Gymnasium environments: a robot with a task, told once a gait cycle what to do.
+"""Gymnasium environments: a robot with a task and one action in a gait cycle.
 
 Importing this registers ``chilopod/NAME-v0`` for every name of ``tasks.TASKS``, and so does
 ``gymnasium.make("chilopod.gym:chilopod/Turn-v0")``. ``episodes`` is the one implementation, of a batch over

@@ -19,10 +19,10 @@ SPRINGS = ("first", "all")
 """Springs that an action sets."""
 
 _SOFTEST = 1.0 / 7.0
-"""Part of the stiffest spring, where the robot file says nothing: at it the paper's robot turns, and bends, ever more
-tightly, until a joint leaves its range."""
+"""Default softest spring relative to the stiffest: there the paper's robot bends ever more tightly, until a joint
+leaves its range."""
 
-_ROUNDING = 1e-6  # by which single precision may miss the end of a range
+_ROUNDING = 1e-6  # tolerance of single precision at the end of a range
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Actions:
 
     A spring goes from its softest to its stiffest by equal factors: at 0 it is their geometric mean. The yaw of a leg
     goes from the right to the left limit of the paper's controller. As there, a leg yaws while it swings, at 40 to 80 %
-    of its swing; the springs ramp with the leg that swings first in the cycle. What an action asks for is so under way
-    within a gait cycle of its observation, and no foot is dragged across the floor.
+    of its swing; the springs ramp with the leg that swings first in the cycle. Thus an action takes effect within a
+    gait cycle of its observation, and feet are not dragged across the floor.
 
     Attributes
     ----------
@@ -52,14 +52,15 @@ class Actions:
 
     @classmethod
     def of(cls, robot: Robot, springs: Literal["first", "all"] = "first") -> Actions:
-        """The actions of a robot, on its first spring or on all that can be adjusted.
+        """Actions of a robot on its first spring or on all adjustable springs.
 
-        A robot without any actuator is given them. Where the robot file gives no range, it goes from a seventh of the
-        stiffest spring of the axis to that. Raises ParameterError if a spring has no actuator, or that leaves it no
-        range.
+        A robot without any actuator gets ideal ones. The default range goes from a seventh of the stiffest spring of
+        the axis to that spring. Raises ParameterError if a spring has no actuator, or an empty range.
         """
         if springs not in SPRINGS:
-            raise ParameterError("are no springs", field="springs", value=springs, allowed=" or ".join(SPRINGS))
+            raise ParameterError(
+                "must be one of the sets of springs", field="springs", value=springs, allowed=" or ".join(SPRINGS)
+            )
         own = robot.springs
         if own.adjustable is None:
             every = springs == "all"
@@ -67,14 +68,19 @@ class Actions:
         can = robot.springs.adjustable or ()
         joints = (0,) if springs == "first" else tuple(joint for joint, each in enumerate(can) if each)
         if not any(can) or not all(can[joint] for joint in joints):
-            raise ParameterError("has no actuator", field="springs.adjustable[0]", value=False, allowed="true")
+            raise ParameterError(
+                "must be true: the action sets the first spring",
+                field="springs.adjustable[0]",
+                value=False,
+                allowed="true",
+            )
         most = max(own.stiffness)
         softest = tuple(own.softest[joint] if own.softest else _SOFTEST * most for joint in joints)
         stiffest = tuple(own.stiffest[joint] if own.stiffest else most for joint in joints)
         for low, high in zip(softest, stiffest, strict=True):
             if not low < high:
                 given, names = f"{low:g}, {high:g} N*m/rad", "springs.softest, springs.stiffest"
-                raise ParameterError("leave a spring no range", field=names, value=given)
+                raise ParameterError("must leave each spring a range", field=names, value=given)
         return cls(robot, joints, softest, stiffest)
 
     @property
@@ -87,13 +93,13 @@ class Actions:
 
     @property
     def moments(self) -> tuple[tuple[float, float, int], ...]:
-        """When legs yaw: parts of the cycle, how long that takes (s), and which leg it is, in order."""
+        """Times of leg yaw in order: fraction of the cycle, duration (s), and leg."""
         events = self.legs.events(self.robot.gait)
         return tuple(sorted((each.phase, each.window, SIDES.index(each.name)) for each in events))
 
     def checked(self, actions: ArrayLike, robots: int) -> Array:
-        """Actions of a batch, each its own copy, shape (robots, len(names)). Raises ParameterError if they are none:
-        wrong shape, NaN, out of range."""
+        """Actions of a batch, each its own copy, shape (robots, len(names)). Raises ParameterError for a wrong shape,
+        NaN, or values out of range."""
         array, shape = as_array("action", actions), (robots, len(self.names))
         if array.shape != shape:
             raise ParameterError("has the wrong shape", field="action", value=array.shape, allowed=str(shape))
@@ -111,19 +117,19 @@ class Actions:
         return np.asarray(np.exp(low + 0.5 * (actions[:, : len(self.joints)] + 1.0) * (high - low)))
 
     def set_by(self, stiffness: Array) -> Array:
-        """The actions that set springs to a stiffness, N*m/rad, as far as they go, shape (robots, len(joints))."""
+        """Actions that set springs to a stiffness, N*m/rad, within their ranges, shape (robots, len(joints))."""
         low, high = np.log(self.softest), np.log(self.stiffest)
         return np.clip(2.0 * (np.log(stiffness) - low) / (high - low) - 1.0, -1.0, 1.0)
 
     def commands(self, actions: Array, leg_yaw: Array) -> list[tuple[float, Command]]:
-        """Commands of a gait cycle by :meth:`checked` actions and the present leg yaw, rad, shape (robots, 2): parts of
-        the cycle, and the commands that come then."""
+        """Commands of a gait cycle from :meth:`checked` actions and the present leg yaw, rad, shape (robots, 2):
+        fractions of the cycle, and the commands at these times."""
         stiffness = np.tile(self.robot.springs.stiffness, (len(actions), 1))
         stiffness[:, self.joints] = self.stiffness(actions)
         wanted, yaw = self.legs.limit * actions[:, len(self.joints) :], leg_yaw.copy()
-        told = []
+        timed = []
         for number, (phase, window, side) in enumerate(self.moments):
             yaw[:, side] = wanted[:, side]
             springs = stiffness if number == 0 else None
-            told.append((phase, Command(leg_yaw=yaw.copy(), stiffness=springs, within=window)))
-        return told
+            timed.append((phase, Command(leg_yaw=yaw.copy(), stiffness=springs, within=window)))
+        return timed

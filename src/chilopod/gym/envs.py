@@ -1,4 +1,4 @@
-"""The environments as Gymnasium knows them: a batch of robots, and one of them alone."""
+"""Environments of Gymnasium: a batch of robots, and a single robot."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FPS = 10  # pictures of a film, each a gait cycle
 
 
 def _without_pictures(env: Any) -> dict[str, Any]:
-    """State of an environment for copies; pictures are drawn from the episodes anew."""
+    """State of an environment for copies; pictures are drawn again from the episodes."""
     return {**env.__dict__, "_pictures": None}
 
 
@@ -48,8 +48,8 @@ def _drawn(env: Any) -> list[Pixels] | None:
 
 
 class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
-    """Robots with one task, all in one walk of an engine. Raises ParameterError if there is no such robot, engine, task
-    or render mode.
+    """Robots with one task, all in one walk of an engine. Raises ParameterError for an unknown robot, engine, task or
+    render mode.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     render_mode
         ``rgb_array`` or None.
     named
-        As of :class:`chilopod.gym.Episodes`: task, springs, patience, disturbance, and what the task has.
+        Arguments of :class:`chilopod.gym.Episodes`: task, springs, patience, disturbance, and fields of the task.
     """
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -87,8 +87,8 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Row, dict[str, Any]]:
-        """Begin an episode with every robot: ``seed`` is that of robot 0, to which that of robot i adds i, or one each;
-        None: as the generators go on."""
+        """Begin an episode with every robot: ``seed`` is that of robot 0, to which robot i adds i, or a list of one
+        each; None continues the generators."""
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:
@@ -135,7 +135,7 @@ class RobotEnv(gymnasium.Env[Row, Row]):
     __getstate__ = _without_pictures
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Row, dict[str, Any]]:
-        """Begin an episode; with a seed the one that trials draw from it."""
+        """Begin an episode; with a seed, that of trials with the same seed."""
         (seed,) = _seeds(seed, 1)
         super().reset(seed=seed)
         step, self._over = self.episodes.begin([self.np_random], [seed]), False
@@ -144,7 +144,9 @@ class RobotEnv(gymnasium.Env[Row, Row]):
     def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
         """Walk for a gait cycle."""
         if self._over:
-            raise ParameterError("the episode is over", field="step", allowed="reset() first")
+            raise ParameterError(
+                "must not be called after the end of an episode", field="step", allowed="reset() first"
+            )
         step = self.episodes.step(np.asarray(action)[None])
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         self._over = terminated or truncated
@@ -161,7 +163,7 @@ def _episodes(
 ) -> Episodes:
     if render_mode not in (None, *_RENDER_MODES):
         allowed = ", ".join(_RENDER_MODES)
-        raise ParameterError("there is no such render mode", field="render_mode", value=render_mode, allowed=allowed)
+        raise ParameterError("must be one of the render modes", field="render_mode", value=render_mode, allowed=allowed)
     engine_named(engine)
     if robot is None:
         robot = _PRESETS.get(engine, _PRESETS["planar"])
@@ -193,7 +195,7 @@ def _whole(seed: object) -> int:
 
 
 def _infos(step: Step) -> dict[str, Any]:
-    """As vector environments give them: every array with a mask, of who has it."""
+    """Infos in the form of vector environments: every array with a mask of the robots that have it."""
     here = np.ones(len(step.reward), dtype=np.bool_)
     return {**step.info, **{f"_{name}": here.copy() for name in step.info}}
 

@@ -28,8 +28,8 @@ from chilopod.tasks.course import patience_of
 from chilopod.trials.disturbance import Disturbance, Drawn, conditions, draw
 
 _MOST = 1 << 20  # robots
-_A_LOOK = 2.0 * (8.0 + 1.0)  # bytes that a look's error and whether it misses take, drawn and in one array
-_SEEDS = 1 << 31  # of episodes that nobody gave one, less than this
+_A_LOOK = 2.0 * (8.0 + 1.0)  # bytes of a look's error and its miss, drawn and in one array
+_SEEDS = 1 << 31  # seeds of episodes without a given one are less than this
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Step:
         begun is 0.
     info
         ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad), ``verdict`` on
-        the target of which the robot is done with this step, or "", and ``arrived``: how many targets so far.
+        the target that ended in this step, or "", and ``arrived``: number of targets reached so far.
     """
 
     observation: NDArray[np.float32]
@@ -56,7 +56,7 @@ class Step:
 @dataclass(frozen=True)
 class Moment:
     """Poses of a batch at the end of a step, for pictures: x, y and heading of module 1 (m, m, rad), joint angles and
-    leg yaw (rad), and the places of the targets (m), each of shape (robots, ...)."""
+    leg yaw (rad), and positions of the targets (m), each of shape (robots, ...)."""
 
     pose: Array
     joint_angles: Array
@@ -65,20 +65,19 @@ class Moment:
 
 
 class Episodes:
-    """Robots that walk to targets, each in an episode of its own. Raises ParameterError if there is no such robot,
-    engine or task.
+    """Robots that walk to targets, each in its own episode. Raises ParameterError for an unknown robot, engine or task.
 
     Parameters
     ----------
     robot, count, engine
         Robot, number of episodes at once, and name of the engine.
     task, chosen
-        Task, or its name among :data:`chilopod.gym.tasks.TASKS`; attributes of it that are to be others, such as
-        ``targets`` or ``rewards``.
+        Task, or its name among :data:`chilopod.gym.tasks.TASKS`; fields of it with other values, such as ``targets`` or
+        ``rewards``.
     springs
         Springs that actions set, see :class:`chilopod.gym.Actions`.
     patience
-        For each target, s; by default the engine's, see :func:`chilopod.tasks.course.patience_of`.
+        Patience for each target, s; by default the engine's, see :func:`chilopod.tasks.course.patience_of`.
     disturbance
         Disturbance of the start and of bearings, as in trials.
     remember
@@ -118,21 +117,21 @@ class Episodes:
         self.sight = Sight(self.actions, common.range)
         gait, least = robot.gait, self.task.farthest / robot.gait.speed
         if self._patience < least:
-            problem, allowed = "is too short for the farthest target", f"{least:g} s or more"
+            problem, allowed = "must be long enough to reach the farthest target", f"{least:g} s or more"
             raise ParameterError(problem, field="patience", value=f"{self._patience:g} s", allowed=allowed)
         self.period = gait.period
         self._looks = int(np.ceil(common.duration / gait.period)) + len(common.goals) + 1
         needed = _A_LOOK * self._looks * self.count
         if needed > memory.available():
             problem, asked = f"would take {memory.in_words(needed)} of memory", f"{self.count} * {common.duration:g} s"
-            allowed = f"less, {memory.in_words(memory.available())} are free"
+            allowed = f"fewer or shorter episodes: {memory.in_words(memory.available())} are free"
             raise ParameterError(problem, field="num_envs * targets * patience", value=asked, allowed=allowed)
         self.moments: deque[Moment] | None = deque(maxlen=self._looks) if remember else None
         self._walk: Walk | None = None
         self._generators: list[np.random.Generator] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        # An engine may be a module, and a walk compiled: both are made anew, the walk to the bit.
+        # An engine may be a module, and a walk compiled: both are rebuilt, the walk to the bit.
         saved = None if self._walk is None else self._walk.save()
         return {**self.__dict__, "_engine": None, "_walk": saved}
 
@@ -150,21 +149,21 @@ class Episodes:
         return int(self._cycle - self._since[robot])
 
     def begin(self, generators: Sequence[np.random.Generator], seeds: Sequence[int | None]) -> Step:
-        """Begin an episode with every robot, in a new walk, with the disturbance that trials draw from its seed. Where
-        that is None it is drawn from the robot's generator, as those of later episodes are."""
+        """Begin an episode with every robot, in a new walk, with the disturbance of trials with its seed. A seed of
+        None, and the seeds of later episodes, are drawn from the robot's generator."""
         self._generators = list(generators)
         return self._begin(seeds)
 
     def step(self, actions: ArrayLike) -> Step:
         """Walk for a gait cycle by actions of shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`;
         those of robots whose episode was over are not used. Raises ParameterError, and changes nothing, before the
-        first episode, or if an action is none."""
+        first episode, or for an invalid action."""
         if self._walk is None:
-            raise ParameterError("there is no episode yet", field="step", allowed="reset() first")
-        told, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk
+            raise ParameterError("must not be called before the first reset", field="step", allowed="reset() first")
+        checked, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk
         if waiting.all():
             return self._begin([None] * self.count)
-        for phase, command in self.actions.commands(told, self._leg_yaw):
+        for phase, command in self.actions.commands(checked, self._leg_yaw):
             walk.advance((self._cycle + phase) * self.period)
             walk.command(command)
         self._cycle += 1
@@ -198,7 +197,7 @@ class Episodes:
     def _drawn(
         self, ids: NDArray[np.intp], seeds: Sequence[int | None]
     ) -> tuple[list[Drawn], list[Any], dict[str, Any]]:
-        """Disturbances and courses of new episodes of some robots, and with what they walk."""
+        """Disturbances, courses and start arguments of new episodes of some robots."""
         chosen = [
             int(self._generators[robot].integers(_SEEDS)) if seed is None else seed
             for robot, seed in zip(ids.tolist(), seeds, strict=True)
@@ -209,14 +208,14 @@ class Episodes:
         return drawn, [self.task.course(seed, self._patience) for seed in chosen], start
 
     def _look(self, walk: Walk, fresh: Marks) -> Step:
-        """Judge, put up the next targets, and see; at the end of a step."""
+        """Judge the targets, set the next ones, and observe, at the end of a step."""
         referee, seen, pose = self._referee, walk.observe(), walk.pose()
         away, left = _distance(referee.aims, pose), referee.time_left(walk.time)
         judged = referee.judge(walk)
         busy, aims = referee.busy, referee.aims
         others = judged.moved & busy
         if others.any():
-            # Who is done with all targets shows the last one once more.
+            # A robot without further targets shows the last one again.
             again = walk.observe()
             seen = replace(
                 seen,
@@ -245,7 +244,7 @@ class Episodes:
         return Step(self.sight.row(self._through(seen)), reward, terminated, truncated, info)
 
     def _through(self, seen: Observation) -> Observation:
-        """Observation that gets through to the robots, with noise and the view that scanners have."""
+        """Observation with the noise and the view of the scanners."""
         look = self._cycle - self._since
         if not self._engine.traits.noisy:
             bearing = seen.bearing + self._errors[np.arange(self.count), look]

@@ -1,4 +1,5 @@
-"""A robot of a batch from above, as films draw it: one panel that is kept, in which only what moves is drawn anew."""
+"""Picture of a robot of a batch from above, in the style of films: one panel, in which only moving parts are
+redrawn."""
 
 from __future__ import annotations
 
@@ -20,13 +21,13 @@ from chilopod.steering import ARRIVAL_RADIUS
 Array = NDArray[np.float64]
 
 SIZE: Final = 480
-"""Pixels, of height and width."""
+"""Height and width of a picture, pixels."""
 
 _FONT, _MARGIN = 14.0, 0.3  # pixels; m
 
 
 class Picture:
-    """Pictures of one robot of a batch while its episodes go on."""
+    """Pictures of one robot of a batch during its episodes."""
 
     def __init__(self, episodes: Episodes, robot: int) -> None:
         self._episodes, self._robot = episodes, robot
@@ -35,7 +36,7 @@ class Picture:
         self._drawn: tuple[Floor, tuple[Aim, ...]] | None = None
 
     def drawn(self) -> NDArray[np.uint8]:
-        """The robot now, shape (:data:`SIZE`, :data:`SIZE`, 3); an empty floor before the first episode."""
+        """Picture of the robot now, shape (:data:`SIZE`, :data:`SIZE`, 3); an empty floor before the first episode."""
         moments = self._episodes.moments
         past = list(moments)[-1 - self._episodes.steps(self._robot) :] if moments else []
         if not past:
@@ -59,7 +60,7 @@ class Picture:
         return bodies(self._episodes.robot, times, pose[..., :2], pose[..., 2], bends, yaws)
 
     def _floor(self, frames: BodyFrames, aims: tuple[Aim, ...]) -> Floor:
-        """The piece of floor that was shown last, if everything is on it; else a square that has room for more."""
+        """Piece of floor of the last picture, if everything is on it; else a larger square."""
         spine, places = frames.spine.reshape(-1, 2), np.array([each.place for each in aims]).reshape(-1, 2)
         spine = spine[np.isfinite(spine).all(axis=1)]
         points = np.concatenate([spine, places - ARRIVAL_RADIUS, places + ARRIVAL_RADIUS])
@@ -72,7 +73,7 @@ class Picture:
         return Floor(middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half, 1.0)
 
     def _lay(self, scene: Scene) -> None:
-        """The floor and its targets, on which the robot is drawn."""
+        """Draw the floor and its targets, as a background of the robot."""
         self._figure.clear()
         axes: Axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0))
         zoom = SIZE / (scene.floor.x1 - scene.floor.x0)
@@ -83,7 +84,7 @@ class Picture:
 
 
 def _aims(places: list[Array], period: float) -> tuple[Aim, ...]:
-    """The targets so far, in the order of their turns."""
+    """Targets so far, in their order."""
     aims: list[Aim] = []
     for step, place in enumerate(places):
         where = float(place[0]), float(place[1])

@@ -1,4 +1,4 @@
-"""Strategies as policies: what to do for what an environment shows."""
+"""Strategies as policies: actions for the observations of an environment."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from chilopod.tasks.radius_law import radius_law
 Row = NDArray[np.float32]
 
 Policy = Callable[[Row], Row]
-"""From the observation of a robot, or one a robot, to its action."""
+"""Function from observations, one row or one for each robot, to actions."""
 
 BASELINES = {name: each for name, each in ON_THE_WAY.items() if not each.needs_torque}
-"""Strategies that steer with what actions set."""
+"""Strategies that steer only with the actuators of actions."""
 
 
 @dataclass(frozen=True)
 class Steered:
     """A controller that steers by springs and leg yaw as a policy, for episodes.
 
-    At every step it is asked at all its events at once, with what is seen at the beginning of the gait cycle. In a walk
-    it is asked at each event when it comes: it then sees what a policy saw up to a cycle before. Springs that the
-    controller does not set stay as stiff as in the robot file, as far as actions go.
+    At every step the controller is called at all its events at once, with the observation at the beginning of the gait
+    cycle. In a walk it is called at each event in turn, with an observation up to a cycle later. Springs that the
+    controller does not set keep the stiffness of the robot file, within the range of actions.
     """
 
     controller: Controller
     episodes: Episodes
 
     def __call__(self, observation: Row) -> Row:
-        """Actions for observations, one row or one a robot."""
+        """Actions for observations, one row or one for each robot."""
         rows, actions = np.atleast_2d(observation), self.episodes.actions
         seen = self.episodes.sight.seen(rows)
         yaw, stiffness = seen.leg_yaw.copy(), np.tile(actions.robot.springs.stiffness, (len(rows), 1))
@@ -58,14 +58,14 @@ def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
     Parameters
     ----------
     name, episodes
-        ``leg-yaw``: the paper's controller, the springs as they are; or ``variable``: the first spring is set besides.
+        ``leg-yaw``: the paper's controller with constant springs; or ``variable``, which also sets the first spring.
     engine
         Engine of the radius law of ``variable``, see :func:`chilopod.tasks.radius_law`.
 
     Raises
     ------
     ParameterError, AnalysisError
-        If there is none of this name, or the robot has no radius law, and the strategy stands on it.
+        For an unknown name, or if the strategy needs a radius law and the robot has none.
     """
     strategy = strategy_named(name, BASELINES)
     law = radius_law(episodes.robot, engine) if strategy.needs_law else None

@@ -1,4 +1,4 @@
-"""Senses of a robot, as one row of bounded numbers."""
+"""Observations of a robot as one row of bounded numbers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _MOST_BENT = 0.5 * np.pi  # rad, of a joint of a robot that walks
 
 @dataclass(frozen=True)
 class Sight:
-    """The layout of an observation.
+    """Layout of an observation.
 
-    In order: whether the target is seen (0 or 1); sine and cosine of its bearing, left positive, and its distance in m,
+    In order: visibility of the target (0 or 1); sine and cosine of its bearing, left positive, and its distance in m,
     all 0 where it is not seen; the yaw joints, rad; the yaw of the left and of the right leg of module 1 as last
-    commanded, rad; and the springs that actions set, as the action that sets them to what they are. A robot that does
-    not walk any more shows straight joints. ``range`` is that of the robot's scanner, m.
+    commanded, rad; and the springs that actions set, in the scale of actions. A robot that no longer walks shows
+    straight joints. ``range`` is that of the robot's scanner, m.
     """
 
     actions: Actions

@@ -23,8 +23,8 @@ Marks = NDArray[np.bool_]
 class Rewards:
     """Weights of the reward of a step, see :meth:`Task.reward`.
 
-    Weighed are every metre that the target has come nearer, arriving at a target, every gait cycle, and the failure of
-    a robot that falls, or bends a joint too far, besides what the time that was left is charged.
+    The weights are for every metre of progress towards the target, arrival at a target, every gait cycle, and the
+    failure of a robot that falls or bends a joint too far, in addition to the charge for its remaining time.
     """
 
     progress: float = 1.0
@@ -45,10 +45,10 @@ class Look:
     Attributes
     ----------
     judged, busy
-        Marks of the robots that are done with a target, and of those that have another one.
+        Masks of the robots whose target ended, and of those that have another one.
     nearer, left, period, speed
-        Distance by which the target has come nearer, m, NaN where there is none; time left for all targets and length
-        of a step, s; speed of the straight walk without slip, m/s.
+        Progress towards the target, m, NaN for robots without one; time left for all targets and length of a step, s;
+        speed of the straight walk without slip, m/s.
     """
 
     judged: Judged
@@ -61,7 +61,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Task:
-    """Reward and ending of an episode, with these weights of the reward; subclasses say which targets it has."""
+    """Reward and end of an episode, with weights of the reward; subclasses define the targets."""
 
     rewards: Rewards = Rewards()
 
@@ -71,36 +71,36 @@ class Task:
 
     @property
     def farthest(self) -> float:
-        """Largest distance of a target when its turn comes, m; by default that of random courses."""
+        """Largest distance of a target when it is set, m; by default that of random courses."""
         return RANDOM_DISTANCES[1]
 
     def course(self, seed: int, patience: float) -> Course:
-        """Targets of the episode of a seed, each with so much time, s; as many for every seed."""
+        """Targets of the episode of a seed, each with a patience, s; the same number for every seed."""
         raise NotImplementedError
 
     def reward(self, look: Look) -> Array:
         """Reward of a step.
 
-        A robot that fails is charged as if it walked straight away from its targets until their time is over, with the
-        penalty for failing on top: walking on to the end of the time is then never worse, whatever the robot does.
+        A robot that fails is charged as if it walked straight away from its targets until their time is over, plus the
+        penalty for failing. Therefore walking on is never worse than failing.
         """
         worth = self.rewards
-        # At worst a robot that walks on gains as little as this in the time that is left.
+        # Least gain of a robot that walks on in the time left.
         least = min(worth.cycle, 0.0) / look.period - abs(worth.progress) * look.speed
         reward = worth.progress * np.nan_to_num(look.nearer) + worth.arrival * look.judged.arrived
         reward += worth.cycle + np.where(look.judged.gone, worth.failure + least * look.left, 0.0)
         return np.asarray(reward)
 
     def ending(self, look: Look) -> tuple[Marks, Marks]:
-        """Marks of the robots that have arrived at their last target or do not walk any more (*terminated*), and of
-        those whose time for the last target is over (*truncated*)."""
+        """Masks of the robots that have arrived at their last target or no longer walk (*terminated*), and of those
+        whose time for the last target is over (*truncated*)."""
         judged = look.judged
         return judged.gone | (judged.arrived & ~look.busy), (judged.late | judged.unseen) & ~look.busy
 
 
 @dataclass(frozen=True)
 class RandomTargets(Task):
-    """So many random targets, one after the other, see :func:`chilopod.steering.random_course`."""
+    """A number of random targets, one after the other, see :func:`chilopod.steering.random_course`."""
 
     targets: int = 1
 
@@ -115,7 +115,7 @@ class RandomTargets(Task):
 
 @dataclass(frozen=True)
 class OneTarget(Task):
-    """One target at the same place for every seed, where a robot that is not disturbed sees it."""
+    """One target at the same position for every seed, relative to a robot without disturbance."""
 
     target: Target = field(kw_only=True)
 
@@ -130,7 +130,7 @@ class OneTarget(Task):
         return self.target.distance
 
     def course(self, seed: int, patience: float) -> Course:
-        """The place of the target."""
+        """Course of the target alone."""
         x, y = self.target.position.tolist()
         return Course((Goal(x, y, relative=False),), patience)
 
@@ -145,14 +145,14 @@ TASKS: Final[Mapping[str, Task]] = {
 
 
 def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
-    """A task, or the one of this name, with some of its attributes chosen otherwise. Raises ParameterError if there is
-    no such task, or it has no such attribute."""
+    """Return a task, given itself or by name, with other values of some fields. Raises ParameterError for an unknown
+    task or field."""
     found = TASKS.get(task) if isinstance(task, str) else task
     if not isinstance(found, Task):
         nearest, allowed = nearest_name(str(task), TASKS), f"{', '.join(TASKS)}, or a chilopod.gym.Task"
-        raise ParameterError("there is no such task", field="task", value=task, allowed=allowed, nearest=nearest)
+        raise ParameterError("must be one of the tasks", field="task", value=task, allowed=allowed, nearest=nearest)
     names = [each.name for each in fields(found)]
     for name in chosen.keys() - names:
-        problem = f"is no attribute of a {type(found).__name__}"
+        problem = f"must be a field of {type(found).__name__}"
         raise ParameterError(problem, field=name, value=chosen[name], allowed=", ".join(names))
     return replace(found, **chosen)

@@ -1,4 +1,4 @@
-"""The paper's planar model: compiled equations of motion, linearisation, flow and its derivative; an engine."""
+"""The paper's planar model as an engine: compiled equations of motion, linearisation, flow and its derivative."""
 
 from typing import TYPE_CHECKING
 

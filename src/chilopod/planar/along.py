@@ -1,4 +1,4 @@
-"""Periodic walks that are followed through a parameter: many robots a call, few tangents, means over a period."""
+"""Planar model for periodic walks along a parameter: many robots in a call, few tangents, means over a period."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 NODES = 16
 """Gauss-Legendre nodes in every interval between two switches: after each one, motion settles within milliseconds."""
 
-_AT_ONCE = 500  # walks of which the motion is held in memory
+_AT_ONCE = 500  # walks whose motion is held in memory
 _DERIVATIVE = 100.0  # tolerance of the derivative over that of the state
 _CUTS = (1 / 6, 1 / 3, 1 / 2)  # of the interval, where tangents that have died out are dropped
 _DEAD = 1e-12  # size of a tangent that no longer matters, relative to the largest
@@ -51,7 +51,7 @@ class FollowedModel(PlanarModel):
         tolerance = _DERIVATIVE * self.tolerance
         state, left, right = x.astype(np.complex128), np.eye(self.dimension), np.eye(self.dimension)
         for start, end in zip(times, times[1:], strict=False):
-            batch = np.ascontiguousarray(state + 1j * COMPLEX_STEP * left.T)  # numba would compile all once more
+            batch = np.ascontiguousarray(state + 1j * COMPLEX_STEP * left.T)  # numba would compile everything once more
             carry([self], batch, start, end, tolerance)
             state, left = batch[0].real.astype(np.complex128), batch.imag.T / COMPLEX_STEP
             basis, upper, order = qr(left, mode="economic", pivoting=True)
@@ -87,7 +87,7 @@ class WalkMeans(ReadOnlyArrays):
     most_bent
         Largest angle of any joint within the period, rad, shape (walks,).
     leg_power
-        Mean power the legs deliver, W, shape (walks,).
+        Mean power that the legs deliver, W, shape (walks,).
     floor_power
         Mean power lost at the feet, W, never positive, shape (walks,).
     drifts
@@ -137,7 +137,7 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
 
 def _check_one_each(models: Sequence[PlanarModel], states: Array, name: str) -> None:
     if states.ndim != 2 or not 0 < len(models) == len(states):
-        raise ParameterError("must be one for each model", field=name, value=states.shape, allowed="at least one")
+        raise ParameterError("must have one row for each model", field=name, value=states.shape, allowed="at least one")
 
 
 def _alike(models: Sequence[PlanarModel]) -> bool:

@@ -1,4 +1,4 @@
-"""How far a walk carries the robot over the floor."""
+"""Displacement of the robot over the floor in a period of its walk."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 class Drift:
     """Motion of module 1 over one period of a periodic walk, in its own frame at the start.
 
-    Repeated for ever, it moves the robot along a circle, so the figures below are those of the path, whatever happens
-    within a period.
+    The repeated motion follows a circle, so the quantities below describe the path over many periods.
 
     Attributes
     ----------
@@ -21,7 +20,7 @@ class Drift:
     turn
         Change of heading, rad, left positive.
     period
-        s.
+        Duration of a gait cycle, s.
     """
 
     forward: float

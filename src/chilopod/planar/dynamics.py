@@ -30,13 +30,13 @@ from chilopod.planar.contact import C_EX, C_EY, C_PD, C_PP, C_PXE, C_SUM, C_X, C
 LENGTH, MASS, INERTIA, SPEED = range(4)
 
 SCRATCH = 10
-"""Numbers per module that the right-hand side keeps."""
+"""Scratch numbers of the right-hand side for each module."""
 
 _COS, _SIN, _RATE, _VX, _VY, _HX, _HY, _INVERSE, _BIAS, _JOINT = range(SCRATCH)
 
 SPRING = 6
 ORIGIN, LEVEL, SLOPE, BEHIND, DECAY, TORQUE = range(SPRING)
-"""Columns that describe a spring that changes, and what drives its joint beside it."""
+"""Columns that describe a changing spring and the torque at its joint."""
 
 
 def _spring_torque(springs: Any, joint: int, angle: Any, t: Any) -> Any:

@@ -29,22 +29,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Powers:
-    """Where energy comes from and goes to, W.
+    """Powers that enter and leave the robot, W.
 
     Their sum is the rate of change of the kinetic and elastic energy.
 
     Attributes
     ----------
     legs
-        Delivered by the leg motors: each stance foot is driven back relative to its module against its friction force.
+        Power of the leg motors, which drive each stance foot back relative to its module against its friction force.
     floor
-        Lost to friction at the feet, never positive.
+        Power of friction at the feet, never positive.
     dampers
-        Lost in the yaw joints, never positive.
+        Power of the dampers of the yaw joints, never positive.
     springs
-        Done on bent springs by stiffening them, 1/2 theta^2 dk/dt.
+        Power of stiffening bent springs, 1/2 theta^2 dk/dt.
     drives
-        Delivered by torques at the yaw joints.
+        Power of torques at the yaw joints.
     """
 
     legs: float
@@ -55,7 +55,7 @@ class Powers:
 
     @property
     def total(self) -> float:
-        """Their sum."""
+        """Sum of all powers, W."""
         return self.legs + self.floor + self.dampers + self.springs + self.drives
 
 
@@ -68,7 +68,7 @@ def module_motion(model: PlanarModel, x: ArrayLike) -> tuple[Array, Array]:
 
 
 def energy(model: PlanarModel, x: ArrayLike, stiffness: ArrayLike | None = None) -> float:
-    """Kinetic and elastic energy, J; with the springs of the model, or of a ``stiffness``, N*m/rad, shape (N-1,)."""
+    """Kinetic and elastic energy, J, with the springs of the model or a given ``stiffness``, N*m/rad, shape (N-1,)."""
     x = np.asarray(x, dtype=np.float64)
     _, twist = module_motion(model, x)
     robot = model.robot

@@ -1,7 +1,7 @@
 """Flow of the nonlinear planar model and its derivative, many robots at a time.
 
-The compiled loop runs over robots; each is carried from switch to switch of its contact pattern, so that the integrator
-only ever sees a smooth right-hand side. A tangent is one more "robot" whose state has an imaginary part (see
+The compiled loop runs over robots; each is integrated from switch to switch of its contact pattern, so that the
+right-hand side is always smooth. A tangent is one more "robot" whose state has an imaginary part (see
 :mod:`chilopod.integrate`).
 """
 
@@ -45,11 +45,10 @@ def pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array
 
     Returns
     -------
-    Where in its contact interval each piece starts (s), how long it lasts (s), and which interval of the period it
-    belongs to.
+    Start of each piece in its contact interval, s, its duration, s, and the number of the interval in the period.
     """
     if not (np.isfinite(t0) and np.isfinite(t1) and t0 <= t1):
-        raise ParameterError("times must be finite and in order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
+        raise ParameterError("must be finite and ascending", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
     period = gait.period
     times = gait.schedule(modules).times
     first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
@@ -68,12 +67,12 @@ def advance(
 ) -> Any:
     """Carry every row of ``states`` through all pieces of time, in place, on all cores.
 
-    Pieces start at times in their contact intervals and last so long, s, shape (pieces,). There is one robot for all
-    states or one for each; states have shape (states, 2N+1), or with poses behind (states, 2N+4), float64 or
+    Pieces have start times in their contact intervals and durations, s, shape (pieces,). One robot serves all states,
+    or each state has its own; states have shape (states, 2N+1), or with poses behind (states, 2N+4), float64 or
     complex128. The tolerance is relative to max(1, |x|). Nodes are parts of every piece, rising, 0 to 1.
 
     Returns reduced states at the nodes, shape (states, pieces, nodes, 2N+1), None if a motion diverges. ParameterError
-    if shapes do not go together: compiled code would read beyond them.
+    for inconsistent shapes, because compiled code would read beyond the arrays.
     """
     count, (several, joints) = len(states), robots.stiffness.shape
     fits = (

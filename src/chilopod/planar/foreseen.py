@@ -1,4 +1,4 @@
-"""Cost of a walk of the planar model, foreseen before it is begun: the steps of its integrator."""
+"""Estimated cost of a walk of the planar model before its start: the steps of its integrator."""
 
 from __future__ import annotations
 
@@ -9,26 +9,25 @@ MOST_STEPS = 2e9
 """Largest number of steps of all modules together: an hour or so of one robot on one core."""
 
 _REACH = 6.0
-"""About the fastest rate times the longest step with which the integrator is stable."""
+"""Approximate stability limit of the integrator: fastest rate times longest step."""
 
 
 def check_steps(robot: Robot, seconds: float) -> None:
-    """Refuse a walk of some seconds that would take more steps than anybody waits for, naming what makes it move so
-    fast."""
+    """Refuse a walk that would take too many steps; the error names the property that makes the motion so fast."""
     switches = len(robot.gait.schedule(robot.body.modules).times) - 1  # as far as they differ; each ends a step
     rates = {**_rates(robot), "gait.stance, gait.swing": _REACH * switches / robot.gait.period}
     steps = robot.body.modules * seconds * sum(rates.values()) / _REACH
     if steps > MOST_STEPS:
         problem = f"the motion is too fast to follow for {seconds:g} s: about {steps:.0e} steps of modules"
-        allowed = f"what takes at most {MOST_STEPS:.0e}"
+        allowed = f"at most {MOST_STEPS:.0e} steps of modules"
         raise ParameterError(problem, field=max(rates, key=rates.__getitem__), allowed=allowed)
 
 
 def _rates(robot: Robot) -> dict[str, float]:
     """Contribution of each property to a bound on the fastest motion, 1/s.
 
-    The bounds are those of modules that nothing joins. Joints only take freedom away, and by Rayleigh's principle what
-    is left is damped and sprung no more strongly.
+    The bounds hold for modules without joints. Joints only remove degrees of freedom, and by Rayleigh's principle the
+    remaining motion is damped and sprung no more strongly.
     """
     mass, inertia = robot.module_mass, robot.module_yaw_inertia
     legs, springs, friction = robot.legs, robot.springs, robot.ground.friction

@@ -8,7 +8,7 @@ a polynomial of second degree because the feet move back at constant speed. Subs
 exact recurrence (k + 1) z_{k+1} = A0 z_k + A1 z_{k-1} + A2 z_{k-2}.
 
 The feet damp motion at rates from 0 to some -rho = -450 /s, and the series of exp(-rho t) cancels itself to nothing.
-So the series is taken of y = exp(rho t / 2) z, whose rates are centred about zero: its terms add up to the large
+Therefore the series is that of y = exp(rho t / 2) z, whose rates are centred about zero: its terms add up to the large
 growth of the slow modes instead of cancelling, round-off stays relative to the slow modes however long the step, and
 one step spans the whole interval between two switches. Springs that ring at a high frequency f beside little damping
 still cancel, by exp(|rho/2 + i f| h - rho h / 2), and shorten the step h. The derivation by hand is checked in the
@@ -120,7 +120,7 @@ def system_matrices(
     rates = np.zeros((n - 1, n + 2))
     rates[range(n - 1), range(2, n + 1)] = -1.0
     rates[range(n - 1), range(3, n + 2)] = 1.0
-    # A power series knows no direction of time, so its terms grow as fast as the motion of the interval before, run
+    # A power series has no direction of time, so its terms grow as fast as the motion of the interval before, run
     # backwards, would: the mean of the drag from -h to 0 counts too. Within the interval the largest stands at an end,
     # since a foot damps as the square of a linear function of time.
     h = durations[:, None, None]
@@ -171,7 +171,7 @@ def joint_bound(compliance: Array, torque: Array) -> float:
 
 
 def steps(widths: Array, decay: Array, frequency: float) -> float:
-    """About how many Taylor steps :func:`propagate` takes."""
+    """Approximate number of Taylor steps of :func:`propagate`."""
     centred = np.hypot(0.5 * decay, frequency)
     return float((widths * np.maximum(centred / _LONGEST, (centred - 0.5 * decay) / _CANCELLED)).sum())
 
@@ -187,8 +187,8 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
     """Carry one panel of columns through all intervals, in place; returns (error, orders).
 
     ``state`` has 2N+1 rows and then zeros, up to a multiple of ROWS. The error bounds that of the largest entry of the
-    result. How much round-off matters depends on what the motion makes of it, so the last column is no solution but a
-    sample of round-off: every step adds what rounding its matrix may do, with arbitrary signs, and carries it on.
+    result. The effect of round-off depends on the motion, so the last column is a sample of round-off instead of a
+    solution: every step adds the rounding error of its matrix, with arbitrary signs, and propagates it.
     """
     intervals, velocities = upper.shape[0], upper.shape[1]
     n = upper.shape[3]
@@ -228,7 +228,7 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
                 reach[i] = 0.0
                 for q in range(PANEL - 1):
                     reach[i] = max(reach[i], abs(state[i, q]))
-            # What a step's length multiplies is rounded with it; at a switch, with the clock.
+            # The product with a step's length carries its rounding error; at a switch, that of the clock.
             rounded = 1.0 if part > 0 else 1.0 + clock / (_CARRIED * h)
             for i in range(n):
                 size = reach[i]
@@ -248,7 +248,7 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
                 series_term(block, terms, at, 1.0 / k, state)
                 at -= rows
                 orders += 1
-                # The recurrence remembers two orders: three small ones in a row end it.
+                # The recurrence uses three orders, so three small terms in a row end it.
                 if k % _CHECKED == 0:
                     size = _largest(terms[at : at + 3 * rows])
                     peak = max(peak, size)
@@ -262,7 +262,7 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
     carried = 0.0
     for i in range(n):
         carried = max(carried, abs(state[i, PANEL - 1]))
-    # How much the factors leave to spare on random robots, the tests find in extended precision.
+    # The tests measure the margin of the factors on random robots in extended precision.
     return 2.220446049250313e-16 * (_CARRIED * carried / _ROUND_OFF + _OWN * largest), orders
 
 
@@ -312,6 +312,8 @@ def propagate(
     """
     n, intervals = len(matrix), widths.size
     if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):
-        raise ParameterError("has the wrong shape", field="upper", value=upper.shape, allowed="see propagate()")
+        raise ParameterError(
+            "has the wrong shape", field="upper", value=upper.shape, allowed="the shapes that propagate() documents"
+        )
     error, orders = _propagate_all(widths, upper, decay, frequency, clock, matrix)
     return float(error), int(orders)

@@ -40,19 +40,19 @@ _MOST_NUMBERS = 1e8  # of the matrices of a period
 class PlanarModel(ReadOnlyArrays):
     """The paper's planar model (eq. 1) of one robot, period by period.
 
-    The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). Of what
-    :mod:`chilopod.stability.problem.capabilities` names it knows its orbit, scale, symmetries and switch times, bounds
-    its error, and carries many states or many robots at once; :class:`chilopod.planar.along.FollowedModel` also carries
-    each state by its own robot. It has no tangents or frames, for its full derivative is small. It does not change once
-    it is made, and its arrays cannot be written into: another robot is another model.
+    The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). Of the
+    capabilities in :mod:`chilopod.stability.problem.capabilities` it has orbit, scale, symmetries, switch times, error bound,
+    and flows of many states or many robots at once; :class:`chilopod.planar.along.FollowedModel` adds flows of each
+    state with its own robot. It has no tangents or frames, because its full derivative is small. A model is immutable:
+    another robot needs another model.
 
     Parameters
     ----------
     robot
-        The description; SI inside.
+        Description of the robot.
     tolerance
-        Tolerance of the nonlinear flow, relative to max(1, |x|). The straight walk does not use it: there the
-        derivative comes from the linearised equations by Taylor series, to round-off.
+        Tolerance of the nonlinear flow, relative to max(1, |x|). The straight walk does not use it: its derivative
+        comes from the linearised equations by Taylor series, to round-off.
     use_symmetry
         True to offer the half-period symmetry of the gait, where it has one, to the analyses.
     """
@@ -88,15 +88,15 @@ class PlanarModel(ReadOnlyArrays):
 
     @cached_property
     def orbit(self) -> Array:
-        """The straight walk, shape (2N+1,): every stance foot rests on the floor, so it moves at stride/stance for
-        ever."""
+        """The straight walk, shape (2N+1,): every stance foot rests on the floor, so the robot moves at
+        stride/stance."""
         state = np.zeros(self.dimension)
         state[0] = self.robot.gait.speed
         return read_only(state)
 
     @cached_property
     def scale(self) -> Array:
-        """Large changes of the states: m/s, rad/s and rad are of the order of one."""
+        """Typical size of the states: one in m/s, rad/s and rad."""
         return read_only(np.ones(self.dimension))
 
     @property
@@ -144,7 +144,7 @@ class PlanarModel(ReadOnlyArrays):
         carry([self], batch, t0, t1, self.tolerance)
         derivative = batch.imag.T / COMPLEX_STEP
         # Against finer steps the global error stays within some tens of the tolerance per step, times the growth of the
-        # motion; and the derivative is that of a motion so much in error, which counts as its growth once more.
+        # motion; the derivative is that of a motion with this error, which adds the growth once more.
         growth = max(1.0, float(np.abs(derivative).max()))
         error = 100.0 * self.tolerance * growth**2
         return batch[0].real.copy(), derivative, error
@@ -166,7 +166,7 @@ class PlanarModel(ReadOnlyArrays):
         return out
 
     def drift(self, x: ArrayLike) -> Drift:
-        """How the robot moves over the floor in one period that starts in state x at time 0."""
+        """Motion over the floor in one period that starts in state x at time 0."""
         batch = np.append(self._checked(x), np.zeros(3))[None]
         carry([self], batch, 0.0, self.period, self.tolerance)
         forward, left, turn = batch[0, -3:].tolist()
@@ -189,7 +189,7 @@ class PlanarModel(ReadOnlyArrays):
 
     @property
     def contraction(self) -> float:
-        """How many times the fastest motion about the straight walk dies out by a factor of e in a period, at most."""
+        """Upper bound on the decay of the fastest motion about the straight walk, in factors of e in a period."""
         return float(self._linearised[3] @ np.diff(self.schedule.times))
 
     @staticmethod
@@ -212,8 +212,8 @@ class PlanarModel(ReadOnlyArrays):
         return to_joint @ matrices, _ROWS_DIFFER * errors
 
     def can_flow_with(self, other: PlanarModel) -> bool:
-        """True if :meth:`flow_many` may take both robots at once: they differ in springs at the most in what sets the
-        shape."""
+        """True if :meth:`flow_many` accepts both robots in one call: they differ in no property but springs and
+        dampers."""
         here, there = self.robot, other.robot
         return self.modules == other.modules and (here.gait is there.gait or here.gait == there.gait)
 
@@ -235,12 +235,14 @@ class PlanarModel(ReadOnlyArrays):
 
     @cached_property
     def _linearised(self) -> tuple[Array, Array, Array, Array, float]:
-        """Linear equations of one period: the passive matrices, what springs and dampers take from A0, the fastest
-        decay in every interval, and the frequency of the springs."""
+        """Linear equations of one period: the passive matrices, the contribution of springs and dampers to A0, the
+        fastest decay in every interval, and the frequency of the springs."""
         robot = self.robot
         n, intervals = self.modules, len(self.schedule.times) - 1
         if 3 * intervals * (n + 2) * (2 * n + 1) > _MOST_NUMBERS:
-            problem = f"its equations are too many: {intervals} intervals between touch-downs and lift-offs in a period"
+            problem = (
+                f"the periodic walk takes too many equations: a period has {intervals} intervals of constant contact"
+            )
             allowed = "fewer modules, or phases with which many legs touch down at once"
             raise AnalysisError(problem, field="body.modules", value=n, allowed=allowed)
         passive, joint, rates, decay = _passive_matrices(
@@ -286,7 +288,7 @@ class PlanarModel(ReadOnlyArrays):
         return widths, upper, decay, frequency
 
     def _clock(self, t0: float, t1: float) -> float:
-        """The largest time from which those between t0 and t1 are computed."""
+        """Largest time from which the times between t0 and t1 are computed."""
         return max(abs(t0), abs(t1), self.period)
 
 
@@ -301,7 +303,7 @@ def carry(
     starts, widths, interval = models[0]._pieces(t0, t1)
     recorded = advance(starts, widths, _chains(models, interval), states, tolerance, nodes)
     if recorded is None:
-        raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
+        raise AnalysisError(f"the motion must stay finite, but it diverges between {t0:g} s and {t1:g} s", field="x")
     return recorded
 
 

@@ -1,4 +1,4 @@
-"""Record of a walk: places, angles, rates and foot forces over time."""
+"""Record of a walk: positions, angles, rates and foot forces over time."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 
 def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Array) -> xr.Dataset:
     """States with poses over time, shape (samples, robots, 2N+4), as named quantities on the floor, see
-    :func:`chilopod.record.walk_record`; samples are in s, leg yaw in rad, shape (samples, robots, 2), and any of the
-    robots' models will do."""
+    :func:`chilopod.record.walk_record`; samples are in s, leg yaw in rad, shape (samples, robots, 2), and any one of
+    the robots' models serves."""
     n = model.modules
     heading = states[..., 2 * n + 3]
     return walk_record(
@@ -37,7 +37,7 @@ def foot_forces(
     models: Sequence[PlanarModel], samples: Array, states: Array, leg_yaw: Array, friction: Array
 ) -> xr.DataArray:
     """Force of the floor on every foot, zero for those in the air, along the floor's axes, N, over (time, robot,
-    module, side, axis): foot by foot from places and velocities, without the contact moments."""
+    module, side, axis): foot by foot from positions and velocities, without the contact moments."""
     n, gait = models[0].modules, models[0].robot.gait
     phase = gait.phases(samples, n)[:, None]
     yaw = np.zeros((*states.shape[:2], n, 2))

@@ -1,9 +1,9 @@
-"""One term of a matrix Taylor series in vector registers, where the linearised flow spends its time.
+"""One term of a matrix Taylor series in vector registers, the innermost loop of the linearised flow.
 
 For matrices of some ten rows a BLAS call costs more than its arithmetic, and the compiler does not keep sums in
 registers across an inner loop over columns. So the product is written out as compiler instructions: four rows times
 two vectors of eight columns stay in registers while the inner index runs; on processors with narrower vectors the
-compiler splits the operations. ``benchmarks/series_term.py`` holds it against plain loops and BLAS.
+compiler splits the operations. ``benchmarks/series_term.py`` compares it with plain loops and BLAS.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ PANEL = 16
 """Number of columns."""
 
 ROWS = 4
-"""The matrix must have a multiple of so many rows."""
+"""The number of rows of the matrix must be a multiple of this."""
 
 _LANES = 8
 

@@ -28,17 +28,17 @@ def simulate(
     forces: bool = False,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Let robots walk on the plane; each one alone, all of them at the same time.
+    """Simulate walks of robots on the plane; the robots do not interact.
 
     Parameters
     ----------
     robots, initial, friction, target, tolerance
         As for :func:`start`.
     duration
-        s; the gait is at phase 0 at time 0.
+        Duration of the walks, s; the gait is at phase 0 at time 0.
     controller
-        Asked for commands at its events; without one the legs stay straight. In this model a leg's yaw moves at once
-        and matters only while its foot stands.
+        Controller, called at its events; None keeps the legs straight. In this model a leg's yaw changes at once and
+        matters only while its foot stands.
     bearing_noise
         Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events.
@@ -47,22 +47,22 @@ def simulate(
     forces
         True to add the force on every foot.
     progress
-        Called with the part done (0 to 1) and a few words.
+        Function of the fraction done (0 to 1) and a few words.
 
     Returns
     -------
     Dataset over time, robot (the walk), joint (1 .. N-1), side and axis: ``position`` and ``velocity`` of the centre of
     module 1 on the floor, ``heading``, ``heading_rate``, ``joint_angle``, ``joint_rate``, ``leg_yaw`` (at this moment),
     ``stiffness`` (over time if any spring is adjustable), ``status``; with a target, ``target``, ``distance`` and
-    ``bearing``; with a controller, ``command`` (leg yaw asked for) over (event, robot, side), ``command_stiffness``
-    (NaN where none was asked for) and ``command_torque``, reached ``within`` (event) s; with ``forces``,
-    ``foot_force`` on the robot over (time, robot, module, side, axis), on the floor's axes. From where a walk fails on
-    it is NaN, and ``status`` tells why. Units in attributes.
+    ``bearing``; with a controller, ``command`` (commanded leg yaw) over (event, robot, side), ``command_stiffness``
+    (NaN where none was commanded) and ``command_torque``, reached ``within`` (event) s; with ``forces``, ``foot_force``
+    on the robot over (time, robot, module, side, axis), on the floor's axes. After the failure of a walk all is NaN,
+    and ``status`` gives the reason. Attributes hold the units.
 
     Raises
     ------
     ParameterError
-        If an argument has the wrong shape or is out of range, or the robots do not go together.
+        If an argument has the wrong shape or is out of range, or the robots differ in gait or number of modules.
     """
     in_range("duration", duration, LONGEST, "s")
     walk = start(

@@ -1,8 +1,8 @@
-"""The compiled loop of a simulation: many robots through one stretch of time in which nobody interferes.
+"""Compiled loop of a simulation: many robots through one stretch of time without commands.
 
-Robots walk side by side, each in a lane (see :mod:`chilopod.lanes`) and each for itself, with its own steps and its own
-piece of time; where one has arrived, or failed, the next of those that wait goes on. A robot alone walks in numbers of
-one lane, to the same bits.
+Robots are integrated in parallel, each in a lane (see :mod:`chilopod.lanes`), with its own steps and its own piece of
+time; when one arrives or fails, the next waiting robot takes its lane. A single robot uses numbers of one lane and has
+the same bits.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOP
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
-"""Largest bend of a yaw joint, rad: beyond it modules run into each other."""
+"""Largest bend of a yaw joint, rad: beyond it modules collide."""
 
 _A_GROUP, _GROUPS = LANES, 4
-"""Robots that a thread is given at a time at least, and how many times each thread is given some at most."""
+"""Least number of robots in a group for a thread, and largest number of groups for each thread."""
 
 _WORTH_WAKING, _A_STEP = 2e-4, 2.5e-7
-"""Work that is worth waking other threads for, and that of a step for one module, in lanes, about, s."""
+"""Least work for several threads, and approximate work of a step for one module in lanes, s."""
 
 _TIME, _STEP, _ERROR = range(3)
 _NOBODY = -1
 
 _slope = njit(rhs.py_func)
-"""Without leave for LLVM to fuse, see :mod:`chilopod.lanes`."""
+"""Compiler without permission to fuse, see :mod:`chilopod.lanes`."""
 
 _attempt = lanes_step(_slope)
 
@@ -44,10 +44,10 @@ _attempt = lanes_step(_slope)
 class Pieces(NamedTuple):
     """Pieces of time that all robots walk through.
 
-    Each begins at a time, starts so far into its contact interval and has a width, s; it belongs to a contact
-    ``interval``, and ``sample`` is the place in ``record`` of the state at its end, -1 for none; all of shape
-    (pieces,). By interval, ``contact`` says whether each foot stands and ``stroke`` where it is at the start, m ahead
-    of mid-stroke, shape (intervals, N, 2).
+    Each piece has a begin, a start within its contact interval and a width, s, a contact ``interval``, and the index
+    ``sample`` in ``record`` of the state at its end, -1 for none; all of shape (pieces,). For each interval,
+    ``contact`` is True for standing feet and ``stroke`` is their position at the start, m ahead of mid-stroke, shape
+    (intervals, N, 2).
     """
 
     begins: Any
@@ -79,7 +79,7 @@ class Robots(NamedTuple):
 
 
 class _Lanes(NamedTuple):
-    """Numbers that the right-hand side reads, whose last axis is the lane; see ``dynamics.py``."""
+    """Arguments of the right-hand side, with the lane as last axis; see ``dynamics.py``."""
 
     x: Any
     scalars: Any
@@ -89,11 +89,11 @@ class _Lanes(NamedTuple):
 
 
 class _Places(NamedTuple):
-    """Where the robot in each lane is: its number, or NOBODY, and its piece.
+    """Robot of each lane, or NOBODY, and its progress in its piece.
 
-    No step straddles the end of a ramp: a piece is walked in parts, from ``begin`` to ``end`` of it (s). ``next`` is
-    the step to try next (s), 0 for a guess; ``tried`` counts the steps in this part, ``rejected`` says whether the one
-    before was, and ``last`` whether the present one is to be the last of the part.
+    A step does not straddle the end of a ramp: a piece is walked in parts, from ``begin`` to ``end`` (s). ``next`` is
+    the step to try next (s), 0 for a guess; ``tried`` counts the steps in this part, ``rejected`` is True after a
+    rejected step, and ``last`` is True for the last step of the part.
     """
 
     robot: Any
@@ -108,8 +108,7 @@ class _Places(NamedTuple):
 
 @njit
 def _fit(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: Any, record: Any) -> bool:
-    """True if arguments of :func:`carry` have shapes that go together and are not empty: compiled loops look at no
-    index."""
+    """True if arguments of :func:`carry` have consistent shapes and are not empty; compiled loops check no index."""
     (count, joints), size = robots.lag.shape, pieces.widths.size
     return bool(
         0 < rows.size <= count
@@ -135,10 +134,10 @@ def _fit(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: An
 
 
 def _carrier(width: int) -> Callable[..., bool]:
-    """The loop on one thread for a number of lanes.
+    """Return the loop on one thread for a number of lanes.
 
     It is called as ``carry(rows, pieces, robots, tolerance, states, step, status, record)``, see :func:`carry`, and
-    returns whether shapes of arrays go together; otherwise it does nothing.
+    returns True if the shapes of arrays are consistent; otherwise it does nothing.
     """
 
     @njit
@@ -184,7 +183,7 @@ def _carrier(width: int) -> Callable[..., bool]:
         walking = min(width, rows.size)
         waiting = walking
         for lane in range(width):
-            # Where nobody is, the first robot stands still: numbers that cost no more than others.
+            # An empty lane holds the first robot at rest, whose numbers cost no more than others.
             _put(lane, rows[lane if lane < walking else 0], robots, states, step, lanes, at)
             _begin(lane, at.piece[lane], 0.0, pieces, robots, lanes, clock, at)
             if lane >= walking:
@@ -233,7 +232,7 @@ def _carrier(width: int) -> Callable[..., bool]:
 
 @njit
 def _put(lane: int, r: int, robots: Any, states: Any, step: Any, lanes: Any, at: Any) -> None:
-    """A robot into a lane."""
+    """Put a robot into a lane."""
     at.robot[lane] = r
     at.next[lane] = step[r]
     copy_into(lanes.x[:, lane], states[r])
@@ -243,7 +242,7 @@ def _put(lane: int, r: int, robots: Any, states: Any, step: Any, lanes: Any, at:
 
 @njit
 def _begin(lane: int, s: int, begin: float, pieces: Any, robots: Any, lanes: Any, clock: Any, at: Any) -> None:
-    """The part of a piece that begins somewhere in it: it ends with the piece, or where a ramp does."""
+    """Begin a part of a piece; it ends with the piece, or with a ramp."""
     r = at.robot[lane]
     end = pieces.widths[s]
     for j in range(robots.lag.shape[1]):
@@ -270,7 +269,8 @@ def _begin(lane: int, s: int, begin: float, pieces: Any, robots: Any, lanes: Any
 
 @njit(inline="always")
 def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at: Any) -> None:
-    """As long as the one before suggests, or as is left; see :func:`chilopod.integrate.integrator` for the guess."""
+    """Choose the step that the one before suggests, at most the time left; see :func:`chilopod.integrate.integrator`
+    for the first guess."""
     left = pieces.starts[at.piece[lane]] + at.end[lane] - clock[_TIME, lane]
     if at.next[lane] <= 0.0:
         scale, steep = 0.0, 0.0
@@ -284,7 +284,7 @@ def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at:
 
 @njit(inline="always")
 def _judge_step(lane: int, clock: Any, at: Any) -> bool:
-    """Go on in time if the step was good enough, and say how long the next shall be; whether that is of any use."""
+    """Advance the time if the step is accepted, and set the next step; return False if that is too small."""
     error, step = clock[_ERROR, lane], clock[_STEP, lane]
     factor = step_factor(error, at.rejected[lane])
     at.tried[lane] += 1
@@ -312,7 +312,7 @@ def _most_bent(x: Any, joints: int, lane: int) -> float:
 
 @njit
 def _describe(profile: Any, lag: Any, torque: Any, now: float, zero: float, springs: Any) -> None:
-    """Springs about ``now`` (s) for the right-hand side; its own time begins at ``zero``."""
+    """Describe the springs about ``now`` (s) for the right-hand side, whose own time begins at ``zero``."""
     for j in range(lag.size):
         ramping = now < profile[UNTIL, j]
         springs[j, ORIGIN] = (profile[SINCE, j] if ramping else profile[UNTIL, j]) - zero
@@ -327,10 +327,10 @@ def _describe(profile: Any, lag: Any, torque: Any, now: float, zero: float, spri
 
 
 walk_alone = _carrier(1)
-"""As :func:`carry`, one robot after the other on this thread."""
+""":func:`carry`, one robot after the other on this thread."""
 
 walk_abreast = _carrier(LANES)
-"""As :func:`carry`, side by side on this thread: waking the others takes longer than a step of some robots."""
+""":func:`carry` in lanes on this thread: waking other threads takes longer than a step of a few robots."""
 
 
 @parallel_njit
@@ -345,7 +345,7 @@ def walk(
     status: Any,
     record: Any,
 ) -> bool:
-    """As :func:`carry`, parted into groups, those of a group on one thread: the answer hangs on neither."""
+    """Run :func:`carry` in groups of robots, one thread for each group; the results depend on neither."""
     if not _fit(rows, pieces, robots, states, step, status, record):
         return False
     for group in numba.prange(groups):
@@ -360,10 +360,10 @@ def carry(
     """Carry robots through all pieces of time, in place, on all cores; each robot on its own, step by step.
 
     ``rows`` are the numbers of the robots that walk, at least one. States have poses behind, shape (robots, 2N+4).
-    ``step`` is the one to start with, s, 0 for a guess, and is left at the last one; ``status`` is left at WALKING, or
-    DIVERGED or OUT_OF_RANGE where a robot fails; both of shape (robots,). ``record`` has states over (samples, robots,
-    2N+4); what no robot reached is left alone. ParameterError if shapes of arrays do not go together, or there are no
-    rows or pieces.
+    ``step`` is the first step, s, 0 for a guess, and becomes the last one; ``status`` becomes WALKING, or DIVERGED or
+    OUT_OF_RANGE where a robot fails; both of shape (robots,). ``record`` has states over (samples, robots, 2N+4);
+    samples that a robot does not reach stay unchanged. ParameterError if the shapes of arrays are inconsistent, or rows
+    or pieces are empty.
     """
     what = (rows, pieces, robots, tolerance, states, step, status, record)
     threads = numba.get_num_threads()
@@ -375,10 +375,15 @@ def carry(
     else:
         fits = walk_alone(*what)
     if not fits:
-        raise ParameterError("do not fit together", field="states", value=states.shape, allowed="see carry()")
+        raise ParameterError(
+            "must fit the number of modules and walks",
+            field="states",
+            value=states.shape,
+            allowed="the shapes that carry() documents",
+        )
 
 
 def _work(rows: Any, pieces: Pieces, step: Any) -> float:
-    """How long it will take on one thread, about, s: at least a step a piece, and each as long as the last one."""
+    """Estimated time on one thread, s: at least one step in each piece, each as long as the last one."""
     steps = pieces.widths.size * rows.size + (pieces.widths.sum() / np.maximum(step[rows], 1e-6)).sum()
     return float(_A_STEP * pieces.contact.shape[1] * steps)

@@ -1,12 +1,12 @@
-"""Where the time of a walk is cut: at the switches of the contact pattern, at samples, and where a command comes.
+"""Cuts in the time of a walk: switches of the contact pattern, samples and commands.
 
-A walk is carried from cut to cut, and the integrator takes its steps within. So that the same steps are taken however
-the walk is asked to advance, it stops for good only at cuts that are there anyhow; from the last of them to where it
-was asked to go it is carried on a copy, which becomes the walk only if a command comes there.
+A walk is integrated from cut to cut. It stops for good only at cuts that do not depend on the calls of ``advance``, so
+that the steps are always the same. From the last cut to the time of the call a copy is integrated, which becomes the
+walk only if a command is given there.
 
-No time is a sum of others: a switch is so many periods and its place in the period, a sample its number over the rate,
-a command comes at the time that was given. So a cut lies before another, or not, whoever asks. Who asks for a time that
-lies beside a cut by no more than rounding of whole multiples of the period (``BEGINNING``) is at that cut.
+Times are not sums of others: a switch is a number of periods plus its phase, a sample is its number over the rate, a
+command has the time given. Therefore the order of cuts does not depend on the calls either. A time that differs from a
+cut by no more than rounding of whole multiples of the period (``BEGINNING``) is that cut.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _SAME_INSTANT = 1e-10  # s, within which a sample is taken at a switch
 
 
 class Timeline:
-    """The cuts of one walk, by the contact pattern of one period and samples per second, 0 for none.
+    """Cuts of one walk, from the contact pattern of one period and the samples per second, 0 for none.
 
-    Attribute ``position`` is the place in time, as plain numbers: time of the last cut (s), number of the contact
-    interval it lies in, counted from time 0, or ends, and number of the next sample.
+    Attribute ``position`` holds plain numbers: time of the last cut (s), number of the contact interval in which the
+    cut lies or which it ends, counted from time 0, and number of the next sample.
     """
 
     def __init__(self, schedule: Schedule, rate: float) -> None:
@@ -40,21 +40,21 @@ class Timeline:
 
     @property
     def cut(self) -> float:
-        """The last one, s."""
+        """Time of the last cut, s."""
         return float(self.position[0])
 
     @property
     def samples(self) -> int:
-        """How many lie behind the last cut, with that at time 0."""
+        """Number of samples up to the last cut, with that at time 0."""
         return int(self.position[2])
 
     def whole_pieces(self, until: float) -> tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]]:
         """Go on to the last cut up to a time.
 
-        Returns, of every piece between two cuts, when it begins (s), where in its contact interval that is (s), how
-        long it lasts (s), which interval of the period that is, and which sample is taken at its end, or -1.
+        Returns for every piece between two cuts its begin (s), the same relative to its contact interval (s), its
+        duration (s), the number of the interval in the period, and the number of the sample at its end, or -1.
         """
-        # More than there can be: the switches and samples in between.
+        # Upper bound on the number of cuts: the switches and samples in between.
         span = max(until - self.cut, 0.0)
         intervals = len(self._times) - 1
         most = int((span / self._times[-1] + 2.0) * intervals + span * self._rate) + 3
@@ -65,7 +65,7 @@ class Timeline:
         return begins, starts, widths, numbers[0, :count], numbers[1, :count]
 
     def rest(self, until: float) -> tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]]:
-        """The piece from the last cut to a later time, to which :meth:`whole_pieces` went; nothing is sampled there."""
+        """Piece from the last cut to a later time, to which :meth:`whole_pieces` went, without a sample at its end."""
         number, switch, _ = _interval_after(self._times, self.cut, int(self.position[1]))
         cut = self.position[:1].copy()
         which = np.array([number % (len(self._times) - 1)])
@@ -76,14 +76,14 @@ class Timeline:
         return time <= self.cut + self._moment
 
     def cut_at(self, time: float) -> None:
-        """Cut where a command comes, at a time to which :meth:`whole_pieces` went, unless there is a cut."""
+        """Add a cut for a command, at a time to which :meth:`whole_pieces` went, unless it is one already."""
         if not self.is_at_cut(time):
             self.position[0] = time
 
 
 @njit
 def _interval_after(times: Any, cut: float, number: int) -> tuple[int, float, float]:
-    """The contact interval, from one of that number on, that ends after a cut: its number, begin and end (s)."""
+    """First contact interval, from a number on, that ends after a cut: its number, begin and end (s)."""
     intervals = times.size - 1
     while True:
         cycle, index = number // intervals, number % intervals

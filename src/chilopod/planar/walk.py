@@ -1,4 +1,4 @@
-"""Walks of many robots at a time that go on step by step."""
+"""Planar walks of many robots at a time, advanced step by step."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from chilopod.robot import Robot
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
-"""Default of :func:`start`: a minute of walking is then good to better than 1e-6 m."""
+"""Default of :func:`start`: a minute of walking is then accurate to 1e-6 m."""
 
 traits = Traits(
     name="planar",
@@ -86,23 +86,28 @@ def start(
     tolerance: float = TOLERANCE,
     expected: float = 0.0,
 ) -> PlanarWalk:
-    """Put robots on the plane, see :class:`chilopod.engine.Engine`.
+    """Start walks on the plane, see :class:`chilopod.engine.Engine`.
 
     Parameters
     ----------
     robots, friction, target, record, expected
-        As there. Robots share gait and number of modules and may differ in all else.
+        See :class:`chilopod.engine.Engine`. Robots share gait and number of modules and may differ in everything else.
     initial
-        States with poses, shape (walks, 2N+4) or (2N+4,), such as :func:`initial_states` and ``states`` of a walk give.
+        States with poses, shape (walks, 2N+4) or (2N+4,), from :func:`initial_states` or ``states`` of a walk.
     seeds
-        Not used: what these robots see has no noise.
+        Not used: observations have no noise here.
     tolerance
         Tolerance of every step, relative to max(1, |state|).
     """
     tolerance, expected = in_range("tolerance", tolerance, 1e-2), check_wishes(record, expected)
     given = as_robots(robots)
     if record is not None and record.poses:
-        raise ParameterError("the planar model has none", field="poses", value=True, allowed="False, or the twin")
+        raise ParameterError(
+            "must be False: the planar model has no poses in space",
+            field="poses",
+            value=True,
+            allowed="False, or the engine twin",
+        )
     if any(common(robot) != common(given[0]) for robot in given[1:]):
         raise ParameterError("must have the same gait and number of modules", field="robots")
     standing_still = initial_states(given[0])
@@ -111,15 +116,15 @@ def start(
 
 
 def resume(saved: bytes) -> PlanarWalk:
-    """A walk that was saved, see :class:`chilopod.engine.Engine`."""
+    """Continue a saved walk, see :class:`chilopod.engine.Engine`."""
     return resumed(traits, saved, PlanarWalk)
 
 
 @one_thread
 class PlanarWalk(BatchWalk):
-    """Robots under way on the plane, see :class:`chilopod.engine.Walk`; :func:`start` makes one.
+    """Walk on the plane, see :class:`chilopod.engine.Walk`; made by :func:`start`.
 
-    A target is seen wherever it is. A leg's yaw moves at once here and matters only while its foot stands.
+    A target is visible in every direction. A leg's yaw changes at once here and matters only while its foot stands.
     """
 
     def __init__(self, begun: Beginning, record: Recording | None, tolerance: float, expected: float = 0.0) -> None:
@@ -150,7 +155,7 @@ class PlanarWalk(BatchWalk):
 
     @property
     def status(self) -> tuple[Status, ...]:
-        """One a robot, as of the last switch or sample."""
+        """Status of each robot at the last switch or sample."""
         return tuple(_STATUS[int(each)] for each in self._status)
 
     def observe(self) -> Observation:
@@ -189,7 +194,7 @@ class PlanarWalk(BatchWalk):
             "friction": (friction, self._factors.shape[1:]),
         }
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
-        # All are at the switch with which the cycle begins, however time was rounded: there they stop for good anyhow.
+        # All robots are at the switch that begins the cycle, however time was rounded: a walk stops for good there.
         self._here = None
         if rows["friction"] is not None:
             self._factors[marked] = rows["friction"]
@@ -229,9 +234,9 @@ class PlanarWalk(BatchWalk):
             self._samples.grown(len(arrays["samples"]))[:] = arrays["samples"]
 
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
-        """The record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
+        """Record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
         rate = self._record.rate if self._record else 1.0
-        # A sample that comes a moment of rounding after the present is taken already, but does not count yet.
+        # A sample that follows the present within rounding is taken already, but does not count yet.
         count = min(self._timeline.samples, len(self._record.samples(self._time)) if self._record else 0)
         states = self._samples.rows[:count].copy() if copy else self._samples.grown(0)[:count]
         times = np.arange(len(states)) / rate
@@ -258,14 +263,14 @@ class PlanarWalk(BatchWalk):
         return self._here
 
     def _seen(self) -> Array:
-        """States at the present time, NaN where nothing is seen of them; a copy."""
+        """Copy of the states at the present time, NaN for robots that no longer walk."""
         states, _, status = self._now()
-        # What fails is judged where the walk stops for good; what cannot be followed any more shows nothing.
+        # Failures are judged where the walk stops for good; a robot that cannot be integrated further has NaN.
         gone = (self._status != stretch.WALKING) | (status == stretch.DIVERGED)
         return np.where(gone[:, None], np.nan, states)
 
     def _arrive(self, which: NDArray[np.bool_]) -> None:
-        """Let some robots be for good where they are at the present time."""
+        """Make the states at the present time final for some robots."""
         if self._timeline.is_at_cut(self._time):
             return
         for mine, here in zip((self._states, self._step, self._status), self._now(), strict=True):
@@ -279,13 +284,20 @@ class PlanarWalk(BatchWalk):
         status: NDArray[np.intp],
     ) -> None:
         """Carry all robots through pieces of time, in place."""
-        record, told = self._samples.grown(self._timeline.samples if self._record else 0), self._actuators
+        record, actuators = self._samples.grown(self._timeline.samples if self._record else 0), self._actuators
         rows = np.flatnonzero(status == stretch.WALKING)
         if not rows.size or not len(pieces[0]):
             return
         scalars, feet = self._bodies
         robots = stretch.Robots(
-            scalars, feet, self._damping, self._friction, told.profile, told.lag, told.joint_torque, told.leg_yaw
+            scalars,
+            feet,
+            self._damping,
+            self._friction,
+            actuators.profile,
+            actuators.lag,
+            actuators.joint_torque,
+            actuators.leg_yaw,
         )
         when = stretch.Pieces(*pieces, *self._feet)
         stretch.carry(rows, when, robots, self._tolerance, states, step, status, record)

@@ -1,4 +1,4 @@
-"""The description of a robot that every engine reads: validated, immutable, from TOML with units.
+"""Description of a robot for every engine: validated, immutable, read from TOML with units.
 
 >>> from chilopod import load_robot
 >>> robot = load_robot("aoi2022-planar").override("springs.stiffness[0]", "12 N*mm/deg")

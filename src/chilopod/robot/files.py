@@ -1,4 +1,4 @@
-"""Robot files as tables: finding them, reading TOML safely, writing it back."""
+"""Robot files as tables: search, safe reading and writing of TOML."""
 
 from __future__ import annotations
 
@@ -47,14 +47,19 @@ def presets() -> list[str]:
 
 
 def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
-    """Read a robot file, or a preset by its name: the table as it stands in the file, not yet validated, and what to
-    call the source in messages.
+    """Read a robot file, or a preset by its name: the table of the file, not yet validated, and the name of the source
+    for messages.
 
-    A file that is named like a preset is reached as ``./name``. RobotFileError if there is no such file or preset, or
-    it is no TOML.
+    Write ``./name`` for a file with the name of a preset. RobotFileError if the file or preset is missing, or is not
+    valid TOML.
     """
     if not isinstance(robot, str | Path):
-        raise RobotFileError("is no robot", field="robot", value=robot, allowed="a preset or the path of a file")
+        raise RobotFileError(
+            "must be a preset or the path of a robot file",
+            field="robot",
+            value=robot,
+            allowed="a preset or the path of a file",
+        )
     source, path = str(robot), Path(robot)
     names = presets()
     if source in names:
@@ -62,12 +67,12 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     try:
         missing = not (source and path.exists())
     except OSError:
-        missing = False  # reading it says why it cannot be
+        missing = False  # reading it raises the reason
     if missing and (isinstance(robot, Path) or len(path.parts) > 1 or path.suffix):
         raise RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
     if missing:
         allowed, nearest = f"a robot file or one of the presets {', '.join(names)}", nearest_name(source, names)
-        raise RobotFileError("no such preset or file", value=source, allowed=allowed, nearest=nearest)
+        raise RobotFileError("must be a preset or an existing file", value=source, allowed=allowed, nearest=nearest)
     text = read_text(path, "robot file", RobotFileError)
     try:
         return parsed(text), source
@@ -77,8 +82,8 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """Read TOML text, whoever wrote it; RobotFileError if it is none, or would take very long to read."""
-    # What takes Python's reader time that grows with the square of their number: the parts of one key. Between two of
+    """Read TOML text from any source; RobotFileError if it is not valid, or would take very long to read."""
+    # The time of Python's reader grows with the square of the number of parts of one key. Between two of
     # these characters there is a key at most, or part of a text; and no text of a robot is that long.
     dots = max(between.count(".") for between in _BETWEEN_KEYS.split(text))
     if dots > _MOST_DOTS:

@@ -1,4 +1,4 @@
-"""Yaw inertia of a module: of its legs, of its body, and of the whole.
+"""Yaw inertia of a module, of its legs and of its body.
 
 One number, ``body.yaw_inertia``, is that of a whole module with its legs about the module's centre, in every engine.
 Legs count as they stand at mid-stroke, foot below the hip; while the robot walks, each swings about that posture.
@@ -14,8 +14,8 @@ from chilopod.robot.parts import Body, Legs, Twin
 def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
     """Yaw inertia of one whole module with its legs about its centre, kg*m^2.
 
-    The one given, else that of a uniform rod of the module's mass and length. A module may be so short that its legs
-    and the width of its body alone have more than the rod; then it is the least that is possible.
+    The given value, else that of a uniform rod of the module's mass and length. In a very short module legs and body
+    width alone exceed the rod; then it is the least possible value.
     """
     if body.yaw_inertia is not None:
         return body.yaw_inertia
@@ -24,7 +24,7 @@ def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
 
 
 def yaw_inertia_range(body: Body, legs: Legs, twin: Twin) -> tuple[float, float]:
-    """Least and greatest that a module can have, kg*m^2: its body's mass all in the middle, or half at either end."""
+    """Least and greatest yaw inertia of a module, kg*m^2: with the body's mass in the middle, or half at either end."""
     mass = body_mass(body, twin)
     least = legs_yaw_inertia(legs, twin) + mass * twin.body_width**2 / 12.0
     return least, least + 0.25 * mass * (body.length / body.modules) ** 2
@@ -51,7 +51,7 @@ def body_inertia(body: Body, legs: Legs, twin: Twin) -> tuple[float, float, floa
 def legs_yaw_inertia(legs: Legs, twin: Twin) -> float:
     """Yaw inertia of the four links of a module about its centre, standing at mid-stroke, kg*m^2."""
     upper, lower, height = twin.upper_link, twin.lower_link, twin.hip_height
-    # How far the knee is ahead of the line from hip to foot; a leg that is too short hangs straight, and is refused
+    # Distance of the knee ahead of the line from hip to foot; a leg that is too short hangs straight, and is refused
     # where it is built.
     cosine = (height**2 + upper**2 - lower**2) / (2.0 * height * upper)
     knee = upper * math.sqrt(max(1.0 - cosine**2, 0.0))

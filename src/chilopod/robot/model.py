@@ -32,7 +32,7 @@ def _printable(text: object, longest: int) -> str:
     if not isinstance(text, str):
         raise ParameterError("must be text", value=text)
     if not (text.strip() and text.isprintable() and len(text) <= longest):
-        raise ParameterError("is no plain text", value=text, allowed=f"1 to {longest} printable characters")
+        raise ParameterError("must be plain text", value=text, allowed=f"1 to {longest} printable characters")
     return text
 
 
@@ -69,7 +69,7 @@ class Robot(Description):
     body, springs, legs, gait, ground
         The parts of the description, in SI units and radians.
     twin
-        Constants that only the three-dimensional model reads; None for a robot that only the planar model knows.
+        Constants that only the three-dimensional model reads; None for a robot of the planar model alone.
     provenance
         Origin of the numbers: text by dotted path.
 
@@ -90,7 +90,8 @@ class Robot(Description):
 
     @classmethod
     def load(cls, robot: str | Path) -> Self:
-        """Read a robot file, or a preset by its name; RobotFileError says where and why that is no valid robot."""
+        """Read a robot file, or a preset by its name; RobotFileError names the place and the fault of an invalid
+        one."""
         table, source = read_table(robot)
         try:
             return cls(**table)
@@ -102,7 +103,7 @@ class Robot(Description):
 
     @classmethod
     def from_toml(cls, text: str) -> Self:
-        """The robot that :meth:`to_toml` wrote."""
+        """Read the text that :meth:`to_toml` wrote."""
         return cls(**parsed(text))
 
     @model_validator(mode="before")
@@ -126,7 +127,9 @@ class Robot(Description):
             values = getattr(self.springs, key)
             if values is not None and len(values) != joints:
                 allowed = f"{joints}, one fewer than body.modules, or a single value for all"
-                raise ParameterError(f"has {len(values)} values", field=f"springs.{key}", allowed=allowed)
+                raise ParameterError(
+                    f"must have one value for each joint, not {len(values)}", field=f"springs.{key}", allowed=allowed
+                )
         for path in self.provenance:
             try:
                 self._locate(path)
@@ -144,7 +147,7 @@ class Robot(Description):
         """Radius of the arc that the body axis makes, the paper's (N-1) L / sum |theta|, m, shape (...), of mean joint
         angles, rad, shape (..., N-1): infinite where all are zero, NaN where one is."""
         bent = np.abs(np.asarray(joint_angles, dtype=np.float64)).sum(-1)
-        with np.errstate(divide="ignore", over="ignore"):  # a bend of next to nothing is straight
+        with np.errstate(divide="ignore", over="ignore"):  # a negligible bend is straight
             return np.asarray((self.body.modules - 1) * self.module_length / bent)
 
     @property
@@ -174,18 +177,21 @@ class Robot(Description):
         """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``.
 
         Without an index the springs count as one parameter, which has a value if all are alike. ``body.yaw_inertia`` is
-        `module_yaw_inertia` where none is given. Here and below, a path that names no number is a ParameterError.
+        `module_yaw_inertia` where none is given. Here and below, a path that is not that of a number raises
+        ParameterError.
         """
         place = self._locate(path)
         if path == "body.yaw_inertia":
             return self.module_yaw_inertia
         value = getattr(getattr(self, place.section), place.key)
         if value is None:
-            raise ParameterError("this robot has none", field=path)
+            raise ParameterError("must be a parameter that this robot has", field=path)
         if not place.quantity.each:
             return float(value)
         if place.index is None and any(item != value[0] for item in value):
-            raise ParameterError("its values differ", field=path, allowed=f"one of them, such as {path}[0]")
+            raise ParameterError(
+                "must be a single value, but its values differ", field=path, allowed=f"a single one, such as {path}[0]"
+            )
         return float(value[place.index or 0])
 
     def unit_of(self, path: str) -> str:
@@ -201,8 +207,8 @@ class Robot(Description):
 
         `path` is as for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring
         and damper for joints that are new and drops those that are gone; length and mass are those of the whole robot
-        and stay. What `provenance` said of a changed parameter is replaced by a note that it was overridden.
-        ParameterError if `value` is out of range.
+        and stay. The provenance of a changed parameter becomes a note that it was overridden. ParameterError if `value`
+        is out of range.
         """
         place = self._locate(path)
         try:
@@ -214,7 +220,7 @@ class Robot(Description):
     def override(self, path: str, value: object) -> Self:
         """Return this robot with one parameter changed: a number in SI units or text with its unit.
 
-        As `with_value` otherwise; also raises `UnitError` if the text is no quantity or of another dimension.
+        Otherwise as `with_value`; also raises `UnitError` if the text is not a quantity or has another dimension.
         """
         place = self._locate(path)
         try:
@@ -229,7 +235,7 @@ class Robot(Description):
         for assignment in assignments:
             path, equals, value = assignment.partition("=")
             if not equals:
-                raise ParameterError("is not an override", value=assignment, allowed="PATH=VALUE")
+                raise ParameterError("must be an override", value=assignment, allowed="PATH=VALUE")
             robot = robot.override(path.strip(), value)
         return robot
 
@@ -238,12 +244,12 @@ class Robot(Description):
         return type(self)(**{**dict(self), **fields})
 
     def with_twin_of(self, other: Robot) -> Self:
-        """Return this robot with the [twin] of another, and what is said there of where its numbers come from."""
+        """Return this robot with the [twin] of another, and the provenance of its numbers."""
         told = {path: text for path, text in other.provenance.items() if path.startswith("twin.")}
         return self.with_(twin=other.twin, provenance={**self.provenance, **told})
 
     def provenance_of(self, path: str) -> str | None:
-        """Return what is said about where a parameter comes from; a spring falls back on what is said of all."""
+        """Return the provenance of a parameter; a spring falls back on that of all springs."""
         found: str | None = self.provenance.get(path, self.provenance.get(path.partition("[")[0]))
         return found
 
@@ -255,7 +261,7 @@ class Robot(Description):
         ]
 
     def _repr_svg_(self) -> str:
-        # Only notebooks draw: others need not load what that takes.
+        # Only notebooks draw, so the drawing is imported here.
         from chilopod.robot.schematic import schematic
 
         return schematic(self.body, self.springs, self.legs, self.gait, self.name)
@@ -294,9 +300,9 @@ class Robot(Description):
     def _locate(self, path: str) -> Place:
         place = place_of(path)
         if place.section == "twin" and self.twin is None:
-            raise ParameterError("this robot has no [twin], only the planar model knows it", field=path)
+            raise ParameterError("needs a table [twin], which this robot lacks", field=path)
         if place.index is not None and place.index >= self.body.modules - 1:
-            raise ParameterError("there is no such spring", field=path, allowed=f"0 to {self.body.modules - 2}")
+            raise ParameterError("must be the index of a spring", field=path, allowed=f"0 to {self.body.modules - 2}")
         return place
 
     def _replaced(self, path: str, place: Place, value: float) -> Self:
@@ -307,7 +313,9 @@ class Robot(Description):
         if place.quantity.each:
             if old is None:
                 if place.index is not None and not isinstance(place.quantity, Flag):
-                    raise ParameterError("this robot has none", allowed=f"{path.partition('[')[0]} for all of them")
+                    raise ParameterError(
+                        "must be a parameter that this robot has", allowed=f"{path.partition('[')[0]} for all of them"
+                    )
                 old = (False,) * (self.body.modules - 1)
             new = tuple(value if place.index in (None, index) else item for index, item in enumerate(old))
         if new == getattr(section, place.key):
@@ -316,7 +324,7 @@ class Robot(Description):
         if place.section == "twin" or place.key in ("softest", "stiffest"):
             changed = type(changed)(**dict(changed))
         changes: dict[str, Any] = {place.section: changed}
-        # What was said of single springs no longer holds when all are set, nor when their joints are gone.
+        # The provenance of single springs ends when all are set, or when their joints are gone.
         joints = 0 if place.quantity.each and place.index is None else self.body.modules - 1
         if place.quantity is MODULES:
             joints = int(value) - 1

@@ -14,12 +14,12 @@ from chilopod.robot.parts import Body, Legs, Springs, Twin
 from chilopod.units import Description, Quantity, quantities
 
 _PATH: Final = re.compile(r"([a-z_]+\.[a-z_]+)(?:\[([0-9]{1,6})\])?")
-_INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # as one may have meant it
+_INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # tolerates spaces and a missing bracket
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a parameter stands: section, key, index among the springs or None, and what it may hold."""
+    """Place of a parameter: section, key, index among the springs or None, and allowed values."""
 
     section: str
     key: str
@@ -38,30 +38,32 @@ SECTIONS: Final[dict[str, type[Description]]] = {
 QUANTITIES: Final = {
     f"{section}.{key}": quantity for section, model in SECTIONS.items() for key, quantity in quantities(model).items()
 }
-"""The quantity of every number of a robot by its path, springs not counted singly."""
+"""Quantity of every number of a robot by its path, with one entry for all springs."""
 
 
 @lru_cache(maxsize=1024)
 def place_of(path: str) -> Place:
     """Read a dotted path such as ``springs.stiffness[0]``; whether the robot has that many springs is not checked.
-    ParameterError if it names no number, with the nearest path that does."""
+    ParameterError, with the nearest path, if it is not the path of a number."""
     known = QUANTITIES
     match = _PATH.fullmatch(path)
     stem, index = match.groups() if match else (path, None)
     if stem not in known:
         if stem.partition(".")[0] in ("name", "provenance"):
-            raise ParameterError("is text, not a parameter", field=path, allowed=", ".join(known))
+            raise ParameterError("must be the path of a parameter, not of a text", field=path, allowed=", ".join(known))
         bare, _, rest = path.partition("[")
         # "stiffness" alone, or under a wrong section, is nearer to what was meant than spelling can tell.
         same_key = (name for name in known if name.partition(".")[2] == bare.rpartition(".")[2])
         nearest = next(same_key, None) or nearest_name(bare, known)
         if nearest is None:
-            raise ParameterError("names no parameter", field=path, allowed=", ".join(known))
+            raise ParameterError("must be the path of a parameter", field=path, allowed=", ".join(known))
         meant = _INDEX.fullmatch(rest) if known[nearest].each else None
-        raise ParameterError("names no parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest)
+        raise ParameterError(
+            "must be the path of a parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest
+        )
     quantity = known[stem]
     if index is not None and not quantity.each:
-        raise ParameterError("has no index", field=path, allowed=stem)
+        raise ParameterError("must be written without an index", field=path, allowed=stem)
     section, key = stem.split(".")
     return Place(section, key, None if index is None else int(index), quantity)
 

@@ -1,4 +1,4 @@
-"""The parts of a robot that only the robot has: its chain of modules, their joints, their feet."""
+"""Parts of a robot's description: chain of modules, joints, feet, and constants of the twin."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STIFFNESS: Final = Quantity("N*m/rad", "N*mm/deg", each=True)
 
 
 class Body(Description):
-    """The chain of modules, all alike, joined end to end.
+    """Chain of equal modules, joined end to end.
 
     Attributes
     ----------
@@ -30,8 +30,8 @@ class Body(Description):
         Mass of the whole chain, kg.
     yaw_inertia
         Yaw inertia of one whole module with its legs about its centre, kg*m^2, in every engine. None means that of a
-        uniform rod of the module's mass and length; or, where the legs and the body's width of [twin] alone have more
-        than the rod, as in short modules, the least possible (:mod:`chilopod.robot.inertia`).
+        uniform rod of the module's mass and length, or the least possible value if legs and body width of [twin] alone
+        exceed it (:mod:`chilopod.robot.inertia`).
     """
 
     modules: Annotated[int, MODULES]
@@ -41,7 +41,7 @@ class Body(Description):
 
 
 class Springs(Description):
-    """Torsional springs and dampers of the yaw joints, front to rear; and actuators that change springs on the way.
+    """Torsional springs and dampers of the yaw joints, front to rear; and actuators that change springs during a walk.
 
     All have one value for each joint; a single one stands for all joints.
 
@@ -52,13 +52,13 @@ class Springs(Description):
     damping
         (modules-1,) N*m*s/rad, zero or more.
     adjustable
-        True if a spring has an actuator that changes its stiffness, (modules-1,); None: none of them.
+        True if a spring has an actuator that changes its stiffness, (modules-1,); None for no actuators.
     softest, stiffest
-        Between which its actuator keeps a spring, (modules-1,) N*m/rad; None: no limit.
+        Limits of the stiffness that an actuator sets, (modules-1,) N*m/rad; None for no limit.
     rate
-        At most, of a spring's stiffness, (modules-1,) N*m/rad/s; None: no limit.
+        Largest rate of change of a spring's stiffness, (modules-1,) N*m/rad/s; None for no limit.
     lag
-        Time constant with which a spring follows its actuator, (modules-1,) s; None: at once.
+        Time constant with which a spring follows its actuator, (modules-1,) s; None for no lag.
     """
 
     stiffness: Annotated[tuple[float, ...], _STIFFNESS]
@@ -81,13 +81,13 @@ class Springs(Description):
         if self.softest is not None and self.stiffest is not None:
             for joint, (low, high) in enumerate(zip(self.softest, self.stiffest, strict=False)):
                 if low > high:
-                    problem = f"of joint {joint + 1}, softest is above stiffest"
+                    problem = f"softest must be at most stiffest at joint {joint + 1}"
                     raise ParameterError(problem, value=f"{low:g} N*m/rad", allowed=f"at most {high:g} N*m/rad")
         return self
 
 
 class Legs(Description):
-    """Where each foot is at mid-stroke, relative to the centre of its module.
+    """Position of each foot at mid-stroke, relative to the centre of its module.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Twin(Description):
     foot_radius
         Radius of the round foot, m.
     body_width, body_height
-        Width and height of the box that a module's body is, m; its length is that of the module.
+        Width and height of the box of a module's body, m; its length is that of the module.
     clearance
         Height of the tip path's half ellipse, m.
     servo_stiffness, servo_damping
@@ -131,15 +131,15 @@ class Twin(Description):
     control_interval
         Time between two servo targets, s.
     timestep
-        Step of the simulation, s; a whole number of them makes a control interval.
+        Step of the simulation, s; the control interval is a whole number of steps.
     scanner_view, scanner_step
-        Whole angle the scanner sees, centred ahead, and between two of its beams, rad.
+        Full angle of the scanner's view, centred ahead, and angle between two of its beams, rad.
     scanner_period
-        Between two scans, s.
+        Time between two scans, s.
     scanner_nearest, scanner_range
-        Distances within which it measures, m.
+        Least and greatest distance that the scanner measures, m.
     scanner_resolution, scanner_noise
-        Step of its distances, and standard deviation of their error, m.
+        Resolution of the scanner's distances, and standard deviation of their error, m.
     scanner_offset
         Distance of the scanner ahead of the centre of module 1, m.
     pole_radius
@@ -176,8 +176,8 @@ class Twin(Description):
     def _whole_steps(self) -> Self:
         steps = self.control_interval / self.timestep
         if not (steps > 0.5 and abs(steps - round(steps)) < 1e-6):
-            problem = "does not go into twin.control_interval a whole number of times"
-            allowed = f"{self.control_interval:g} s over a whole number"
+            problem = "must divide twin.control_interval"
+            allowed = f"{self.control_interval:g} s divided by a whole number"
             raise ParameterError(problem, field="timestep", value=f"{self.timestep:g} s", allowed=allowed)
         return self
 

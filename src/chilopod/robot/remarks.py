@@ -1,4 +1,4 @@
-"""Remarks on a robot's description: legal and yet worth knowing."""
+"""Remarks on unusual properties of a valid robot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from chilopod.robot.model import Robot
 
 
 def remarks(robot: Robot) -> list[str]:
-    """Return a sentence for everything unusual about a valid robot; an empty list if there is nothing."""
+    """Return a sentence for every unusual property of a valid robot; an empty list if there is none."""
     found = []
     if not robot.gait.half_period_symmetric:
         found.append(

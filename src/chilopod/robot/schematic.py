@@ -17,16 +17,16 @@ _UNIT = "N*mm/deg"
 
 
 def schematic(body: Body, springs: Springs, legs: Legs, gait: Gait, name: str) -> str:
-    """SVG: modules, joints with their springs, and feet where they are at time 0, filled where they stand.
+    """SVG of modules, joints with their springs, and feet at time 0, filled where they stand.
 
-    The robot walks to the right. Of a very long one the front modules are drawn.
+    The robot walks to the right. Only the front modules of a very long robot are drawn.
     """
     count = min(body.modules, _MOST)
     length = body.length / body.modules
     phases = gait.leg_phases(body.modules)[:count]
     feet = foot_places(legs.forward_offset, legs.half_width, gait.stroke(phases))
     stands = gait.stands(phases)
-    # Feet may be ahead of the front module or behind the rear one.
+    # Feet may reach ahead of the front module or behind the rear one.
     beyond = max(0.0, abs(legs.forward_offset) + 0.5 * gait.stride - 0.5 * length)
     scale = (_WIDTH - 2.0 * _MARGIN) / (count * length + 2.0 * beyond)
     hip_ahead = min(max(legs.forward_offset, -_OWN * length), _OWN * length)

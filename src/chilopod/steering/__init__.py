@@ -1,5 +1,5 @@
-"""Steering: courses of targets, the radius that a target asks for, the spring that gives it, the leg-yaw controller,
-and measures of how well a walk went."""
+"""Steering: courses of targets, radius and spring of the circle to a target, leg-yaw controller, and measures of
+success."""
 
 from chilopod.steering.actuated import ActuatedAxis
 from chilopod.steering.course import COURSES, Course, Goal, course_named, random_course

@@ -1,4 +1,4 @@
-"""A body axis that is driven joint by joint: what steering by a spring is held against."""
+"""Body axis that is driven joint by joint, for comparison with steering by a spring."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _A_CYCLE = 6  # the paper's scanner scans ten times a second
 class ActuatedAxis:
     """Torques bend the axis into the circle to the target, the same angle in all joints.
 
-    At each of six instants of a gait cycle the torque of every joint is what holds its spring at the wanted angle: the
-    joint stays as springy as it is, with another angle of rest. (Torques that also push against what is missing of the
-    angle do half as much again of work in the planar model, and throw the lightly damped joints of the twin too far.)
-    Legs yaw as in the paper; a target that is not seen is looked for to the side that they were last turned to.
+    At each of six instants of a gait cycle the torque of every joint holds its spring at the desired angle: the joint
+    keeps its stiffness and gets another angle of rest. (Torques that also act against the error of the angle do half as
+    much again of work in the planar model, and make the lightly damped joints of the twin overshoot.) Legs yaw as in
+    the paper; a target out of view is searched for on the side that they were last turned to.
 
     Attributes
     ----------
     stiffness
-        Stiffness of the springs that it works against, N*m/rad, (N-1,).
+        Stiffness of the springs that the torques hold, N*m/rad, (N-1,).
     module_length, most_bent
-        Length of a module, m; largest angle that is wanted of one joint, rad.
+        Length of a module, m; largest desired angle of one joint, rad.
     leg_yaw
         Leg yaw of the legs of module 1.
     """
@@ -43,11 +43,11 @@ class ActuatedAxis:
 
     @classmethod
     def of(cls, robot: Robot, law: RadiusLaw) -> ActuatedAxis:
-        """Axis of a robot, which bends no tighter than its softest spring would bend it, by its radius law."""
+        """Axis of a robot, which bends no more tightly than with the softest spring of its radius law."""
         return cls(robot.springs.stiffness, robot.module_length, robot.module_length / law.tightest)
 
     def events(self, gait: Gait) -> Sequence[Event]:
-        """Six of the axis, and those of the legs of module 1."""
+        """Six events of the axis, and those of the legs of module 1."""
         window = gait.period / _A_CYCLE
         axis = [Event("axis", number / _A_CYCLE, window) for number in range(_A_CYCLE)]
         return [*axis, *self.leg_yaw.events(gait)]

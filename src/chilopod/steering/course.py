@@ -1,4 +1,4 @@
-"""Courses: targets one after another, and how they are read."""
+"""Courses: targets one after another, and their text form."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
 from chilopod.text_file import read_text
 
 MOST_GOALS = 1000
-"""More targets than this are a slip of the pen."""
+"""Largest number of targets; more are typing errors."""
 
 RANDOM_DISTANCES = (0.8, 2.0)
-"""Least and largest distance of the targets of a random course from where the robot is when their turn comes, m."""
+"""Least and largest distance of the targets of a random course from the robot when they are set, m."""
 
 _LONGEST_PATIENCE = 1e4
 _FORM = 'a direction and a distance, such as "45 deg, 1.3 m", or a place on the floor, such as "1.2 m, 0.5 m"'
 _RANDOM = "random:"
 _LONGEST_SEED = 18  # digits: a 64-bit whole number holds them
 _WIDEST_BEARING = math.radians(75.0)
-_DIGITS = 9  # of a distance: what rounding does to the 0.15 m or 10 km that somebody typed is not held against them
+_DIGITS = 9  # decimal places of a distance, so that rounding does not exclude 0.15 m or 10 km
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A target of a course: a place on the floor, or one seen from where the robot is when its turn comes.
+    """Target of a course: a position on the floor, or relative to the robot at the time the target is set.
 
     Attributes
     ----------
     x, y
-        On the floor, where the robot starts at the origin along x; or ahead of module 1 and to its left, m.
+        Position on the floor, where the robot starts at the origin along x; or ahead of module 1 and to its left, m.
     relative
-        True if seen from module 1 when the goal before is done with.
+        True if the position is relative to module 1 at the end of the goal before.
 
     Raises
     ------
     ParameterError
-        If it is too far to be a target, or is relative and on the robot already.
+        If the target is too far, or is relative and within the arrival radius.
     """
 
     x: float
@@ -60,7 +60,12 @@ class Goal:
         if not (ARRIVAL_RADIUS if self.relative else -1.0) < distance <= FARTHEST:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
             allowed = f"{near}at most {FARTHEST:g} m"
-            raise ParameterError("is no way to go", field="target distance", value=f"{distance:g} m", allowed=allowed)
+            raise ParameterError(
+                "must be a distance that a robot can walk",
+                field="target distance",
+                value=f"{distance:g} m",
+                allowed=allowed,
+            )
 
     @classmethod
     def parse(cls, text: str) -> Goal:
@@ -71,13 +76,13 @@ class Goal:
         Raises
         ------
         ParameterError, UnitError
-            If it is neither, or no place to go to.
+            For any other text, or a position out of range.
         """
         first, comma, second = (part.strip() for part in text.partition(","))
         fits = [unit for unit in ("rad", "m") if _is_quantity(first, unit)]
         if not comma or len(fits) != 1:
-            # Of a bare number nobody could tell whether it is an angle or a length.
-            problem = "needs a unit behind its first number" if comma and fits else "is no target"
+            # A number without a unit could be an angle or a length.
+            problem = "must have a unit behind its first number" if comma and fits else "must be a target"
             raise ParameterError(problem, field="target", value=text.strip(), allowed=_FORM)
         value = units.parse(first, fits[0])
         try:
@@ -89,7 +94,7 @@ class Goal:
             return cls(value, other, relative=False)
         if not abs(value) <= math.pi or other < 0.0:
             allowed = "-180 to 180 deg, a positive distance"
-            raise ParameterError("is no direction and distance", field="target", value=text.strip(), allowed=allowed)
+            raise ParameterError("must be bearing and distance", field="target", value=text.strip(), allowed=allowed)
         return cls(other * math.cos(value), other * math.sin(value), relative=True)
 
     def __str__(self) -> str:
@@ -98,7 +103,7 @@ class Goal:
         return f"{math.degrees(math.atan2(self.y, self.x)):g} deg, {math.hypot(self.x, self.y):g} m"
 
     def place(self, poses: Array) -> Array:
-        """Place on the floor, m, shape (robots, 2), by the poses of module 1 when the goal's turn comes: x, y (m) and
+        """Position on the floor, m, shape (robots, 2), from the poses of module 1 when the goal is set: x, y (m) and
         heading (rad), shape (robots, 3)."""
         if not self.relative:
             return np.tile([self.x, self.y], (len(poses), 1))
@@ -113,14 +118,14 @@ class Course:
     Attributes
     ----------
     goals, patience
-        At least one goal, none where the one before is; time for each, s, then the next has its turn.
+        At least one goal, each apart from the one before; time for each, s, after which the next is set.
     view, range
-        Whole angle ahead of module 1 within which its scanner sees, rad, and range of the scanner, m; by default those
-        of the paper's (Hokuyo URG-04LX).
+        Full angle of the scanner's view ahead of module 1, rad, and its range, m; by default those of the paper's
+        (Hokuyo URG-04LX).
     tightest
-        Radius of the circles that the shortest path to a target is made of, m; 0 for a robot that turns on the spot.
-        That of a radius law is the paper's measure, of the body axis: module 1 itself goes round in smaller circles, so
-        that a walk may be shorter than this path.
+        Radius of the circles of the shortest path to a target, m; 0 for a robot that turns on the spot. The radius of a
+        radius law is the paper's measure of the body axis: module 1 itself follows smaller circles, so that a walk may
+        be shorter than this path.
 
     Raises
     ------
@@ -142,7 +147,7 @@ class Course:
         in_range("range", self.range, FARTHEST, "m")
         if not 0.0 <= self.tightest <= FARTHEST:
             allowed = f"0 to {FARTHEST:g} m"
-            raise ParameterError("is no radius", field="tightest", value=f"{self.tightest:g} m", allowed=allowed)
+            raise ParameterError("must be a radius", field="tightest", value=f"{self.tightest:g} m", allowed=allowed)
         if not 1 <= len(self.goals) <= MOST_GOALS:
             raise _wrong_count(len(self.goals))
         before, where = Goal(0.0, 0.0, relative=False), "where the robot starts"
@@ -155,7 +160,7 @@ class Course:
 
     @property
     def duration(self) -> float:
-        """Nothing takes longer, s."""
+        """Longest duration of a walk along the course, s."""
         return self.patience * len(self.goals)
 
     def __str__(self) -> str:
@@ -173,19 +178,18 @@ COURSES: Mapping[str, tuple[Goal, ...]] = {
         (1.0, 1.0), (0.0, 2.0), (-1.0, 1.0), (0.0, 0.0), (1.0, -1.0), (0.0, -2.0), (-1.0, -1.0), (0.0, 0.0)
     ),
 }
-"""By name, for a robot as long as the paper's, 1.35 m, which turns within about 0.35 m.
+"""Courses by name, for a robot as long as the paper's, 1.35 m, which turns within about 0.35 m.
 
 ======  ===============================================================
-slalom  gates left and right of the way ahead, 1.5 m from each other
-square  the corners of a square of 2 m, all turns to the left
-eight   a circle of 1 m to the left and one to the right, back each time
-======  ===============================================================
+slalom  gates left and right of the straight path, 1.5 m from each other square  the corners of a square of 2 m, all
+turns to the left eight   a circle of 1 m to the left and one to the right, back each time ======
+===============================================================
 """
 
 
 def random_course(seed: int, patience: float, count: int = 5) -> Course:
-    """So many targets seen from module 1 at random, each with so much patience, s: bearings within 75 deg of the
-    heading, distances of 0.8 to 2 m. The same seed, 0 or more, makes the same course."""
+    """Random course of a number of targets relative to module 1, each with a patience, s: bearings within 75 deg of the
+    heading, distances of 0.8 to 2 m. Equal seeds, 0 or more, give equal courses."""
     rng = np.random.default_rng(seed)
     bearings = rng.uniform(-_WIDEST_BEARING, _WIDEST_BEARING, count)
     distances = rng.uniform(*RANDOM_DISTANCES, count)
@@ -194,19 +198,19 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
 
 
 def course_named(text: str, patience: float) -> Course:
-    """Read a course with so much patience for each target, s.
+    """Read a course with a patience for each target, s.
 
     Parameters
     ----------
     text
         Targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or the
         path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or ``random:SEED``.
-        A file that is named like a course is reached as ``./name``.
+        Write ``./name`` for a file with the name of a course.
 
     Raises
     ------
     ParameterError, UnitError
-        If it is none of these, saying which target is wrong.
+        For any other text; the message names the wrong target.
     """
     if text in COURSES:
         return Course(COURSES[text], patience)
@@ -217,7 +221,7 @@ def course_named(text: str, patience: float) -> Course:
     if "," in text or ";" in text:
         return Course(_goals(text.split(";")), patience)
     raise ParameterError(
-        "there is no such course or file",
+        "must be targets, a named course or an existing file",
         field="targets",
         value=text,
         allowed=f'targets such as "45 deg, 1.3 m; -60 deg, 1.5 m", a file, {", ".join(COURSES)}, {_RANDOM}SEED',
@@ -252,12 +256,12 @@ def _seed(text: str) -> int:
     digits = text.removeprefix(_RANDOM)
     if not (digits.isascii() and digits.isdigit() and len(digits) <= _LONGEST_SEED):
         allowed = f"a whole number from 0, at most {_LONGEST_SEED} digits, such as {_RANDOM}1"
-        raise ParameterError("has no seed", field="targets", value=text, allowed=allowed)
+        raise ParameterError("must end with a seed", field="targets", value=text, allowed=allowed)
     return int(digits)
 
 
 def _wrong_count(count: int) -> ParameterError:
-    return ParameterError("is no number of targets", field="targets", value=count, allowed=f"1 to {MOST_GOALS}")
+    return ParameterError("must be a number of targets", field="targets", value=count, allowed=f"1 to {MOST_GOALS}")
 
 
 def _is_quantity(text: str, unit: str) -> bool:

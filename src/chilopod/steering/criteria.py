@@ -1,4 +1,4 @@
-"""How well a turn went: the paper's three criteria and what became of the robot."""
+"""Evaluation of a turn: the paper's three criteria and the outcome."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ class Outcome(Labelled):
 
 @dataclass(frozen=True)
 class Criteria(ReadOnlyArrays):
-    """Criteria of turning tasks, one entry a walk.
+    """Criteria of turning tasks, one entry for each walk.
 
     Attributes
     ----------
     time
-        Time at which the first two are taken and up to which the third is, s.
+        Time of the first two criteria and end of the integral of the third, s.
     distance, angle, effort
         Distance of the target, m (epsilon 1); its angle to the heading, unsigned, rad (epsilon 2); integral of the
         squared leg yaw of both legs, rad^2 s (epsilon 3).
     arrival, nearest
-        Time at which the target was first within the arrival radius, s, NaN if never; its smallest distance, m.
+        Time at which the target was first within the arrival radius, s, NaN if never; smallest distance of the target,
+        m.
     outcome
         Outcome of the task.
     """
@@ -49,7 +50,7 @@ class Criteria(ReadOnlyArrays):
 
 
 def earliest_arrival(record: xr.Dataset) -> float:
-    """The first time at which any walk of a record arrives, s; NaN if none does."""
+    """First time at which any walk of a record arrives, s; NaN if none does."""
     times = arrivals(record)
     return float(np.nanmin(times)) if np.isfinite(times).any() else float("nan")
 
@@ -94,22 +95,22 @@ def evaluate(record: xr.Dataset, time: float) -> Criteria:
         elif not walked[robot]:
             outcomes.append(Outcome.FAILED)
         else:
-            # Still turned towards the target's side where it is nearest: the target is inside of the path.
+            # A robot that still turns towards the target where it is nearest has it inside the path.
             nearest = int(distance[:, robot].argmin())
             same = bearing[nearest, robot] * bearing[0, robot] >= 0.0
             outcomes.append(Outcome.OUTSIDE if same else Outcome.INSIDE)
-    # Where the target is moves smoothly, its bearing does until it jumps from -pi to pi.
+    # The position of the target relative to the robot is smooth; its bearing jumps from -pi to pi.
     turning = np.abs(np.array([_at(time, record.time.values, np.unwrap(each)) for each in bearing.T]))
     away = np.array([_at(time, record.time.values, each) for each in distance.T])
     angle = np.minimum(turning % (2.0 * np.pi), -turning % (2.0 * np.pi))
     nearest_ever = np.fmin.reduce(distance, axis=0)
-    # The last command of a robot that has failed is no effort.
+    # The last command of a failed robot does not count as effort.
     effort = np.where(np.isfinite(away), efforts(record, time), np.nan)
     return Criteria(time, away, angle, effort, arrival, nearest_ever, tuple(outcomes))
 
 
 def _at(time: float, times: Array, values: Array) -> float:
-    """A sampled quantity in between, NaN outside."""
+    """Sampled quantity by interpolation, NaN outside."""
     return float(np.interp(time, times, values, left=np.nan, right=np.nan))
 
 
@@ -124,7 +125,7 @@ def efforts(record: xr.Dataset, time: float) -> Array:
     for side in range(2):
         yaw, since = np.zeros(count), 0.0
         for start, ramp, command in zip(starts, within, commands[:, :, side], strict=True):
-            # An event of the other leg is no break: this leg's own commands change only at its own events.
+            # Events of the other leg are skipped: the commands of a leg change only at its own events.
             if (command == yaw).all() or start >= time:
                 continue
             total += yaw**2 * (start - since)

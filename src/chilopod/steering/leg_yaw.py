@@ -21,8 +21,8 @@ class LegYawController:
     """Once in every swing of each leg of module 1, its yaw moves towards the target's bearing by at most ``step``.
 
     At ``start`` of the swing the bearing psi is read; until ``end`` of the swing the desired yaw then ramps by psi less
-    the present yaw, or by sign(psi - yaw) times ``step`` if that is less; and it never exceeds ``limit``. The yaw does
-    not move while the foot stands. While the target is not seen it stays as it is.
+    the present yaw, or by sign(psi - yaw) times ``step`` if that is less; and it never exceeds ``limit``. The yaw stays
+    constant while the foot stands, and while the target is not seen.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class LegYawController:
                 raise ParameterError("is out of range", field=name, value=value, allowed="0 to a right angle, rad")
         if not 0.0 <= self.start <= self.end <= 1.0:
             raise ParameterError(
-                "must be parts of the swing, in order", field="start, end", value=(self.start, self.end)
+                "must be fractions of the swing in ascending order", field="start, end", value=(self.start, self.end)
             )
 
     def events(self, gait: Gait) -> Sequence[Event]:
@@ -55,7 +55,7 @@ class LegYawController:
         return [Event(side, float((at - phase) % 1.0), ramp) for side, phase in phases]
 
     def act(self, event: Event, seen: Observation) -> Command:
-        """New yaw for the leg whose swing this is."""
+        """Command a new yaw for the swinging leg."""
         side = SIDES.index(event.name)
         yaw = seen.leg_yaw.copy()
         change = np.clip(seen.bearing - yaw[:, side], -self.step, self.step)
@@ -64,7 +64,7 @@ class LegYawController:
         return Command(leg_yaw=yaw, within=event.window)
 
     def towards(self, event: Event, seen: Observation) -> Command:
-        """As :meth:`act`, but a target that is not seen is looked for: the leg yaws on to the side that the left one is
-        turned to, to the left if it is straight."""
+        """Command as :meth:`act`, but search for a target out of view: the leg yaws further to the side that the left
+        one is turned to, to the left if it is straight."""
         sought = np.copysign(0.5 * math.pi, seen.leg_yaw[:, 0])
         return self.act(event, replace(seen, bearing=np.where(np.isnan(seen.bearing), sought, seen.bearing)))

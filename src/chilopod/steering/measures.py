@@ -1,4 +1,4 @@
-"""Measures of a walk along a course, target by target: time, way, and what it cost to steer."""
+"""Measures of a walk along a course, target by target: time, path length, and cost of steering."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ _READ = ("position", "leg_yaw", "joint_angle", "stiffness", "command_torque", "s
 
 
 def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Dataset:
-    """The record of one robot on a course, to which :class:`chilopod.steering.CourseReferee` has added, up to where it
-    ended, with what every target came to; without what is over time and over events if ``brief``.
+    """Record of one robot on a course, completed by :class:`chilopod.steering.CourseReferee`, up to its end, with
+    measures of every target; without variables over time and events if ``brief``.
 
-    Added are, over (robot, goal), between the moment a target was put up and that at which it was done with:
+    The measures over (robot, goal) cover the time from the setting of a target to its end:
 
     ``goal_path``
-        Way of module 1, m, from gait cycle to gait cycle: swaying to and fro within a step is no way.
+        Path length of module 1, m, from gait cycle to gait cycle; sway within a cycle is not counted.
     ``goal_effort``
         Integral of the squared yaw of both legs, as commanded, rad^2 s.
     ``goal_spring_work``
-        Work of actuators on springs, 1/2 theta^2 dk where it is positive, J: they take nothing back.
+        Positive work of actuators on springs, 1/2 theta^2 dk, J; they recover no energy.
     ``goal_drive_work``
         Work of joint torques, joint by joint and command by command, where it is positive, J.
     """
     begin, end = (record[f"goal_{name}"].values[0] for name in ("begin", "end"))
     over = float(np.nanmax(end))
     last = over + 1e-9
-    # How long others walked on that were simulated with it is no part of it.
+    # The time that other robots of its batch walked on does not count.
     data = (record[[name for name in _READ if name in record]] if brief else record).isel(
         time=record.time.values <= last, **({"event": record.event.values < last} if "event" in record.dims else {})
     )
@@ -44,13 +44,13 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
     for name, ((times, so_far), unit) in sums.items():
         between = np.interp(end, times, so_far) - np.interp(begin, times, so_far)
         found[f"goal_{name}"] = (_OVER, between[None], {"units": unit})
-    # All at once: to add them one by one takes several times as long.
+    # All variables at once, because adding them one by one takes several times as long.
     kept = record.drop_dims(["time", "event"], errors="ignore") if brief else data
     return kept.assign(found).assign_attrs(duration=over)
 
 
 def _so_far(times: Array, steps: Array) -> tuple[Array, Array]:
-    """Times, and the sum up to each of them of what comes to it from one to the next; what is not there counts 0."""
+    """Times, and cumulative sums of the increments between them; NaN counts 0."""
     return times, np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
 
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class RadiusLaw(ReadOnlyArrays):
-    """Radius of the stable curved walks from the pitchfork on, as long as it falls with the parameter.
+    """Radius of the stable curved walks below the pitchfork, as long as it falls with the parameter.
 
     The squared curvature 1/r^2 is interpolated: it leaves zero linearly at the pitchfork, where the radius itself is
     infinite and has no slope.
@@ -43,38 +43,38 @@ class RadiusLaw(ReadOnlyArrays):
 
     @classmethod
     def of_branch(cls, values: ArrayLike, radii: ArrayLike, stable: ArrayLike, unit: str) -> RadiusLaw:
-        """The law along a branch of curved walks that starts at its pitchfork.
+        """Build the law from a branch of curved walks that starts at its pitchfork.
 
         Parameters
         ----------
         values, radii, stable, unit
-            Along the branch, from the pitchfork on (itself included): the parameter in SI units, the radius in m, and
-            whether the walk is stable, shape (points,); unit of the values in messages.
+            Parameter in SI units, radius in m and stability of the walk along the branch, from the pitchfork (included)
+            on, shape (points,); unit of the values in messages.
 
         Raises
         ------
         AnalysisError
-            If the walks beside the pitchfork are not stable or do not tighten as the parameter falls: then no spring
-            sets the radius of a turn from straight on.
+            If the walks beside the pitchfork are not stable or do not tighten as the parameter falls, so that no spring
+            sets the radius of a turn.
         """
         values, radii, stable = np.asarray(values, float), np.asarray(radii, float), np.asarray(stable, bool)
         curvature = np.where(np.isfinite(radii), 1.0 / radii, 0.0)
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
         count = 1 + (len(good) if good.all() else int(np.argmin(good)))
         if count < 3:
-            problem = "the curved walks beside the pitchfork are unstable or do not tighten: there is no radius law"
+            problem = "the curved walks beside the pitchfork must be stable and tighten for a radius law"
             raise AnalysisError(problem, field="branch")
         bent = np.concatenate([[np.inf], radii[1:count]])
         return cls(values[:count][::-1], bent[::-1], unit)
 
     @property
     def pitchfork(self) -> float:
-        """Where the radius becomes infinite, SI units."""
+        """Value at which the radius becomes infinite, SI units."""
         return float(self.values[-1])
 
     @property
     def tightest(self) -> float:
-        """Smallest radius the law knows, m."""
+        """Smallest radius of the law, m."""
         return float(self.radii[0])
 
     def radius(self, value: float) -> float:
@@ -83,14 +83,19 @@ class RadiusLaw(ReadOnlyArrays):
         Raises
         ------
         ParameterError
-            Below the range of the law, which says nothing there.
+            Below the range of the law.
         """
         if value >= self.pitchfork:
             return float("inf")
         if not value >= self.values[0]:
             lowest = units.format(float(self.values[0]), self.unit, digits=4)
             shown = units.format(value, self.unit, digits=4)
-            raise ParameterError("is below the radius law", field="value", value=shown, allowed=f"{lowest} and more")
+            raise ParameterError(
+                "must be at least the smallest value of the radius law",
+                field="value",
+                value=shown,
+                allowed=f"{lowest} and more",
+            )
         return float(1.0 / np.sqrt(self._squared_curvature(value)))
 
     def value(self, radius: float) -> float:
@@ -99,12 +104,17 @@ class RadiusLaw(ReadOnlyArrays):
         Raises
         ------
         AnalysisError
-            If no value within the law does.
+            If no value within the law gives the radius.
         """
         if not radius >= self.tightest:
             softest = units.format(float(self.values[0]), self.unit, digits=4)
             allowed = f"{self.tightest:.4g} m (at {softest}) and more"
-            raise AnalysisError("no spring turns so tightly", field="radius", value=f"{radius:.4g} m", allowed=allowed)
+            raise AnalysisError(
+                "must be at least the tightest radius of the law",
+                field="radius",
+                value=f"{radius:.4g} m",
+                allowed=allowed,
+            )
         if np.isinf(radius):
             return self.pitchfork
         wanted = 1.0 / radius**2

@@ -1,4 +1,4 @@
-"""Referee of courses: it puts up one target after another, and says what became of each."""
+"""Referee of courses: it sets one target after another and judges the outcome of each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LOOK = 0.1
-"""s between two looks at where the robots are: the paper's robot goes 6 mm meanwhile."""
+"""Time between two looks at the positions of the robots, s, in which the paper's robot moves 6 mm."""
 
 
 class Verdict(Labelled):
@@ -37,10 +37,10 @@ class Verdict(Labelled):
 
 @dataclass(frozen=True)
 class Judged:
-    """Marks of the robots, shape (robots,), that a look of :class:`CourseReferee` found to be done with a target.
+    """Masks of the robots, shape (robots,), whose target ended at a look of :class:`CourseReferee`.
 
-    They have ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or walk no more and
-    are done with all targets (``gone``). Others have had no target yet (``begins``).
+    They have ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or no longer walk,
+    which ends all their targets (``gone``). Others have had no target yet (``begins``).
     """
 
     arrived: NDArray[np.bool_]
@@ -51,25 +51,26 @@ class Judged:
 
     @property
     def moved(self) -> NDArray[np.bool_]:
-        """Who has got the next target, or has had the last."""
+        """Robots that got the next target, or ended their last."""
         return self.arrived | self.late | self.unseen | self.begins
 
 
 class CourseReferee:
     """Referee of robots that walk one course each, see :class:`chilopod.engine.Referee`.
 
-    A robot's next target is put up when it has arrived at the one before, or that one's time is over, or it cannot be
-    reached in its time at all: even the straight line to it is longer than what feet cover. After its last one the
-    robot is halted.
+    A robot's next target is set when it has arrived at the one before, when the time of that one is over, or when that
+    one is out of reach: even the straight line to it is longer than the feet can cover in its time. After its last
+    target the robot is halted.
 
     Parameters
     ----------
     courses, gait
-        One course a robot, alike in patience and view; gait of the robots.
+        Course of each robot, with equal patience and view; gait of the robots.
     missed
-        True if a target is missed by the scanner, by event, shape (robots, at least as many as events); None: never.
+        True for events at which the scanner misses the target, shape (robots, at least as many as events); None for no
+        misses.
     keep
-        True to keep what controllers were shown, for :meth:`add_to`.
+        True to log the observations of controllers, for :meth:`add_to`.
     """
 
     every = LOOK
@@ -91,7 +92,7 @@ class CourseReferee:
         self._log: list[Observation] = []
 
     def look(self, walk: Walk) -> bool:
-        """Judge, put up what comes next, halt who is done; whether anybody walks on."""
+        """Judge the targets, set the next ones, halt finished robots; return True if any robot walks on."""
         moved = self.judge(walk).moved
         done = moved & ~self.busy
         if done.any():
@@ -99,7 +100,7 @@ class CourseReferee:
         return bool(self.busy.any())
 
     def judge(self, walk: Walk) -> Judged:
-        """Judge, and put up what comes next."""
+        """Judge the targets and set the next ones."""
         now, pose, begins = walk.time, walk.pose(), self._number < 0
         busy = self.busy & ~begins
         gone = busy & np.isnan(pose[:, 0])
@@ -121,8 +122,8 @@ class CourseReferee:
         return judged
 
     def restart(self, which: NDArray[np.bool_], courses: Sequence[Course], missed: NDArray[np.bool_] | None) -> None:
-        """Begin anew with robots that have been put on the floor anew, by a mask of shape (robots,), each with a
-        course, no longer than the longest at the start, and with what its scanner misses."""
+        """Restart with robots that were restarted, by a mask of shape (robots,), each with a course, no longer than the
+        longest at the start, and with the misses of its scanner."""
         for robot, course in zip(np.flatnonzero(which).tolist(), courses, strict=True):
             self._courses[robot], self._counts[robot] = course, len(course.goals)
         if self._missed is not None and missed is not None:
@@ -133,11 +134,12 @@ class CourseReferee:
 
     @property
     def aims(self) -> Array:
-        """Where the targets are whose turn it is, m, shape (robots, 2); NaN where there is none."""
+        """Positions of the present targets, m, shape (robots, 2); NaN for robots without one."""
         return self._aims.copy()
 
     def time_left(self, now: float) -> Array:
-        """Time until the last target's is over if none is reached, s, shape (robots,); 0 for robots that are done."""
+        """Time to the end of the last target's patience if no target is reached, s, shape (robots,); 0 for finished
+        robots."""
         patience, number = self._common.patience, np.maximum(self._number, 0)
         begin = self._begin[np.arange(len(number)), np.minimum(number, self._begin.shape[1] - 1)]
         until = np.where(np.isnan(begin), now, begin) + patience * (self._counts - number)
@@ -145,11 +147,11 @@ class CourseReferee:
 
     @property
     def busy(self) -> NDArray[np.bool_]:
-        """Who has a target still, shape (robots,)."""
+        """Mask of the robots that still have a target, shape (robots,)."""
         return self._number < self._counts
 
     def through(self, index: int | NDArray[np.intp], seen: Observation) -> Observation:
-        """Part of an observation that a scanner sees at the event of that number, one for all robots or one each."""
+        """Observation as a scanner sees it at the event of that number, one for all robots or one each."""
         hidden = np.abs(seen.bearing) > 0.5 * self._common.view
         hidden |= seen.distance > self._common.range
         if self._missed is not None:
@@ -163,7 +165,7 @@ class CourseReferee:
         return replace(found, **{name: getattr(found, name).copy() for name in _KEPT})
 
     def add_to(self, data: xr.Dataset, walk: Walk) -> None:
-        """Add to the record of a walk that has ended what became of every target and what the controller was shown."""
+        """Add the outcomes of all targets and the observations of the controller to the record of a finished walk."""
         busy = self.busy
         stopped = busy & np.array([each is not Status.WALKED for each in walk.status])
         self._judge(stopped, walk.time, Verdict.STOPPED)
@@ -193,7 +195,7 @@ class CourseReferee:
                 self._verdicts[robot, number + 1 : count] = verdict.label
 
     def _next(self, walk: Walk, pose: Array, which: NDArray[np.bool_]) -> None:
-        """Put up the next target that can be reached."""
+        """Set the next target that can be reached."""
         now, most = walk.time, self._common.patience * self._speed
         for robot in np.flatnonzero(which).tolist():
             self._aims[robot] = np.nan
@@ -221,15 +223,15 @@ _KEPT = {
     "leg_yaw": (("side",), "rad"),
     "stiffness": (("joint",), "N*m/rad"),
 }
-"""Variables shown to a controller, over what besides event and robot, and their units."""
+"""Variables observed by a controller, their dimensions besides event and robot, and their units."""
 
 
 def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Command]:
-    """Commands of a controller when it is shown again what the record of a course says that it was shown."""
+    """Commands of a controller for the observations in the record of a course."""
     shown = {name: record[f"seen_{name}"].transpose("event", "robot", ...).values for name in _KEPT}
     until = float(record.event[-1]) + gait.period
-    asked = zip(event_times(controller, gait, until), range(record.sizes["event"]), strict=False)
+    events = zip(event_times(controller, gait, until), range(record.sizes["event"]), strict=False)
     return [
         controller.act(event, Observation(time, **{name: values[index].copy() for name, values in shown.items()}))
-        for (time, event), index in asked
+        for (time, event), index in events
     ]

@@ -1,4 +1,4 @@
-"""Steering by the first spring, once a gait cycle, from what the robot's sensors give and nothing else."""
+"""Steering by the first spring, once in a gait cycle, from the robot's sensors alone."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ _AHEAD = 2.0  # modules
 
 @dataclass(frozen=True)
 class SpringLaw(ReadOnlyArrays):
-    """The bend that the body has against the bend that leads to the target.
+    """Steering law that compares the bend of the body with the bend of the circle to the target.
 
-    When the left leg of module 1 swings, a curvature is wanted: 2 sin(psi) / D, that of the circle to a place on the
+    When the left leg of module 1 swings, the desired curvature is 2 sin(psi) / D, that of the circle to a point on the
     line to the target a distance D ahead, no farther than the target itself (pure pursuit). It is compared with that of
     the body axis, the sum of joint angles over (N-1) L. The first spring is then
 
-    - as soft as it goes where the body bends less: beside the pitchfork the bend that a spring leads to grows by a few
-      percent a second, too slowly to wait for;
-    - that of the inverse radius law, the paper's k1-hat, where it bends as wanted: this keeps the bend;
-    - as stiff as it goes where it bends more or to the wrong side, where hardly a bend is wanted, and where a joint is
-      bent as far as it may: this straightens it.
+    - as soft as possible where the body bends less, because a bend grows by only a few percent a second beside the
+      pitchfork;
+    - that of the inverse radius law, the paper's k1-hat, where it bends as desired, which keeps the bend;
+    - as stiff as possible where it bends more or to the wrong side, where the desired bend is nearly zero, and where a
+      joint reaches its limit, which straightens it.
 
-    No bend is wanted where the target lies so far within the tightest circle that the robot would walk round it for
-    ever, and the tightest where the target is not seen, to the side that the legs were last turned to: it comes into
-    view again. The legs of module 1 yaw as in the paper, and so tell a new bend its side. What the law commands follows
-    from one observation.
+    The desired bend is zero where the target lies so far within the tightest circle that the robot would circle it for
+    ever. Where the target is out of view it is the tightest, to the side that the legs were last turned to, until the
+    target is in view again. The legs of module 1 yaw as in the paper, which decides the side of a new bend. The
+    commands depend on one observation only.
 
     Attributes
     ----------
@@ -51,13 +51,13 @@ class SpringLaw(ReadOnlyArrays):
     tightest, arm
         Radius of the tightest circle, and (N-1) L of the paper's radius, m.
     ahead
-        D, m. Two modules long: as far as the joints of the first spring and of the next reach. Half of that and half
-        as much again do as well; a circle all the way to a far target is too wide.
+        D, m, two module lengths: the reach of the first two joints. Half of that and half as much again work as well; a
+        circle all the way to a far target is too wide.
     band
-        Part of the wanted bend by which the bend may differ. Between 0.15 and 0.3 it hardly matters.
+        Tolerance of the bend as a fraction of the desired bend. Values between 0.15 and 0.3 work equally well.
     straight, most_bent
-        A wanted bend of all joints together that is left to the legs, and the largest bend of one joint, rad; at a
-        right angle modules run into each other.
+        Desired bend of all joints together that is left to the legs, and the largest bend of one joint, rad; at a right
+        angle modules collide.
     leg_yaw
         Leg yaw of the legs of module 1.
     """
@@ -76,10 +76,10 @@ class SpringLaw(ReadOnlyArrays):
 
     @classmethod
     def of(cls, robot: Robot, law: RadiusLaw) -> SpringLaw:
-        """The law of a robot, by its size, its springs and the actuator of the first one, and by its radius law.
+        """Build the law of a robot from its size, its springs, the actuator of the first one, and its radius law.
 
-        The spring goes from that of the tightest walk of the radius law to the stiffest of the axis, as far as the
-        actuator allows.
+        The range of the spring goes from that of the tightest walk of the radius law to the stiffest of the axis,
+        within the limits of the actuator.
 
         Raises
         ------
@@ -91,7 +91,7 @@ class SpringLaw(ReadOnlyArrays):
         stiffest = min(max(own.stiffness), own.stiffest[0] if own.stiffest else np.inf)
         if not softest < stiffest:
             low, high = (units.format(each, law.unit, digits=4) for each in (softest, stiffest))
-            problem, names = "leaves the first spring no range to steer with", "springs.softest, springs.stiffest"
+            problem, names = "must leave the first spring a range to steer with", "springs.softest, springs.stiffest"
             allowed = "the softest below the stiffest, and below the stiffest spring of the axis"
             raise ParameterError(problem, field=names, value=f"{low} to {high}", allowed=allowed)
         curvatures = np.where(np.isfinite(law.radii), 1.0 / law.radii, 0.0)
@@ -106,28 +106,28 @@ class SpringLaw(ReadOnlyArrays):
         )
 
     def remarks(self, law: RadiusLaw) -> list[str]:
-        """Radii of its law that the robot's actuator keeps it from."""
-        said = []
+        """Remarks on the radii that the robot's actuator cannot reach."""
+        found = []
         softest, stiffest, pitchfork = (
             units.format(each, law.unit, digits=4) for each in (self.softest, self.stiffest, law.pitchfork)
         )
         if self.softest >= law.pitchfork:
-            said.append(f"at {softest}, its softest, the first spring bends no straight walk ({pitchfork} does)")
+            found.append(f"the softest first spring, {softest}, does not bend the straight walk; {pitchfork} does")
         elif self.softest > law.values[0]:
-            said.append(
-                f"at {softest}, its softest, the first spring makes circles of {self.tightest:.3g} m; tighter ones, "
-                f"down to {law.tightest:.3g} m, are out of its reach"
+            found.append(
+                f"the softest first spring, {softest}, gives circles of {self.tightest:.3g} m; tighter ones, "
+                f"down to {law.tightest:.3g} m, are out of reach"
             )
         if self.stiffest <= law.pitchfork:
-            said.append(f"at {stiffest}, its stiffest, the first spring holds no straight walk ({pitchfork} does)")
-        return said
+            found.append(f"the stiffest first spring, {stiffest}, does not keep the walk straight; {pitchfork} does")
+        return found
 
     def events(self, gait: Gait) -> Sequence[Event]:
-        """Those of the legs of module 1."""
+        """Events of the legs of module 1."""
         return self.leg_yaw.events(gait)
 
     def act(self, event: Event, seen: Observation) -> Command:
-        """Yaw of the leg that swings, and with the left one the spring."""
+        """Command the yaw of the swinging leg, and with the left one the spring."""
         legs = self.leg_yaw.towards(event, seen)
         if event.name != SIDES[0]:
             return legs
@@ -136,10 +136,10 @@ class SpringLaw(ReadOnlyArrays):
         return replace(legs, stiffness=stiffness)
 
     def spring(self, seen: Observation) -> Array:
-        """Stiffness of the first spring for what is seen, N*m/rad, shape (robots,)."""
+        """Stiffness of the first spring for an observation, N*m/rad, shape (robots,)."""
         curvature = self.curvature(seen)
         wanted, bend = self.arm * curvature, -seen.joint_angles.sum(axis=1)
-        # Of what is wanted that there is; negative to the wrong side.
+        # Ratio of the bend to the desired one; negative to the wrong side.
         share = bend * np.sign(wanted) / np.maximum(np.abs(wanted), self.straight)
         steady = np.clip(np.interp(np.abs(curvature), self.curvatures, self.springs), self.softest, self.stiffest)
         spring = np.where(
@@ -150,14 +150,14 @@ class SpringLaw(ReadOnlyArrays):
         return np.where(straightens, self.stiffest, spring)
 
     def curvature(self, seen: Observation) -> Array:
-        """Curvature that is wanted, 1/m, left positive, shape (robots,)."""
+        """Desired curvature, 1/m, left positive, shape (robots,)."""
         bearing = np.clip(seen.bearing, -0.5 * np.pi, 0.5 * np.pi)
         pursued = 2.0 * np.sin(bearing) / np.clip(seen.distance, ARRIVAL_RADIUS, self.ahead)
         sought = np.copysign(1.0 / self.tightest, seen.leg_yaw[:, 0])
         return np.where(np.isnan(pursued), sought, np.where(self._too_near(seen), 0.0, pursued))
 
     def _too_near(self, seen: Observation) -> NDArray[np.bool_]:
-        """True if the tightest circle leads round the target and not to it."""
+        """True if the tightest circle leads around the target and never to it."""
         radius = self.tightest
         ahead, aside = seen.distance * np.cos(seen.bearing), np.abs(seen.distance * np.sin(seen.bearing))
         inside: NDArray[np.bool_] = np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS

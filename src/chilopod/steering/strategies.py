@@ -1,4 +1,4 @@
-"""Strategies: the ways to make a robot turn. A new one is a class with :meth:`Strategy.prepare` and a line of _ALL."""
+"""Strategies for turning a robot. A new one is a class with :meth:`Strategy.prepare` and an entry in _ALL."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class Prepared(NamedTuple):
 
 @dataclass(frozen=True)
 class Strategy:
-    """Way to make a robot turn: here with springs that stay as they are during the walk.
+    """Strategy for turning a robot; this base class keeps the springs constant during the walk.
 
     Attributes
     ----------
     name, sentence
-        Name as it is typed, and description in a sentence.
+        Name on the command line, and description in a sentence.
     springs
-        Dotted path of the spring, or of all springs, that is chosen before the walk; None if there is none to choose.
+        Dotted path of the spring, or of all springs, chosen before the walk; None if the strategy chooses none.
     leg_yaw
         True if the legs of module 1 yaw towards the target.
     """
@@ -50,17 +50,19 @@ class Strategy:
     """True if the controller commands torques of the joints."""
 
     def check(self, spring: float | None) -> None:
-        """Refuse a spring that the strategy does not choose, and the lack of one that it does.
+        """Refuse a spring that the strategy does not choose, and a missing spring that it needs.
 
         Raises
         ------
         ParameterError
-            If the spring does not go with the strategy.
+            If the strategy does not accept the spring, or needs one.
         """
         if self.springs is not None and spring is None:
             raise ParameterError(f"strategy {self.name} needs one stiffness", field="k1", allowed="a stiffness")
         if self.springs is None and spring is not None:
-            raise ParameterError(f"strategy {self.name} has no spring to choose", field="k1", value=spring)
+            raise ParameterError(
+                f"must not be given: strategy {self.name} sets its own springs", field="k1", value=spring
+            )
 
     def fitted(self, robot: Robot, spring: float | None = None) -> tuple[Robot, tuple[str, ...]]:
         """Robot with the strategy's springs and actuators, and remarks on it."""
@@ -68,7 +70,7 @@ class Strategy:
         return (robot if self.springs is None or spring is None else robot.with_value(self.springs, spring)), ()
 
     def controller(self, robot: Robot, law: RadiusLaw | None) -> tuple[Controller | None, tuple[str, ...]]:
-        """Controller of a robot that was :meth:`fitted`, and remarks on it."""
+        """Controller of a :meth:`fitted` robot, and remarks on it."""
         return LegYawController() if self.leg_yaw else None, ()
 
     def prepare(
@@ -78,7 +80,7 @@ class Strategy:
         spring: float | None = None,
         controller: Controller | None = None,
     ) -> Prepared:
-        """Make a robot ready to walk.
+        """Prepare a robot for a walk.
 
         Parameters
         ----------
@@ -92,20 +94,22 @@ class Strategy:
         Raises
         ------
         ParameterError
-            If spring, law or actuators do not go with the strategy.
+            If the strategy does not accept spring, law or actuators.
         """
         walker, remarks = self.fitted(robot, spring)
         if controller is not None:
             return Prepared(walker, controller, remarks)
         if self.needs_law and law is None:
-            raise ParameterError(f"strategy {self.name} needs the robot's radius law", field="law", value=None)
+            raise ParameterError(
+                f"must be the radius law of the robot for strategy {self.name}", field="law", value=None
+            )
         own, more = self.controller(walker, law)
         return Prepared(walker, own, (*remarks, *more))
 
 
 @dataclass(frozen=True)
 class SpringOnTheWay(Strategy):
-    """Strategy that sets the first spring during the walk, by the circle to the target."""
+    """Strategy that sets the first spring during the walk from the circle to the target."""
 
     needs_law = True
 
@@ -117,7 +121,7 @@ class SpringOnTheWay(Strategy):
             said = "the robot file names no actuator: the first spring is taken to change as fast as it is told to"
             return robot.override("springs.adjustable[0]", True), (said,)
         if not adjustable[0]:
-            problem = f"the first spring has no actuator, and the strategy {self.name} sets it on the way"
+            problem = f"must be true: strategy {self.name} sets the first spring while the robot walks"
             raise ParameterError(problem, field="springs.adjustable[0]", value=False, allowed="true")
         return robot, ()
 
@@ -170,16 +174,16 @@ ON_THE_WAY: Mapping[str, Strategy] = {each.name: each for each in ON_COURSES.val
 
 
 def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
-    """One of :data:`STRATEGIES`, or of others.
+    """Return a strategy of :data:`STRATEGIES`, or of other strategies, by its name.
 
     Raises
     ------
     ParameterError
-        If there is none of this name.
+        For an unknown name.
     """
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
         raise ParameterError(
-            "there is no such strategy", field="strategy", value=name, allowed=allowed, nearest=nearest
+            "must be one of the strategies", field="strategy", value=name, allowed=allowed, nearest=nearest
         )
     return among[name]

@@ -12,29 +12,29 @@ from chilopod import units
 from chilopod.errors import ParameterError, UnitError
 
 ARRIVAL_RADIUS = 0.15
-"""m: nearer than this the paper counts the target as reached."""
+"""Distance within which the paper counts the target as reached, m."""
 
 FARTHEST = 1e4
-"""m: a target farther away is a slip of the pen."""
+"""Largest distance of a target, m; larger ones are typing errors."""
 
 _FORM = 'a direction and a distance, such as "45 deg, 1.3 m"'
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where a target is, seen from module 1 before the walk.
+    """Target relative to module 1 before the walk.
 
     Attributes
     ----------
     bearing
-        Direction relative to the heading, left positive, rad; ahead of the robot, that is, within a right angle.
+        Direction relative to the heading, left positive, rad, within a right angle.
     distance
-        From the centre of module 1, m; farther than :data:`ARRIVAL_RADIUS`.
+        Distance from the centre of module 1, m, more than :data:`ARRIVAL_RADIUS`.
 
     Raises
     ------
     ParameterError
-        If there is no circle to it: on the robot, behind it, or too far.
+        For a target within the arrival radius, behind the robot, or too far.
     """
 
     bearing: float
@@ -43,11 +43,14 @@ class Target:
     def __post_init__(self) -> None:
         if not abs(self.bearing) <= 0.5 * math.pi:
             value, allowed = f"{math.degrees(self.bearing):g} deg", "-90 to 90 deg"
-            raise ParameterError("lies behind the robot", field="target bearing", value=value, allowed=allowed)
+            raise ParameterError("must lie in front of the robot", field="target bearing", value=value, allowed=allowed)
         if not ARRIVAL_RADIUS < self.distance <= FARTHEST:
             allowed = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, at most {FARTHEST:g} m"
             raise ParameterError(
-                "is no way to go", field="target distance", value=f"{self.distance:g} m", allowed=allowed
+                "must be a distance that a robot can walk",
+                field="target distance",
+                value=f"{self.distance:g} m",
+                allowed=allowed,
             )
 
     @classmethod
@@ -57,11 +60,11 @@ class Target:
         Raises
         ------
         ParameterError, UnitError
-            If it is not that, or there is no circle to it.
+            For any other text, or a target out of range.
         """
         bearing, comma, distance = text.partition(",")
         if not comma:
-            raise ParameterError("is no target", field="target", value=text, allowed=_FORM)
+            raise ParameterError("must be a target", field="target", value=text, allowed=_FORM)
         try:
             return cls(units.parse(bearing, "rad"), units.parse(distance, "m"))
         except UnitError as error:
@@ -77,7 +80,7 @@ class Target:
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """On the floor, for a robot at the origin that heads along x, m, shape (2,)."""
+        """Position on the floor, for a robot at the origin that heads along x, m, shape (2,)."""
         return self.distance * np.array([math.cos(self.bearing), math.sin(self.bearing)])
 
     def __str__(self) -> str:

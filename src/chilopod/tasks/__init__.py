@@ -1,4 +1,4 @@
-"""The robot's verbs that walk: walk, turn to a target, find how tightly a spring turns, find constants from walks."""
+"""Tasks with walks: walk, turn to a target, measure a radius law, walk a course, identify constants."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Courses: targets one after another, walked with a strategy, and what became of each."""
+"""Walks along courses of targets with a strategy, and the outcome of each target."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import Trial, finite
 
 GRAVITY = 9.81
-"""m/s^2"""
+"""Standard gravity, m/s^2."""
 
 _RATE = 20.0  # Hz, of records: looks of the referee fall on samples
 _PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the straight walk without slip
@@ -40,15 +40,14 @@ _OF_GOALS = {
 
 @dataclass(frozen=True)
 class Driver(Short):
-    """A robot made ready for courses.
+    """Robot prepared for courses.
 
     Attributes
     ----------
     robot, strategy, controller
         Robot with the springs and the actuator of the strategy; strategy; controller, None without steering.
     law, engine
-        The robot's radius law, None where it has none and needs none; name of the engine that it belongs to and that
-        walks.
+        Radius law of the robot, or None if it has none and needs none; name of the engine of law and walks.
     remarks
         Remarks on the result, a sentence each.
     """
@@ -61,16 +60,16 @@ class Driver(Short):
     remarks: tuple[str, ...] = ()
 
     def trial(self, course: Course, seed: int = 0, *, poses: bool = False, brief: bool = False) -> Trial:
-        """The trial of a course, with the disturbance that all studies have, and with any radius of the tightest
-        circle: that of the robot takes its place where it is known."""
+        """Trial of a course, with the disturbance of all studies; the robot's tightest circle replaces that of the
+        course if it is known."""
         goals = course if self.law is None else replace(course, tightest=self.law.tightest)
-        told = self.robot, course.duration, seed, (), goals, self.controller
-        return Trial(*told, rate=_RATE, engine=self.engine, poses=poses, brief=brief)
+        conditions = self.robot, course.duration, seed, (), goals, self.controller
+        return Trial(*conditions, rate=_RATE, engine=self.engine, poses=poses, brief=brief)
 
 
 @dataclass(frozen=True)
 class Driven(Pathed):
-    """Walks along a course by a driver, with their trials and records, each up to where it ended, see
+    """Walks along a course by a driver, with their trials and records, each up to its end, see
     :func:`chilopod.steering.of_course`."""
 
     driver: Driver
@@ -78,7 +77,7 @@ class Driven(Pathed):
 
     @property
     def course(self) -> Course:
-        """The course with the radius of the robot's tightest circle."""
+        """Course with the radius of the robot's tightest circle."""
         return cast(Course, self.first.target)
 
     @property
@@ -88,12 +87,12 @@ class Driven(Pathed):
 
     @property
     def pitchfork(self) -> float | None:
-        """First spring below which the straight walk bends, N*m/rad; None where it is not known."""
+        """First spring below which the straight walk bends, N*m/rad; None if unknown."""
         return self.driver.law.pitchfork if self.driver.law else None
 
     @cached_property
     def record(self) -> xr.Dataset:
-        """Record of all walks together, NaN from where each ended."""
+        """Record of all walks together, NaN after the end of each."""
         longest = max(self.records, key=lambda each: each.sizes.get("time", 0))
         how: Any = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "outer"}
         joined = xr.concat(self.records, "robot", **how).assign_coords(robot=np.arange(len(self.records)))
@@ -139,12 +138,12 @@ def _of_targets(goals: list[dict[str, Any]]) -> list[Sequence[str]]:
         ("target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)")
     ]
     for number, goal in enumerate(goals, 1):
-        told = ["-"] * 5  # of one that had no turn
+        cells = ["-"] * 5  # of a target that was never set
         if goal["path_m"]:
-            told = [f"{goal['end_s'] - goal['begin_s']:.1f}", f"{goal['path_m']:.2f} / {goal['shortest_m']:.2f} m"]
-            told.append(f"{goal['leg_yaw_effort_rad2_s']:.4f}")
-            told += [f"{goal[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]
-        rows.append((str(number), goal["verdict"], *told))
+            cells = [f"{goal['end_s'] - goal['begin_s']:.1f}", f"{goal['path_m']:.2f} / {goal['shortest_m']:.2f} m"]
+            cells.append(f"{goal['leg_yaw_effort_rad2_s']:.4f}")
+            cells += [f"{goal[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]
+        rows.append((str(number), goal["verdict"], *cells))
     return rows
 
 
@@ -174,8 +173,8 @@ def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
     for goal in record.goal.values:
         found = record.isel(robot=0).sel(goal=goal)
         verdict, place = str(found.goal_verdict.item()), [finite(each) for each in found.goal_place.values]
-        told = {told: finite(found[f"goal_{name}"].item()) for name, told in _OF_GOALS.items()}
-        goals.append({"verdict": verdict, "sentence": sentences[verdict], "place_m": place, **told})
+        measures = {key: finite(found[f"goal_{name}"].item()) for name, key in _OF_GOALS.items()}
+        goals.append({"verdict": verdict, "sentence": sentences[verdict], "place_m": place, **measures})
     return {
         "status": str(record.status.values[0]),
         "arrived": _arrived(record),
@@ -188,8 +187,8 @@ def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
 
 
 def steering_cost(robot: Robot, record: xr.Dataset) -> float:
-    """Work that the spring's actuator and the joints' torques did on a course, over weight and way: the part of the
-    cost of transport that steering adds to walking. NaN of a robot that went nowhere."""
+    """Work of the spring's actuator and the joint torques on a course, divided by weight and path length: the part of
+    the cost of transport that steering adds to walking. NaN for a robot that did not move."""
     work = float(record.goal_spring_work.sum() + record.goal_drive_work.sum())
     way = float(record.goal_path.sum())
     return work / (robot.body.mass * GRAVITY * way) if way > 0.0 else np.nan
@@ -206,7 +205,7 @@ def driver(
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> Driver:
-    """Make a robot ready for courses.
+    """Prepare a robot for courses.
 
     Parameters
     ----------
@@ -217,21 +216,21 @@ def driver(
     engine, folder, progress
         As for :func:`chilopod.tasks.radius_law`.
     controller, law
-        Controller in place of the strategy's, and radius law, where it is known already.
+        Controller in place of the strategy's, and radius law if already computed.
 
     Raises
     ------
     ParameterError, AnalysisError
-        If the strategy wants a spring and has none, or has one and wants none; if the spring has no actuator; if the
-        strategy stands on the pitchfork and the robot has none.
+        If the strategy needs a spring and has none, or has one and needs none; if the spring has no actuator; if the
+        strategy needs the pitchfork and the robot has none.
     """
-    strategy.fitted(robot, spring)  # refuses before the law takes its time
+    strategy.fitted(robot, spring)  # refuses wrong arguments before the slow law
     unknown: tuple[str, ...] = ()
     try:
         law = law or radius_law(robot, engine, folder, progress)
     except AnalysisError as error:
         if strategy.needs_law and controller is None:
-            problem = f"the strategy {strategy.name} stands on how tightly the first spring turns the robot"
+            problem = f"strategy {strategy.name} needs a radius law of the first spring"
             allowed = "a robot that bends (narrower, softer behind, with a longer stride), or the strategy leg-yaw"
             raise AnalysisError(f"{problem}: {error.problem}", allowed=allowed) from error
         unknown = (f"how tightly the robot turns is not known, so shortest paths are straight lines: {error.problem}",)
@@ -240,7 +239,7 @@ def driver(
 
 
 def drive(driver: Driver, course: Course, **options: Unpack[RunOptions]) -> Driven:
-    """Let a robot walk a course, with any radius of the tightest circle, see :meth:`Driver.trial`, and with
+    """Run a robot along a course, with any radius of the tightest circle, see :meth:`Driver.trial`, and with
     :class:`chilopod.tasks.RunOptions`. Raises ParameterError if memory cannot hold the records."""
     trial = driver.trial(course, poses=engine_named(driver.engine).traits.poses)
     trials, records = runs(trial, **options)
@@ -248,7 +247,7 @@ def drive(driver: Driver, course: Course, **options: Unpack[RunOptions]) -> Driv
 
 
 def patience_of(engine: str) -> float:
-    """For one target, s: more than a minute where walks slip, 40 s in the planar model."""
+    """Patience for one target, s: 40 s in the planar model, more than a minute where feet slip."""
     return _PATIENCE * engine_named(engine).traits.haste
 
 

@@ -1,4 +1,4 @@
-"""How tightly a robot turns with which first spring: by its exact branch where there is one, by walks elsewhere."""
+"""Radius of a robot's curved walks over its first spring: from the exact branch if there is one, else from walks."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from chilopod.steering import RadiusLaw
 from chilopod.trials import AVERAGED, NONE, Trial, mean_joint_angles, run, summaries
 
 DURATION = 90.0
-"""s, of every trial: beside the onset a bend takes a minute to grow."""
+"""Duration of every trial, s: beside the onset a bend takes a minute to grow."""
 
 CURVED = 0.25
-"""rad: a walk is curved if its joints bend by more than this in all, to a radius of 4.5 m or less."""
+"""Least bend of all joints together of a curved walk, rad: a radius of 4.5 m or less."""
 
 SETTLED = 0.05
 """Largest relative change of the bend of a settled curve in the 10 s before its end."""
 
 HELD = 16
-"""Walks that must hold at a spring: of 20 none leaves the range then, as a rule."""
+"""Number of walks that must stay in range at a spring; then of 20 walks usually all do."""
 
 _LAW_SPRINGS = (0.2, 0.3, 0.37, 0.44, 0.51, 0.59, 0.68, 0.78, 0.9)  # of the stiffest spring
 _LAW_BEND = 0.8  # rad in all, to start with
@@ -39,11 +39,11 @@ _LAW_BEND = 0.8  # rad in all, to start with
 def radius_law(
     robot: Robot, engine: str = "planar", folder: str | Path | None = None, progress: Progress = silent
 ) -> RadiusLaw:
-    """Radius of the curved walks over k1, by the paper's measure of it.
+    """Radius of the curved walks over k1, by the paper's measure.
 
     An engine whose walks are those of the planar theory has the law of the exact branch, from the softest spring on
-    that holds a robot which bends from straight on (:func:`that_holds`). The law of any other engine is measured in
-    undisturbed walks that start bent; springs at which these fail are no part of it.
+    that a robot with a straight start withstands (:func:`that_holds`). The law of any other engine is measured in
+    undisturbed walks that start bent; springs at which these fail are left out.
 
     Parameters
     ----------
@@ -55,18 +55,18 @@ def radius_law(
     Raises
     ------
     AnalysisError
-        If there is no such branch; or fewer than three springs curve, or softer ones do not curve more tightly.
+        If there is no such branch, fewer than three springs curve, or softer springs do not curve more tightly.
     """
     if engine_named(engine).traits.exact:
         return that_holds(radius_laws(robot, progress).axis, robot, engine)
     stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
     springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
     bent = Trial(robot, DURATION, 0, (_LAW_BEND / (robot.body.modules - 1),), None, None, NONE, 10.0, engine=engine)
-    asked = [replace(bent, robot=robot.with_value(K1, stiffness(spring))) for spring in springs]
-    ends = xr.concat([end_of_walk(each, robot) for each in run(asked, folder, progress)], "spring")
+    trials = [replace(bent, robot=robot.with_value(K1, stiffness(spring))) for spring in springs]
+    ends = xr.concat([end_of_walk(each, robot) for each in run(trials, folder, progress)], "spring")
     curved = is_curved(ends)
     if curved.sum() < 3:
-        raise AnalysisError("the walks at fewer than three springs curve: there is no radius law", field="springs")
+        raise AnalysisError("must give at least three curved walks for a radius law", field="springs")
     inverse = 1.0 / np.array(springs)
     fit = square_root_fit(inverse[curved], ends.bend.values[curved], resampled=0)
     stiff_first = np.flatnonzero(curved)[::-1]
@@ -76,11 +76,11 @@ def radius_law(
 
 
 def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:
-    """The part of a radius law whose circles a robot reaches from straight on.
+    """Part of a radius law whose circles a robot reaches from a straight start.
 
-    A robot bends farther on its way into a circle than on the circle, and no two feet are alike, so that a joint may
-    leave its range although that of the settled walk does not. The softest spring that is left is the first at which
-    none of :data:`HELD` walks does, with the disturbance that all studies have. Raises AnalysisError if none is left.
+    A robot bends farther on its way into a circle than on the circle, and feet differ, so that a joint may leave its
+    range although it does not in the settled walk. The softest spring of the result is the first at which no joint does
+    in :data:`HELD` walks with the disturbance of all studies. Raises AnalysisError if no spring remains.
     """
     for first, value in enumerate(law.values[:-2].tolist()):
         walker = robot.with_value(K1, value)
@@ -91,14 +91,14 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
 
 
 def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
-    """Numbers at the end of one trial's record.
+    """Measures at the end of one trial's record.
 
     Returns
     -------
     Dataset over joint: ``mean_angle``, ``axis_radius`` (m) and ``status`` of :class:`chilopod.trials.WalkSummary`;
     ``bend``, the sum of the sizes of the mean angles (rad); ``direction`` (left, right, straight; empty where the walk
     failed); ``moved``, the difference of the bend from that of the 10 s before (rad), ``settled``, whether that is less
-    than :data:`SETTLED` of the bend; and ``speed`` of module 1 over the last 12 s (m/s).
+    than :data:`SETTLED` of the bend; and ``speed``, that of module 1 over the last 12 s (m/s).
     """
     (end,) = summaries(robot, record)
     walk = record.isel(robot=0)
@@ -108,7 +108,7 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
     back = int(np.searchsorted(times, times[-1] - 12.0))
-    # Along the way, gait cycle by gait cycle: on a curve the chord of 12 s is shorter.
+    # Path length, gait cycle by gait cycle: on a curve the chord of 12 s is shorter.
     stride = max(1, round(robot.gait.period / (times[1] - times[0])))
     steps = np.linalg.norm(np.diff(place[back::stride], axis=0), axis=1) / (stride * (times[1] - times[0]))
     return xr.Dataset(

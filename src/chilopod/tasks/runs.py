@@ -1,4 +1,4 @@
-"""Walks that differ in nothing but their seed: what every verb that walks is asked for, and what its result has."""
+"""Walks that differ only in their seed: common options and results of all tasks with walks."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _MOST = 12  # walks that are drawn in a notebook
 
 
 class RunOptions(TypedDict, total=False):
-    """Options of every verb that walks: how often, and where that is kept and told.
+    """Options of every task with walks: seeds, repeats, folder and progress.
 
     Attributes
     ----------
     seed, repeats
-        Seed of the first walk's disturbances, the others count up from it, None (default) for no disturbance at all;
-        and number of walks, by default 1.
+        Seed of the first walk's disturbances, from which the others count up, None (default) for no disturbance; and
+        number of walks, by default 1.
     folder, progress
-        Folder where all trials are kept, if any; called with the part done (0 to 1) and a few words.
+        Folder that keeps all trials, if any; function of the fraction done (0 to 1) and a few words.
     """
 
     seed: int | None
@@ -56,13 +56,13 @@ def runs(
 
 @dataclass(frozen=True)
 class Runs(Summary):
-    """Walks that differ in nothing but their seed, with all that makes each of them."""
+    """Walks that differ only in their seed, with their trials."""
 
     trials: tuple[Trial, ...]
 
     @property
     def first(self) -> Trial:
-        """All but the seed is the same in the others."""
+        """Trial of the first walk; the others differ only in the seed."""
         return self.trials[0]
 
     @property
@@ -82,7 +82,7 @@ class Runs(Summary):
 
     @property
     def seeds(self) -> list[int | None]:
-        """Seed of every walk; None of one that was not disturbed."""
+        """Seed of every walk; None for a walk without disturbance."""
         return [None if trial.disturbance == NONE else trial.seed for trial in self.trials]
 
     @property
@@ -92,18 +92,18 @@ class Runs(Summary):
 
     @cached_property
     def foot_creep(self) -> float | None:
-        """How firmly the engine's floor holds standing feet: the coefficient of viscous friction across the way that
-        lets them creep as much, N*s/m; None where they do not creep, or the robot does not stand."""
+        """Resistance of the engine's floor to creep: coefficient of the viscous friction across the way that gives the
+        same creep of standing feet, N*s/m; None if they do not creep, or the robot cannot stand."""
         engine = engine_named(self.engine)
         found = engine.foot_creep(self.robot).across if isinstance(engine, HasFootCreep) else np.inf
         return found if np.isfinite(found) else None
 
     def as_json(self) -> dict[str, Any]:
-        """Plain numbers; null for what there is not."""
+        """Plain numbers; null for missing values."""
         steering = self.first.controller
         controller = None if steering is None else path_of(type(steering))
-        told = {"robot": self.robot.name, "engine": self.engine, "controller": controller, **self._found()}
-        return {**told, "foot_creep_N_s_m": self.foot_creep}
+        shared = {"robot": self.robot.name, "engine": self.engine, "controller": controller, **self._found()}
+        return {**shared, "foot_creep_N_s_m": self.foot_creep}
 
     def _found(self) -> dict[str, Any]:
         return {}
@@ -143,7 +143,7 @@ def draw_paths(axes: Axes, record: xr.Dataset) -> None:
 
 
 def _targets(record: xr.Dataset) -> np.ndarray:
-    """Places on the floor, shape (targets, 2), each once."""
+    """Positions on the floor, shape (targets, 2), each once."""
     if "goal_place" in record:
         places = record.goal_place.transpose("robot", "goal", "axis").values
     elif "target" in record:

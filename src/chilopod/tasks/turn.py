@@ -1,4 +1,4 @@
-"""One turn: which spring leads to a target, and how the robot gets there with it."""
+"""One turn: the spring that leads to a target, and the walk with it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import NONE, Trial, check_fits, finite, run, straight, together
 
-_SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
+_SOFTEST = 1.0 / 20.0  # of the stiffest spring: start of the search for a strategy without a radius law
 _ROUNDS = 2
 _LEAST = 5.0  # s
 _AS_NEAR = 1e-9  # m
@@ -36,17 +36,17 @@ _TOLD = {
 
 @dataclass(frozen=True)
 class Turn(Pathed):
-    """A turning task and how it went.
+    """Result of a turning task.
 
     Attributes
     ----------
     trials, strategy
-        All that makes each walk, the robot with the spring that it walked with; and the strategy.
+        Trials of the walks, whose robot has the spring that was used; and the strategy.
     by_law
-        The spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None
-        where there is no such spring or none was asked for.
+        Spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None if there
+        is no such spring or it was not requested.
     stiffness
-        The spring it walked with, N*m/rad; None where the strategy leaves the springs alone.
+        Spring that was used, N*m/rad; None if the strategy does not set the springs.
     record, criteria
         Record of all repeats; criteria at the earliest arrival of any of them, or at the end if none arrives.
     """
@@ -59,7 +59,7 @@ class Turn(Pathed):
 
     @property
     def target(self) -> Target:
-        """As given to :func:`turn`."""
+        """Target given to :func:`turn`."""
         return cast(Target, self.first.target)
 
     @property
@@ -77,7 +77,7 @@ class Turn(Pathed):
             "spring_N_m_rad": finite(self.stiffness),
             "evaluation_time_s": found.time,
             "walks": [
-                {"outcome": outcome.label, **{told: finite(getattr(found, name)[i]) for name, told in _TOLD.items()}}
+                {"outcome": outcome.label, **{key: finite(getattr(found, name)[i]) for name, key in _TOLD.items()}}
                 for i, outcome in enumerate(found.outcome)
             ],
         }
@@ -134,14 +134,14 @@ def turn(
     robot, target, strategy
         Robot, target, and one of :data:`chilopod.steering.STRATEGIES`.
     spring
-        Spring of the strategy, N*m/rad; or ``law``: the paper's k1-hat, from the radius law; or ``auto``: what comes
-        nearest to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend.
-        Without leg yaw nothing bends undisturbed, and ``auto`` is ``law``.
+        Spring of the strategy, N*m/rad; or ``law``: the paper's k1-hat, from the radius law; or ``auto``: the spring
+        that comes nearest to the target in undisturbed simulated trials, which accounts for the time that a bend needs
+        to grow. Without leg yaw an undisturbed robot does not bend, and ``auto`` means ``law``.
     duration
-        s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste,
-        see :class:`chilopod.engine.Traits`; at least 5 s.
+        Duration, s; by default the time for the circle at the speed of the straight walk without slip, multiplied by
+        the engine's ``haste``, see :class:`chilopod.engine.Traits`; at least 5 s.
     engine, controller
-        As for :class:`chilopod.trials.Trial`; the controller is in place of the strategy's.
+        As for :class:`chilopod.trials.Trial`; the controller replaces that of the strategy.
     **options
         See :class:`chilopod.tasks.RunOptions`; the folder has the trials of the radius law and of the search too.
 
@@ -151,9 +151,11 @@ def turn(
         If no spring turns tightly enough.
     """
     if spring not in ("auto", "law") and isinstance(spring, str):
-        raise ParameterError("is no spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
+        raise ParameterError(
+            "must be a spring setting", field="spring", value=spring, allowed="auto, law, or a stiffness"
+        )
     if strategy.springs is None and spring != "auto":
-        problem = f"is of no use to {strategy.name}, which leaves the springs alone"
+        problem = f"must be auto: strategy {strategy.name} does not set the springs"
         raise ParameterError(problem, field="spring", value=spring, allowed="auto")
     traits = engine_named(engine).traits
     time = duration if duration is not None else _time_for(robot, target, traits.haste)
@@ -170,7 +172,7 @@ def turn(
         stiffness = spring
     elif spring == "law" or not (strategy.leg_yaw or controller):
         if by_law is None:
-            raise AnalysisError("only the first spring has a radius law", field="spring", value=spring)
+            raise AnalysisError("must be the first spring for a radius law", field="spring", value=spring)
         stiffness = by_law
     else:
         stiffest = max(robot.springs.stiffness)
@@ -191,7 +193,8 @@ def _with_spring(trial: Trial, strategy: Strategy, stiffness: float | None) -> T
 
 
 def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float], folder: str | Path | None) -> float:
-    """The spring of a strategy that comes nearest to the target, by undisturbed trials on ever finer grids, N*m/rad."""
+    """Spring of a strategy that comes nearest to the target, by undisturbed trials on successively finer grids,
+    N*m/rad."""
     low, high = between
     tried = engine_named(trial.engine).traits.a_round
     trial = replace(trial, disturbance=NONE, rate=20.0, poses=False)
@@ -202,7 +205,7 @@ def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float],
             values = np.linspace(values[max(best - 1, 0)], values[min(best + 1, tried - 1)], tried)
         record = together(run([_with_spring(trial, strategy, float(value)) for value in values], folder))
         nearest = evaluate(record, trial.duration).nearest
-        # Of springs that do equally well the stiffest.
+        # Of equally good springs take the stiffest.
         best = int(np.flatnonzero(nearest <= np.nanmin(nearest) + _AS_NEAR)[-1])
     return float(values[best])
 

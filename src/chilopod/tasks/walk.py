@@ -1,4 +1,4 @@
-"""Walks of one robot: one, or many that differ in their disturbances, and what they came to."""
+"""Walks of one robot: one, or many that differ in their disturbances, and their results."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summ
 
 @dataclass(frozen=True)
 class Ends(Runs):
-    """Ends of walks that differ in nothing but their seed: all that makes each, the end of each, and whether they are
-    ``straight``: none of them ever bent, see :func:`chilopod.trials.straight`."""
+    """Ends of walks that differ only in their seed: trials, summaries, and ``straight``, which is True if none of them
+    ever bent, see :func:`chilopod.trials.straight`."""
 
     summaries: Sequence[WalkSummary]
     straight: bool
 
     @property
     def title(self) -> str:
-        """Robot, engine, how many walks and how long, in words."""
+        """Robot, engine, number of walks and their duration, in words."""
         count = len(self.trials)
         return f"{self.who}: {count} walk{'s' if count > 1 else ''} of {self.first.duration:g} s"
 
@@ -59,7 +59,7 @@ class Ends(Runs):
 
 @dataclass(frozen=True)
 class Walks(Pathed, Ends):
-    """The same with the record of all walks."""
+    """Ends of walks together with the record of all walks."""
 
     record: xr.Dataset
 
@@ -75,7 +75,7 @@ def walk(
     controller: Controller | None = None,
     **options: Unpack[RunOptions],
 ) -> Walks:
-    """Let a robot walk, once or many times.
+    """Simulate one walk of a robot, or several.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def walk(
     Raises
     ------
     ParameterError
-        If something is out of range, or memory cannot hold the record: :func:`ends` needs none.
+        If a value is out of range, or memory cannot hold the record, which :func:`ends` does not need.
     """
     bends = tuple(joint_angles)
     one = Trial(robot, duration, 0, bends, controller=controller, rate=rate, forces=forces, engine=engine)
@@ -102,8 +102,8 @@ def ends(
     progress: Progress = silent,
     told: Callable[[int, xr.Dataset], None] = lambda index, record: None,
 ) -> Ends:
-    """Let robots walk and keep only what they came to: memory holds a batch of records, however many walks there are.
-    ``told`` is called with the number of a walk and its record as soon as that is there; for the rest see
+    """Simulate walks and keep only their summaries, so that memory holds one batch of records, however many walks there
+    are. ``told`` is called with the number of a walk and its record as soon as it is done; for the rest see
     :meth:`chilopod.trials.Trial.repeated` and :class:`chilopod.tasks.RunOptions`."""
     trials = tuple(as_now(trials))
     number = {trial.file_name: index for index, trial in enumerate(trials)}

@@ -1,8 +1,8 @@
-"""Trials: one walk each, with its conditions, its disturbances drawn from a seed, and its file.
+"""Trials: single walks with conditions, disturbances drawn from a seed, and a file each.
 
-A study is a list of trials. They run in batches on all cores, or on a cluster, each batch's records are written as soon
-as it is done, every file whole or not at all and under a name derived from all that makes the trial, so a study that
-was stopped in any way goes on where it was, and a trial that several studies share is run once.
+A study is a list of trials. They run in batches on all cores, or on a cluster. The records of each batch are written as
+soon as it is done, in complete files whose names are derived from everything that defines the trial. Therefore a
+stopped study resumes where it was, and a trial that several studies share runs once.
 """
 
 from typing import TYPE_CHECKING

@@ -1,6 +1,6 @@
-"""Check of an engine's record against what was asked of it: before it is kept, for later nobody looks again.
+"""Check of an engine's record against its trials, before the record is kept.
 
-The law is that of :meth:`chilopod.engine.Walk.to_dataset`.
+The rules are those of :meth:`chilopod.engine.Walk.to_dataset`.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ _MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing",
 
 
 def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
-    """The record that an engine gave of a batch. Raises AnalysisError, which names the engine and what is wrong, if it
-    is not that of these trials and of what was drawn for them."""
+    """Return the record that an engine gave of a batch. Raises AnalysisError, which names the engine and the fault, if
+    it does not fit these trials and their drawn disturbances."""
     if not isinstance(data, xr.Dataset):
         raise _refused("its record is no xarray.Dataset", trials[0].engine)
     try:
         wrong = _outline(data, walk, trials[0], len(trials)) or _content(data, walk, trials, drawn)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        wrong = f"its record cannot be understood ({in_words(error)})"
+        wrong = f"its record cannot be read ({in_words(error)})"
     if wrong:
         raise _refused(wrong, trials[0].engine)
     return data
 
 
 def check_finite(values: Mapping[str, Any], engine: str) -> None:
-    """Raise AnalysisError unless, in the variables of a robot's record by name, shape (times, 1, ...), a robot that
-    walks is somewhere, and one that failed or was halted no more from some sample on."""
+    """Raise AnalysisError unless a robot's variables by name, shape (times, 1, ...), are finite while it walks, and NaN
+    from some sample on if it failed or was halted."""
     label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
     count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)
     for name in MOTION:
@@ -49,12 +49,12 @@ def check_finite(values: Mapping[str, Any], engine: str) -> None:
         finite = np.isfinite(values[name][:, 0]).reshape(len(there), -1).all(axis=1)
         if not finite[:count].all() or finite[count:].any():
             raise _refused(
-                f"{name} of a robot that {label} is not finite as long as it walks, or is so afterwards", engine
+                f"{name} of a robot with status {label} must be finite while it walks and NaN afterwards", engine
             )
 
 
 def _refused(wrong: str, engine: str) -> AnalysisError:
-    return AnalysisError(f"gave what was not asked for: {wrong}", field=f"engine {engine}")
+    return AnalysisError(f"must return the records of the trials it received: {wrong}", field=f"engine {engine}")
 
 
 def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
@@ -80,8 +80,12 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     if found.shape != events.shape or not np.all(np.abs(found - events) <= _NEAR):
         return f"{found.size} commands instead of {events.size}, or at other times"
     sizes = {name: len(values) for name, values in coords.items()} | {"time": times.size, "event": events.size}
-    told = {"engine": engine_named(first.engine).traits.name, "robot": file_text(first.robot), "duration": walk.time}
-    for name, value in told.items():
+    attributes = {
+        "engine": engine_named(first.engine).traits.name,
+        "robot": file_text(first.robot),
+        "duration": walk.time,
+    }
+    for name, value in attributes.items():
         if data.attrs.get(name) != value:
             return f"its attribute {name} is {str(data.attrs.get(name))[:40]!r}, not {str(value)[:40]!r}"
     return _quantities(data, first, sizes)
@@ -91,7 +95,7 @@ def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str
     """Fault of variables, in a record of these sizes."""
     aimed, commands = first.target is not None, sizes["event"] > 0
     asked = {"": True, "target": aimed, "forces": first.forces, "poses": first.poses, "commands": commands}
-    # Where all targets of a course are out of reach there never is one.
+    # A course without a target in reach has none.
     may_lack = {*_MAY_LACK, *(("target", "distance", "bearing") if first.course else ())}
     for name, (_, _, why) in QUANTITIES.items():
         if asked[why] and name not in may_lack and name not in data:
@@ -108,8 +112,8 @@ def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str
         units = found.attrs.get("units", "")
         kind, unit = found.dtype if name == "status" else np.dtype(np.float64), units if name == "pose" else unit
         if (found.dims, found.shape, found.dtype, units) != (dims, shape, kind, unit):
-            told = f"{found.dtype} over {dict(found.sizes)} in {units!r}"
-            return f"{name} is {told}, not {kind} over {dict(zip(dims, shape, strict=True))} in {unit!r}"
+            actual = f"{found.dtype} over {dict(found.sizes)} in {units!r}"
+            return f"{name} is {actual}, not {kind} over {dict(zip(dims, shape, strict=True))} in {unit!r}"
     return ""
 
 
@@ -117,24 +121,24 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
     """Fault of numbers."""
     first, status = trials[0], data["status"].values.tolist()
     if status != [each.label for each in walk.status]:
-        return f"status is {status}, not that of the walk"
+        return f"status is {status}, which differs from that of the walk"
     for name, each in data.data_vars.items():
         if name != "status" and (np.abs(each.values) > LARGEST).any():
             return f"{name} has numbers beyond {LARGEST:g}"
     angle, heading, position, yaw = (data[name].values[0] for name in ("joint_angle", "heading", "position", "leg_yaw"))
     places = data["target"].transpose(..., "robot", "axis").values if isinstance(first.target, Target) else None
     springs = data["stiffness"].transpose(..., "robot", "joint").values.reshape(-1, *data["joint_angle"].shape[1:])[0]
-    for robot, (trial, told) in enumerate(zip(trials, drawn, strict=True)):
+    for robot, (trial, draw) in enumerate(zip(trials, drawn, strict=True)):
         off = {
             "position": position[robot],
             "leg_yaw": yaw[robot],
-            "joint_angle": angle[robot] - told.joint_angles,
-            "heading": np.sin(0.5 * (heading[robot] - told.heading)),
+            "joint_angle": angle[robot] - draw.joint_angles,
+            "heading": np.sin(0.5 * (heading[robot] - draw.heading)),
             "stiffness": springs[robot] / np.array(trial.robot.springs.stiffness) - 1.0,
         }
         if places is not None and isinstance(trial.target, Target):
             off["target"] = places[..., robot, :] - np.array(trial.target.position)
         for name, error in off.items() if np.isfinite(heading[robot]) else ():
             if not np.all(np.abs(error) <= _NEAR):
-                return f"{name} of robot {robot} does not start as asked"
+                return f"{name} of robot {robot} does not start at the given values"
     return ""

@@ -1,4 +1,4 @@
-"""Trials that walk together, in any engine."""
+"""Batches of trials that one engine walks together."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from chilopod.trials.disturbance import Drawn, conditions, draw
 from chilopod.trials.trial import Trial
 
 NOT_KEPT = "not kept"
-"""Attribute of a record that is not to be kept: why. It stays nowhere."""
+"""Attribute with the reason why a record must not be kept; files never have it."""
 
-_CHANGES = "what its code can reach changes while it steers"
-_KNOWN: dict[str, str] = {}  # what was found of controllers, by all that makes them
+_CHANGES = "an object that its code can reach changes while it steers"
+_KNOWN: dict[str, str] = {}  # findings about controllers, by everything that defines them
 _MOST_BYTES = 256e6
-"""Largest size of the records of a batch, about."""
+"""Approximate largest size of the records of a batch, bytes."""
 
 
 def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
-    """Trials, in any order, in groups that can walk together and take a few seconds, within so much memory, on so many
-    cores each, by default all."""
+    """Group trials, in any order, into batches that can walk together and take a few seconds, within a limit of memory
+    and on a number of cores each, by default all."""
     groups: dict[tuple[Any, ...], list[Trial]] = {}
     for trial in trials:
         walks = trial.engine, engine_named(trial.engine).common(trial.robot), trial.robot.gait, trial.robot.body.modules
         course = trial.course
         sight = (course.patience, course.view, course.range, course.tightest) if course else trial.target is None
         asked = trial.duration, trial.recording, trial.brief, sight
-        noisy = trial.disturbance.bearing > 0.0  # said once for a batch
+        noisy = trial.disturbance.bearing > 0.0  # reported once for a batch
         alike = walks, asked, noisy, json.dumps(trial.steering, sort_keys=True), trial.code
         groups.setdefault(alike, []).append(trial)
     split = []
@@ -51,12 +51,12 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     """Records of the trials of one of :func:`batches`, each with one ``robot``, and robot file and trial in the
     attributes. Raises ParameterError or AnalysisError if an argument is out of range or a controller fails."""
     first = trials[0]
-    # Who steers otherwise when asked the same again is found out before.
+    # A controller that is not reproducible is found before.
     doubts = first.code[1] or first.code[2] or _doubts(first)
     walk, drawn, referee = _steered(trials, first.duration)
     name = type(first.controller).__name__
     if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
-        raise AnalysisError("changed its own fields while it steered, so its trials are not what they say", field=name)
+        raise AnalysisError("must not change its own fields while it steers: they name the trial", field=name)
     if not doubts and _is_own(first) and first.as_now().code != first.code:
         doubts = _KNOWN[_who(first)] = _CHANGES
     data = check_asked(walk.to_dataset(), walk, trials, drawn)
@@ -69,7 +69,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
 
 
 def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], CourseReferee | None]:
-    """Walk trials of one batch up to a time, s: their walk, what was drawn for each, and who watched."""
+    """Walk trials of one batch up to a time, s; return their walk, the drawn disturbances and the referee."""
     first = trials[0]
     engine = engine_named(first.engine)
     targets = [each.target.position for each in trials if isinstance(each.target, Target)]
@@ -84,7 +84,7 @@ def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], 
         **conditions(engine, first.robot, drawn, first.target is not None and first.disturbance.bearing > 0.0),
     )
     if len(walk.robots) != len(trials):
-        problem = f"start gave a walk of {len(walk.robots)} robots instead of {len(trials)}"
+        problem = f"start must return a walk of {len(trials)} robots, not {len(walk.robots)}"
         raise AnalysisError(problem, field=f"engine {first.engine}")
     noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
@@ -102,24 +102,25 @@ def _who(trial: Trial) -> str:
 
 
 def _doubts(trial: Trial) -> str:
-    """Why a controller's walks cannot be had again, if so: its first gait cycle is walked twice, once a process."""
+    """Reason why a controller's walks are not reproducible, if so: its first gait cycle is walked twice, once in each
+    process."""
     if not _is_own(trial):
         return ""
     who = _who(trial)
     if who not in _KNOWN:
         cycle = min(trial.robot.gait.period, trial.duration)
         one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
-        # An engine may give anything.
+        # An engine may return anything.
         if not getattr(one, "identical", lambda _: True)(other):
-            _KNOWN[who] = "it steers otherwise when it sees the same again (a clock, np.random, a count?)"
+            _KNOWN[who] = "equal observations give different commands (a clock, np.random, a counter?)"
         else:
             _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
     return _KNOWN[who]
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
-    """The records of single robots."""
-    # To number each robot 0 afterwards would take longer than all else.
+    """Records of single robots."""
+    # Numbering each robot 0 afterwards would take longer than everything else.
     data = data.assign_coords(robot=np.zeros(len(trials), dtype=np.int64))
     records = []
     for index, trial in enumerate(trials):
@@ -135,7 +136,7 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
 
 
 def _bytes_of(trial: Trial) -> float:
-    """About what a trial's record takes while it walks."""
+    """Approximate memory of a trial's record while it walks, bytes."""
     # A module's joint, legs and servos at every sample, as the engine has them and as they are recorded.
     numbers = (20 + 6 * trial.forces + 8 * trial.poses) * trial.robot.body.modules
     return 8.0 * numbers * (trial.duration * trial.rate + 1.0)

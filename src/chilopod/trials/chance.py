@@ -1,7 +1,8 @@
-"""Clocks, chance and identities in code: what answers otherwise in every process, though the code is the same.
+"""Detection of clocks, random numbers and identities in code, whose values differ between processes although the code
+is the same.
 
-Instructions are read one after the other, as they stand: names that they load, attributes of modules, local names for
-these. Code that hides better than that is found only if its first gait cycle, walked twice, differs.
+Instructions are read in order: names that they load, attributes of modules, local names for these. Code that hides its
+source of chance is found only if its first gait cycle, walked twice, differs.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ _FINE = ("sleep", "uuid3", "uuid5")
 _SEEDED = frozenset(
     ("Random", "RandomState", "default_rng", "SeedSequence", "MT19937", "PCG64", "PCG64DXSM", "Philox", "SFC64")
 )
-"""Numbers as good as chance that are the same every time, if their seed is."""
+"""Random generators that repeat their numbers for a given seed."""
 _BESIDE = ("CACHE", "COPY_FREE_VARS", "EXTENDED_ARG", "KW_NAMES", "NOP", "PRECALL", "PUSH_NULL", "RESUME", "SWAP")
 _GLOBAL = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_DEREF", "LOAD_CLASSDEREF")
 _INNER = ("LOAD_ATTR", "LOAD_METHOD", "IMPORT_FROM")
 
 
 def by_chance(value: object) -> str:
-    """The name of a function that answers otherwise every time, or of a module of such functions; else empty."""
+    """Name of a function whose result varies from call to call, or of a module of such functions; empty otherwise."""
     of, name = getattr(value, "__self__", None), getattr(value, "__name__", "")
     if isinstance(of, type) and of.__module__ == "datetime" and name in _NOW:
         return f"{of.__name__}.{name}"
@@ -37,7 +38,7 @@ def by_chance(value: object) -> str:
 
 @lru_cache
 def _sources(modules: tuple[str, ...]) -> dict[int, str]:
-    """Names of all such functions and modules, by their address: what imports them may call them otherwise."""
+    """Names of all such functions and modules, by their address, because imports may rename them."""
     found = {id(sys.modules[module]): module for module in modules if module in _WHOLE}
     for module in modules:
         for name, value in vars(sys.modules[module]).items():
@@ -52,8 +53,8 @@ def _sources(modules: tuple[str, ...]) -> dict[int, str]:
 
 
 def chance_in(code: CodeType, space: Mapping[str, object]) -> str:
-    """The name of something that code, functions within included, loads and that answers otherwise every time; empty if
-    there is none. ``space`` has the values of global names, and of names from outer functions."""
+    """Name of a source of chance that code, inner functions included, loads; empty if there is none. ``space`` has the
+    values of global names, and of names from outer functions."""
     local: dict[str, Any] = {}
     here: Any = None
     package: Any = None
@@ -71,7 +72,7 @@ def chance_in(code: CodeType, space: Mapping[str, object]) -> str:
             owner = package if verb == "IMPORT_FROM" else before
             here = owner if owner and owner is package and owner.__name__.endswith(f".{name}") else _inner(owner, name)
         elif isinstance(before, ModuleType) and before is not package and by_chance(before):
-            return by_chance(before)  # given to somebody else
+            return by_chance(before)  # passed to other code
         if _takes_seed(before) and _seedless(verb, name):
             return f"{before.__name__} without a seed"
         hashing = code.co_name == "__hash__" and here is hash  # no more than what dictionaries ask
@@ -82,7 +83,7 @@ def chance_in(code: CodeType, space: Mapping[str, object]) -> str:
 
 
 def _inner(owner: Any, name: str) -> Any:
-    """An attribute of a module, or of a class of datetime; nothing of all else, which could do anything when asked."""
+    """Attribute of a module, or of a class of datetime; None for other objects, whose attributes may run code."""
     if isinstance(owner, ModuleType):
         return vars(owner).get(name)
     return getattr(owner, name, None) if getattr(owner, "__module__", None) == "datetime" else None
@@ -94,12 +95,12 @@ def _takes_seed(value: Any) -> bool:
 
 
 def _seedless(verb: str, value: object) -> bool:
-    """True if what comes after something that takes a seed is none."""
+    """True if the argument of a function that takes a seed is missing or None."""
     return not verb.startswith(("LOAD_", "BUILD_")) or (verb == "LOAD_CONST" and value is None)
 
 
 def _steps(code: CodeType) -> Iterator[tuple[str, Any]]:
-    """Instructions and what they are about, those that are two in one apart."""
+    """Instructions and their arguments, with combined instructions split in two."""
     for each in dis.get_instructions(code):
         if isinstance(each.argval, tuple) and "_FAST_" in each.opname:
             yield from zip(re.findall("[A-Z]+_FAST", each.opname), each.argval, strict=True)

@@ -1,4 +1,4 @@
-"""Trials of a folder that are under way here, so that other processes walk others in the meantime."""
+"""Claims on trials of a folder, so that several processes walk different ones."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ from typing import Self
 from chilopod.process import on_leave
 
 NAME = ".chilopod-claims"
-"""Name of the file whose bytes are locked; there while somebody walks, and after one who was killed."""
+"""Name of the file whose bytes are locked; it exists while a process walks, and after a killed one."""
 
 _NOT, _WITH_OTHERS, _ALONE = "F_UNLCK", "F_RDLCK", "F_WRLCK"  # how a byte is locked
-_PRESENT = 0  # the byte that all who are here have locked, with the others
+_PRESENT = 0  # the byte that all processes in the folder share a lock of
 _DIGITS = 15  # of a trial's name: which byte is its own, of 2**63
-_TRIES, _PAUSE = 500, 2e-3  # s; whoever comes while the last one leaves tries again
+_TRIES, _PAUSE = 500, 2e-3  # s; a process that enters while the last one leaves tries again
 
 
 class Claims:
     """Trials that this process walks in a folder.
 
-    A claim is a lock of the operating system's on one byte of an empty file in the folder; which byte follows from the
-    trial's name. It ends with the process that has it, however that ends. Where there are no such locks (they are
-    Linux's, of open files) everybody is given every claim: then work is doubled, and nothing else. ``sweep`` is called
-    at the end if nobody else is there: what is in the folder now and is no whole file was left over by somebody who was
-    killed.
+    A claim is a lock of the operating system on one byte of an empty file in the folder; the trial's name determines
+    the byte. It ends with its process, however that ends. On systems without such locks (Linux has them for open files)
+    every claim succeeds; then work is doubled, without other harm. ``sweep`` is called at the end if no other process
+    uses the folder: incomplete files in it then belong to killed processes.
     """
 
     def __init__(self, folder: Path, sweep: Callable[[], object]) -> None:
@@ -55,26 +54,26 @@ class Claims:
         if self._handle is not None:
             handle, self._handle = self._handle, None
             with suppress(OSError):
-                _locked(handle, _NOT, _PRESENT)  # of two who leave at once one has it alone
+                _locked(handle, _NOT, _PRESENT)  # of two processes that leave at once one gets the lock
                 if _locked(handle, _ALONE, _PRESENT) and _is(handle, self._path):
                     self._sweep()
                     self._path.unlink()
             os.close(handle)
 
     def take(self, name: str) -> bool:
-        """True if the trial of a file may be walked here: nobody else has it, and nobody else will be given it."""
+        """Claim the trial of a file for this process; return False if another process has it."""
         with suppress(OSError):
             return self._handle is None or _locked(self._handle, _ALONE, _byte_of(name))
         return True
 
     def release(self, name: str) -> None:
-        """Let others have a trial that was taken."""
+        """Release a claimed trial for other processes."""
         with suppress(OSError):
             if self._handle is not None:
                 _locked(self._handle, _NOT, _byte_of(name))
 
     def _entered(self) -> bool:
-        """True if we are in; False if somebody is just leaving and takes the file along."""
+        """True on success; False if the last process is just leaving and removes the file."""
         was_there = self._path.exists()
         handle = _opened(self._path, os.O_CREAT)
         try:
@@ -91,7 +90,7 @@ class Claims:
 
 
 def nobody_in(folder: Path) -> bool:
-    """True if no process walks in a folder now, as far as can be told."""
+    """True if no process is known to walk in a folder now."""
     with suppress(OSError):
         try:
             handle = _opened(folder / NAME)
@@ -122,16 +121,16 @@ def _is(handle: int, path: Path) -> bool:
 
 
 def _locked(handle: int, kind: str, byte: int) -> bool:
-    """Lock a byte, or let it go, unless somebody else has it."""
+    """Lock or unlock a byte, unless another process has it."""
     if sys.platform != "linux":
         raise OSError("there are no such locks")
     import fcntl
 
     # Type, from where, first byte, how many, and the number of a process, which has to be 0.
-    asked = struct.pack("hhqqi", getattr(fcntl, kind), os.SEEK_SET, byte, 1, 0)
+    request = struct.pack("hhqqi", getattr(fcntl, kind), os.SEEK_SET, byte, 1, 0)
     try:
         # Those of an open file: threads exclude each other too, and none is lost when another file is closed.
-        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, asked)
+        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, request)
     except (BlockingIOError, PermissionError):
         return False
     return True

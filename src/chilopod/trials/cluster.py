@@ -1,7 +1,7 @@
 """Trials on a dask cluster: worker processes on this machine, or on any number of others.
 
-What goes over the wire are pickles of trials and of their records: the machines of a cluster have to trust each other.
-Files are written by the client alone, so workers need no disk in common with it.
+Trials and records travel as pickles, so the machines of a cluster must trust each other. Only the client writes files,
+so workers need no disk in common with it.
 """
 
 from __future__ import annotations
@@ -51,30 +51,30 @@ _SETTINGS = {
     "distributed.comm.timeouts.connect": f"{_CONNECT:g}s",
     # What dask would put there it puts into this process's environment too.
     "distributed.nanny.pre-spawn-environ": {},
-    # Of our own scheduler: deaths of its worker until a batch is given back, to be tried alone.
+    # Own scheduler: deaths of a batch's worker before the batch is returned, to be tried alone.
     "distributed.scheduler.allowed-failures": 1,
-    # On a busy machine a worker takes its time to be there again; dask would give its place up.
+    # On a busy machine a worker restarts slowly; dask would give it up.
     "distributed.deploy.lost-worker-timeout": "1h",
 }
 
 
 class Cluster:
-    """An executor: batches walk on the workers of a dask cluster, each on all threads of one.
+    """Executor that walks batches on the workers of a dask cluster, each on all threads of one worker.
 
-    A worker that is killed is replaced, if it has a nanny, and its batch walked again; a batch that kills its worker
-    again and again is an error once all others are done.
+    A killed worker is replaced, if it has a nanny, and its batch runs again; a batch that kills its worker repeatedly
+    is an error after all others are done.
 
     Parameters
     ----------
     where, threads
-        The address of a scheduler, such as ``tcp://10.0.0.1:8786``; or how many worker processes to start on this
-        machine, and threads of each, by default its share of the cores.
+        The address of a scheduler, such as ``tcp://10.0.0.1:8786``; or the number of worker processes to start on this
+        machine; and the threads of each, by default its share of the cores.
 
     Raises
     ------
     ExtraError, ParameterError, ClusterError
-        If dask is not installed; there cannot be so many workers; it is not there, has no workers, or has another
-        Python, chilopod, numpy or numba.
+        If dask is not installed, the number of workers is out of range, or the cluster does not answer, has no workers,
+        or has another version of Python, chilopod, numpy or numba.
     """
 
     def __init__(self, where: str | int, threads: int | None = None) -> None:
@@ -100,16 +100,16 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """How many there were when it was last looked at."""
+        """Number of workers at the last check."""
         return len(self._threads)
 
     @property
     def words(self) -> str:
-        """How many workers."""
+        """Number of workers in words."""
         return f", {self.workers} worker{'s' * (self.workers != 1)}"
 
     def cut(self, batches: Sequence[list[Trial]]) -> Iterator[list[Trial]]:
-        """In even pieces: every worker gets several, is done with one in seconds, and has work for all its threads."""
+        """Cut batches into even pieces: several for every worker, each with seconds of work for all its threads."""
         threads = max(self._threads, default=1)
         trials = sum(len(batch) for batch in batches)
         largest = -(-trials // (_SHARES * max(self.workers, 1)))
@@ -120,23 +120,23 @@ class Cluster:
                 yield from self._pace.pieces(batch[i : i + size], threads)
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """The number of a batch and its records, as they come; a batch is taken when it is sent. Raises ClusterError if
-        the cluster goes away or has no worker for a minute, if workers have other versions and, when all else is done,
-        for batches that kill their workers; ParameterError if workers cannot import a controller."""
+        """Yield the number of a batch and its records as they arrive; a batch is taken when it is sent. Raises
+        ClusterError if the cluster goes away or has no worker for a minute, if workers have other versions and, when
+        all else is done, for batches that kill their workers; ParameterError if workers cannot import a controller."""
         suspects: list[tuple[int, Sequence[Trial]]] = []
         yield from self._walk(enumerate(batches), suspects)
-        # Dask blames all that a killed worker was given. What is killed alone, too, kills.
+        # Dask blames every batch of a killed worker. A batch that also fails alone is the cause.
         guilty: list[tuple[int, Sequence[Trial]]] = []
         for suspect in suspects:
             yield from self._walk([suspect], guilty)
         if guilty:
             which = "; ".join(_named(batch) for _, batch in guilty)
-            raise self._error(f"these kill their worker again and again, all others are done: {which}")
+            raise self._error(f"these batches kill their worker repeatedly, all others are done: {which}")
 
     def _walk(
         self, batches: Iterable[tuple[int, Sequence[Trial]]], killed: list[tuple[int, Sequence[Trial]]]
     ) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """Batches with their numbers; those that were given up go into ``killed``."""
+        """Yield batches with their numbers; abandoned ones go into ``killed``."""
         from distributed import KilledWorker
 
         arrived: _Answers = queue.SimpleQueue()
@@ -159,13 +159,13 @@ class Cluster:
                     self._pace.took(batch, max(self._threads, default=1), seconds)
                     yield index, records
         finally:
-            # What nobody waits for any more does not walk. (Cancelling what fetches it would leave tasks of dask's
+            # Cancel batches whose result is no longer needed. (Cancelling the fetch itself would leave tasks of dask's
             # alone with their exceptions, of which asyncio complains.)
             for _, future in under_way.values():
                 future.release()
 
     def _sent(self, index: int, batch: Sequence[Trial], arrived: _Answers) -> Any:
-        """Give a batch to the cluster, and see to it that its answer is fetched as soon as it is there; its future."""
+        """Send a batch to the cluster and return its future, whose result is fetched as soon as it is ready."""
         client, job = self._client, packed(batch)
         try:
             future = client.submit(walked_there, job, str(self._where), pure=False)
@@ -185,7 +185,7 @@ class Cluster:
         return future
 
     def _next(self, arrived: _Answers) -> tuple[int, bytes | BaseException]:
-        """The next answer, from a cluster that is there."""
+        """Next answer of the cluster; ClusterError if it is lost."""
         self._seen = time.monotonic()
         while True:
             with suppress(queue.Empty):
@@ -193,7 +193,7 @@ class Cluster:
             self._look()
 
     def _look(self) -> None:
-        """See whether the scheduler is there, and its workers."""
+        """Check the scheduler and its workers."""
         try:
             threads = self._client.sync(self._client.scheduler.ncores, callback_timeout=_ANSWER)
         except Exception as error:
@@ -203,13 +203,13 @@ class Cluster:
         if self._threads:
             self._seen = now
         elif now - self._seen > _ALONE:
-            raise self._error(f"has had no workers for {_ALONE:.0f} s; what is kept in a folder goes on from here")
+            raise self._error(f"has had no workers for {_ALONE:.0f} s; a kept study resumes from here")
 
     def _in_words(self, error: BaseException) -> ClusterError:
-        """An error of dask's own."""
+        """Message of an error of dask."""
         gone = isinstance(error, (OSError, TimeoutError, asyncio.CancelledError)) or "Cancelled" in type(error).__name__
         if gone or self._client.status != "running":
-            return self._error("the scheduler went away; what is kept in a folder goes on from here")
+            return self._error("the scheduler was lost; a kept study resumes from here")
         return self._error(one_line(f"{type(error).__name__}: {error}"))
 
     def _error(self, problem: str) -> ClusterError:
@@ -217,21 +217,21 @@ class Cluster:
 
 
 def _named(batch: Sequence[Trial]) -> str:
-    """A batch in a few words."""
+    """Description of a batch in a few words."""
     first = batch[0]
     seeds = [str(trial.seed) for trial in batch[:_MOST_SEEDS]] + ["..."] * (len(batch) > _MOST_SEEDS)
     return f"{first.engine}, {first.robot.name}, {first.duration:g} s, seeds {', '.join(seeds)}"
 
 
 def _connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
-    """A ``distributed.Client`` of a cluster; leaving the stack closes all that was opened for it."""
+    """Client (``distributed.Client``) of a cluster; the stack closes everything opened for it."""
     if isinstance(where, int) and not 1 <= where <= _MOST:
-        raise ParameterError("is no number of workers", field="cluster", value=where, allowed=f"1 to {_MOST}")
+        raise ParameterError("must be a number of workers", field="cluster", value=where, allowed=f"1 to {_MOST}")
     needs("distributed", extra="cluster")
     import dask
     import distributed
 
-    for name in _LOGGERS:  # what they would log is said in one line, by us
+    for name in _LOGGERS:  # chilopod reports their messages in one line
         logger = logging.getLogger(name)
         stack.callback(logger.setLevel, logger.level)
         logger.setLevel(logging.CRITICAL + 1)
@@ -248,42 +248,46 @@ def _connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
 
 
 def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
-    """A client of a cluster that somebody started."""
+    """Client of a running cluster."""
 
     async def asked() -> None:
         secrets = distributed.Security().get_connection_args("client")
         async with distributed.rpc(address, connection_args=secrets, timeout=_CONNECT) as scheduler:
             if (await asyncio.wait_for(scheduler.identity(), _CONNECT))["type"] != "Scheduler":
-                raise ValueError("is a worker, no scheduler")
+                raise ValueError("is a worker, not a scheduler")
 
     try:
-        # A client that cannot be made leaves a loop, a thread and a traceback behind, so somebody else knocks first; in
+        # A client that fails leaves a loop, a thread and a traceback behind, so a probe connects first; in
         # a thread, because a notebook has a loop in this one.
         with ThreadPoolExecutor(1) as knocking:
             knocking.submit(asyncio.run, asked()).result()
-    except Exception as error:  # OSError, ValueError of an address, whatever comes of bytes that are not dask's
-        reason = "does not answer" if isinstance(error, OSError) else f"is none ({type(error).__name__}: {error})"
+    except Exception as error:  # OSError, ValueError of an address, any error from bytes that are not dask's
+        reason = (
+            "does not answer"
+            if isinstance(error, OSError)
+            else f"must be a dask scheduler ({type(error).__name__}: {error})"
+        )
         allowed = "the address of a dask scheduler"
         raise ClusterError(one_line(reason), field="cluster", value=address, allowed=allowed) from None
     client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
     stack.callback(_closed, client)
     try:
         if not client.nthreads():
-            raise ClusterError("has no workers", field="cluster", value=address)
+            raise ClusterError("must have at least one worker", field="cluster", value=address)
         for place, there in client.run(versions, PACKAGES).items():
             check_versions(versions(PACKAGES), there, f"{address}, {place}")
     except ClusterError:
         raise
-    except Exception as error:  # what a scheduler answers that is no scheduler, or goes away now
+    except Exception as error:  # the answer of something else, or a scheduler that is lost now
         problem = f"cannot be used: {type(error).__name__}: {error}"
         raise ClusterError(one_line(problem), field="cluster", value=address) from error
     return client
 
 
 def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
-    """A client of worker processes on this machine, which die with it."""
+    """Client of worker processes on this machine, which end with it."""
     # Ctrl-C goes to all processes of the terminal; workers inherit from the thread that starts them, which is made
-    # here, that it is not for them. (Whoever starts Python's resource tracker is told to listen again.)
+    # here and blocks it. (Python's resource tracker unblocks it for the thread that starts the tracker.)
     if sys.platform != "win32":
         resource_tracker.ensure_running()
     others = multiprocessing.active_children()
@@ -294,9 +298,9 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
             n_workers=0,
             threads_per_worker=threads,
             host="127.0.0.1",
-            # Whoever reaches a scheduler runs code as its user: this one talks to those alone that have its keys.
+            # Access to a scheduler allows running code as its user: this one accepts only clients with its keys.
             security=distributed.Security.temporary(),
-            # Its server of figures on itself stays, without the dashboard, but on no port that others want.
+            # Its status server stays, without the dashboard, on a free port.
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             silence_logs=logging.CRITICAL,
             memory_limit=None,
@@ -313,19 +317,19 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
     try:
         client.wait_for_workers(workers, timeout=_START)
     except TimeoutError:
-        problem = "worker processes do not start; a script has to make its cluster under `if __name__ == '__main__':`"
+        problem = "worker processes do not start; a script must create its cluster under `if __name__ == '__main__':`"
         raise ClusterError(problem, field="cluster", value=workers) from None
     return client
 
 
 def _closed(client: Any) -> None:
-    with suppress(Exception):  # there may be nothing left to say goodbye to
+    with suppress(Exception):  # the cluster may already be gone
         client.close(timeout=_STOP)
 
 
 def _stopped(cluster: Any, others: Sequence[BaseProcess]) -> None:
-    """Stop workers, those too that walk or have just been started; left to itself dask waits for them. What ``others``
-    started goes on."""
+    """Stop workers, even those that walk or have just started, for which dask would wait. Processes that ``others``
+    started go on."""
 
     async def stop() -> None:
         nannies = list(cluster.workers.values())
@@ -337,6 +341,6 @@ def _stopped(cluster: Any, others: Sequence[BaseProcess]) -> None:
         child.kill()
     with suppress(Exception):
         cluster.close(timeout=_STOP)
-    # When Python ends dask would try again for ten seconds, and tell of processes whose end it has not noticed.
+    # At the end of Python dask would retry for ten seconds and report processes whose end it missed.
     cluster.shutdown_on_close = False
     logging.getLogger("distributed.process").setLevel(logging.CRITICAL + 1)

@@ -25,9 +25,9 @@ _described: ContextVar[dict[object, tuple[str, str]] | None] = ContextVar("descr
 
 
 def plain(value: object, field: str) -> Any:
-    """A number, text, None, enum, array, or a tuple or frozen dataclass of these, as JSON has it, different for
-    different values: of classes their path, of a dataclass the fields that count in comparisons. Raises ParameterError
-    for anything else, naming the field."""
+    """A number, text, None, enum, array, or a tuple or frozen dataclass of these, in the form of JSON, distinct for
+    distinct values: classes by their path, dataclasses by the fields that count in comparisons. Raises ParameterError
+    for anything else, with the field."""
     kind: Any = type(value)
     if isinstance(value, enum.Enum):
         return {"enum": path_of(kind), "name": value.name}
@@ -46,7 +46,7 @@ def plain(value: object, field: str) -> Any:
             "fields": {name: plain(getattr(value, name), f"{field}.{name}") for name in _counted(value)},
         }
     raise ParameterError(
-        "is no plain data, so nobody could tell trials apart",
+        "must be plain data, because its value names the trial",
         field=field,
         value=kind.__name__,
         allowed="numbers, text, None, enums, arrays, and tuples or frozen dataclasses of these",
@@ -54,26 +54,26 @@ def plain(value: object, field: str) -> Any:
 
 
 def code_of(value: object) -> tuple[str, str]:
-    """Digest of everything that the code of a controller can reach, as it is now, and what of that answers otherwise
-    every time; empty for our own. Raises UnknownKindError if it reaches what cannot be described."""
-    told: list[str] = []
+    """Digest of everything that the code of a controller can reach now, and the source of chance in it, if any; empty
+    for controllers of chilopod. Raises UnknownKindError for an object that cannot be described."""
+    parts: list[str] = []
     chances: list[str] = []
     for each in _parts(value):
         kind, beside = type(each), Reach()
         found, chance = _once(kind, kind.__module__, kind.__qualname__)
-        told.append(found)
+        parts.append(found)
         chances.append(chance)
         for name in sorted(getattr(each, "__dict__", {}).keys() - _declared(each)):
             beside.see(vars(each)[name], f"{kind.__qualname__}.{name}")
-            told += [name, beside.digest]
+            parts += [name, beside.digest]
         chances.append(beside.chance)
-    digest = hashlib.sha256(repr(told).encode()).hexdigest()[:_DIGITS] if any(told) else ""
+    digest = hashlib.sha256(repr(parts).encode()).hexdigest()[:_DIGITS] if any(parts) else ""
     return digest, next(filter(None, chances), "")
 
 
 def sources_of(engine: str) -> str:
-    """Digest of the module of an engine of one's own, and of all its own that it imports; empty for our own. Raises
-    UnknownKindError if a file cannot be read."""
+    """Digest of the module of a user's engine and of all user modules that it imports; empty for engines of chilopod.
+    Raises UnknownKindError if a file cannot be read."""
     module = engine.partition(":")[0] if ":" in engine else "chilopod"
     return _once(sys.modules[module], module, module)[0]
 
@@ -92,7 +92,7 @@ def _once(value: object, module: str, path: str) -> tuple[str, str]:
 
 @contextmanager
 def meanwhile_unchanged() -> Iterator[None]:
-    """While nobody edits classes, each is described once."""
+    """Describe each class only once within the block, in which classes must not change."""
     token = _described.set({})
     try:
         yield
@@ -101,17 +101,17 @@ def meanwhile_unchanged() -> Iterator[None]:
 
 
 def classes_in(value: object) -> Iterator[type]:
-    """All classes of one's own in what :func:`plain` takes."""
+    """All user classes in an argument of :func:`plain`."""
     return (type(each) for each in _parts(value))
 
 
 def is_ours(kind: type) -> bool:
-    """True if chilopod brings a class."""
+    """True if a class is part of chilopod."""
     return kind.__module__.partition(".")[0] == "chilopod"
 
 
 def is_findable(kind: type) -> bool:
-    """True if another process can find a class: what its module has by its name, not in a notebook or a script."""
+    """True if another process can import a class by its name, which excludes notebooks and scripts."""
     found: Any = sys.modules.get(kind.__module__)
     for part in kind.__qualname__.split("."):
         found = getattr(found, part, None)
@@ -120,18 +120,18 @@ def is_findable(kind: type) -> bool:
 
 @lru_cache(maxsize=4096)
 def file_text(robot: Robot) -> str:
-    """The robot file; of repeats it is written once."""
+    """Text of the robot file, cached for repeats."""
     return robot.to_toml()
 
 
 @lru_cache(maxsize=4096)
 def robot_text(robot: Robot) -> str:
-    """A robot file that says all that makes a walk: what it is called and where its numbers come from does not."""
+    """Text of a robot file with everything that determines a walk, without name and provenance."""
     return robot.with_(name="robot", provenance={}).to_toml()
 
 
 def _parts(value: object) -> Iterator[Any]:
-    """Enums and dataclasses in what :func:`plain` takes."""
+    """Enums and dataclasses in an argument of :func:`plain`."""
     if isinstance(value, enum.Enum):
         yield value
     elif isinstance(value, tuple):
@@ -144,7 +144,7 @@ def _parts(value: object) -> Iterator[Any]:
 
 
 def _declared(value: Any) -> set[str]:
-    """Attributes of an object that its class tells all about."""
+    """Attributes of an object that its class fully defines."""
     if isinstance(value, enum.Enum):
         return set(vars(value))
     declared = {each.name for each in dataclasses.fields(value)}

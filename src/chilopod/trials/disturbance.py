@@ -1,4 +1,4 @@
-"""Differences from trial to trial."""
+"""Disturbances of trials."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 Array = NDArray[np.float64]
 
 _SLICK = 1e-3
-"""Friction that a foot without grip has left."""
+"""Remaining friction of a foot without grip, as a factor."""
 
 _DEVIATIONS = ("joint_angle", "heading", "friction", "bearing")
 
@@ -26,9 +26,9 @@ class Disturbance:
     """Differences from trial to trial: standard deviations of independent normal deviates.
 
     None of it is printed in the paper. Of joints at 0.5, 1, 2 deg and feet at 2, 4, 8 % the middle is the smallest
-    spread with which the twin does what the robot did at k1 = 28 N*mm/deg: most walks curve, to both sides (5, 7 and 8
-    of 10 after 90 s). A heading of 1 deg is careful setting up by hand; the bearing's error is the scanner's step of
-    0.352 deg with an extended target.
+    spread with which the twin agrees with the robot at k1 = 28 N*mm/deg: most walks curve, to both sides (5, 7 and 8 of
+    10 after 90 s). A heading of 1 deg corresponds to careful positioning by hand, and the error of the bearing to the
+    scanner's step of 0.352 deg with an extended target.
 
     Attributes
     ----------
@@ -39,9 +39,9 @@ class Disturbance:
     bearing
         Deviation of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
     missed
-        Part of its looks at which the scanner misses the target, on a course.
+        Fraction of the looks at which the scanner misses the target, on a course.
     slick
-        A foot that has lost its grip, as good as a leg: module and side (left 0, right 1), counted from 0; None: none.
+        Foot without grip, which simulates a lost leg: module and side (left 0, right 1), counted from 0, or None.
     """
 
     joint_angle: float = float(np.deg2rad(1.0))
@@ -52,12 +52,12 @@ class Disturbance:
     slick: tuple[int, int] | None = None
 
     def scaled(self, factor: float) -> Disturbance:
-        """The same with all standard deviations so many times as large."""
+        """Disturbance with all standard deviations multiplied by a factor."""
         return replace(self, **{name: factor * getattr(self, name) for name in _DEVIATIONS})
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.missed <= 1.0:
-            raise ParameterError("is no part", field="missed", value=self.missed, allowed="0 to 1")
+            raise ParameterError("must be a fraction", field="missed", value=self.missed, allowed="0 to 1")
         for name in _DEVIATIONS:
             value = getattr(self, name)
             if not 0.0 <= value < 10.0:
@@ -70,7 +70,7 @@ NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Drawn:
-    """Draw of a disturbance by a seed, for one robot.
+    """Disturbance of one robot, drawn from a seed.
 
     Attributes
     ----------
@@ -93,8 +93,8 @@ class Drawn:
 def draw(
     disturbance: Disturbance, seed: int, modules: int, looks: int, joint_angles: Sequence[float] | None = None
 ) -> Drawn:
-    """Draw a disturbance for a robot of so many modules that looks at its target so often, each kind from its own
-    stream of numbers. The joint angles at the start are about ``joint_angles``, rad, by default straight."""
+    """Draw a disturbance for a number of modules and of looks at the target, each kind from its own stream of random
+    numbers. The joint angles at the start scatter about ``joint_angles``, rad, by default straight."""
     streams = np.random.SeedSequence(seed).spawn(6)
     joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])
     feet = np.exp(disturbance.friction * friction.standard_normal((modules, 2)))
@@ -113,7 +113,7 @@ def draw(
 
 
 def conditions(engine: Engine, robot: Robot, drawn: Sequence[Drawn], noisy: bool) -> dict[str, Any]:
-    """Arguments with which an engine starts walks as drawn, ``noisy`` with noise of its own sensors if it has any."""
+    """Arguments of an engine's ``start`` for drawn walks; a ``noisy`` engine also gets seeds of its sensor noise."""
     angles, headings = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
     return {
         "initial": engine.initial_states(robot, angles, headings),

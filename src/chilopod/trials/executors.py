@@ -1,4 +1,4 @@
-"""Where trials walk: what every executor does, the one of this machine, and which one is in use."""
+"""Executors, which run batches of trials: their interface, the one of this machine, and the one in use."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
 
 _SECONDS = 2.5  # of work in a batch, about
-_USUAL = 10.0  # s of a walk of which a core walks as many as an engine says, until it is known better
+_USUAL = 10.0  # s of a walk of which a core walks the engine's ``a_core``, until measured
 _LANES = 8  # robots that a core walks at once in the planar model
 
 
 class Executor(Protocol):
-    """Walks batches of trials, somewhere: the same trial has the same bits on every executor."""
+    """Executor of batches of trials; results are equal to the bit on every executor."""
 
     @property
     def words(self) -> str:
@@ -30,25 +30,26 @@ class Executor(Protocol):
         ...
 
     def cut(self, batches: Sequence[list[Trial]]) -> Iterable[list[Trial]]:
-        """The same batches in order, those that are too large in pieces; each is cut when it is taken."""
+        """Yield the same batches in order, large ones in pieces; each is cut when it is taken."""
         ...
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """The number of a batch and its records, of every batch as soon as it is done, in any order. A batch is taken
-        when its walk begins, not before: what nobody has begun, another process may. Who stops taking records stops the
-        walks."""
+        """Yield the number and the records of every batch as soon as it is done, in any order. A batch is taken when
+        its walk begins, so that other processes may take those not yet begun. The walks stop when the generator is
+        closed."""
         ...
 
 
 class Pace:
-    """How many trials are a few seconds' work, by how long the last ones took: what somebody is killed at is lost."""
+    """Estimate of the trials in a few seconds of work from the time of the last ones; a kill loses the current
+    batch."""
 
     def __init__(self) -> None:
         self._speeds: dict[str, float] = {}  # of engines: s of walks that a core does in a second
 
     def pieces(self, batch: Sequence[Trial], threads: int) -> Iterator[list[Trial]]:
-        """A batch in pieces for so many threads, each cut when it is taken: all lanes full, else at least all threads
-        busy."""
+        """Yield a batch in pieces for a number of threads, each cut when it is taken: all lanes full, or at least all
+        threads busy."""
         done = 0
         while done < len(batch):
             first = batch[done]
@@ -66,18 +67,18 @@ class Pace:
 
 
 class Here:
-    """This machine: one batch after the other, each on all cores."""
+    """Executor of this machine: one batch after the other, each on all cores."""
 
     words = ""
     _pace = Pace()  # of this process
 
     def cut(self, batches: Sequence[list[Trial]]) -> Iterator[list[Trial]]:
-        """The same batches, in pieces of a few seconds' work."""
+        """Yield the same batches in pieces of a few seconds of work."""
         for batch in batches:
             yield from self._pace.pieces(batch, cores())
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """One after the other."""
+        """Walk one batch after the other."""
         from chilopod.trials.batch import walked
 
         for index, batch in enumerate(batches):
@@ -97,8 +98,8 @@ def current() -> Executor:
 
 @contextmanager
 def using(executor: Executor) -> Iterator[None]:
-    """Let everything that runs trials in this block, studies and tasks included, run them there, in this thread and in
-    tasks of asyncio made in the block, not in threads started in it."""
+    """Use an executor for all trials within this block, studies and tasks included, in this thread and in tasks of
+    asyncio made in the block, but not in threads started in it."""
     token = _CURRENT.set(executor)
     try:
         yield

@@ -28,11 +28,11 @@ class Header:
 
 
 def content_of(record: xr.Dataset) -> bytes:
-    """A record as it stands in its file. Raises OutputError if it holds anything but floating-point numbers, integers
-    of 32 bits, truth values and text, or has a dimension of length 0."""
+    """Bytes of a record's file. Raises OutputError for types other than floating-point numbers, integers of 32 bits,
+    truth values and text, and for a dimension of length 0."""
     if not all(record.sizes.values()):
         sizes = {str(name): size for name, size in record.sizes.items()}
-        raise OutputError("has a dimension of length 0 and cannot be kept", field="record", value=sizes)
+        raise OutputError("must not have a dimension of length 0", field="record", value=sizes)
     buffer = io.BytesIO()
     # Directly, for xarray takes ten times as long as the walk of a short trial.
     file = netcdf_file(buffer, "w", version=2)
@@ -55,7 +55,7 @@ def content_of(record: xr.Dataset) -> bytes:
 
 
 def _as_stored(field: str, values: NDArray[Any]) -> tuple[NDArray[Any], dict[str, str]]:
-    """Values as the file has them, text with one more dimension, and what readers must know of them."""
+    """Values in the form of the file, text with one more dimension, and attributes that readers need."""
     kind = values.dtype.kind
     if kind == "f":
         return values, {}
@@ -65,24 +65,24 @@ def _as_stored(field: str, values: NDArray[Any]) -> tuple[NDArray[Any], dict[str
         encoded = np.char.encode(values.astype(str), "utf-8")
         encoded = encoded.astype(f"S{max(1, encoded.dtype.itemsize)}")
         return encoded[..., None].view("S1"), {"_Encoding": "utf-8"}
-    raise OutputError("cannot be kept in a file", field=field, value=str(values.dtype))
+    raise OutputError("must be of a type that netCDF can hold", field=field, value=str(values.dtype))
 
 
 def _describe(target: Any, field: str, attributes: Mapping[Any, Any]) -> None:
     for name, value in attributes.items():
         if not isinstance(value, str | bool | int | float | np.number):
-            raise OutputError("cannot be kept in a file", field=f"{field}.attrs[{name!r}]", value=value)
+            raise OutputError("must be of a type that netCDF can hold", field=f"{field}.attrs[{name!r}]", value=value)
         setattr(target, str(name), value.encode() if isinstance(value, str) else np.float64(value))
 
 
 def read_record(path: Path) -> xr.Dataset:
-    """A record as it was walked: of the same types, and with nothing about the file. Raises what
-    :func:`chilopod.netcdf.unsealed` does."""
+    """Read a record with its original types and without attributes of the file. Raises the errors of
+    :func:`chilopod.netcdf.unsealed`."""
     try:
         record = xr.load_dataset(io.BytesIO(unsealed(path)), engine="scipy").drop_encoding()
     except UnsoundError:
         raise
-    except _DAMAGES as error:  # whoever wrote it has set the seal himself
+    except _DAMAGES as error:  # the seal is valid but the content is foreign
         raise UnsoundError(f"cannot be read ({in_words(error)})") from None
     record.attrs = {name: value if isinstance(value, str) else float(value) for name, value in record.attrs.items()}
     # The file has integers of 32 bits only, and all text is read as objects.
@@ -93,14 +93,14 @@ def read_record(path: Path) -> xr.Dataset:
 
 
 def read_header(path: Path, *, whole: bool = False) -> Header:
-    """Header of a record's file, all of which is held against its seal if ``whole``, otherwise its length alone. Raises
-    what :func:`chilopod.netcdf.unsealed` does."""
+    """Read the header of a record's file and check the whole file against its seal if ``whole``, otherwise only its
+    length. Raises the errors of :func:`chilopod.netcdf.unsealed`."""
     if whole:
         unsealed(path)
     with sealed_file(path) as file:
         try:
             with netcdf_file(file, mmap=True) as front:
-                told = {name: value for name, value in vars(front).items() if isinstance(value, bytes)}
-                return Header({name: value.decode() for name, value in told.items()}, file.seek(0, io.SEEK_END))
+                attributes = {name: value for name, value in vars(front).items() if isinstance(value, bytes)}
+                return Header({name: value.decode() for name, value in attributes.items()}, file.seek(0, io.SEEK_END))
         except _DAMAGES:
             raise UnsoundError("is damaged or was edited") from None

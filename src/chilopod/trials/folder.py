@@ -1,4 +1,4 @@
-"""Contents of a folder of trials, by its names and the headers of its files; no robot is built and nothing walks."""
+"""Contents of a folder of trials, from its names and the headers of its files, without building robots or walking."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from chilopod.trials.trial import digest_of, versions_of
 _TRIAL = re.compile(r".+-[0-9a-f]{20}\.nc")
 _ASIDE = re.compile(_TRIAL.pattern + r"\.aside\d*")
 _UNFINISHED = ".chilopod-"
-_EVERY = 50  # files between two signs of life
+_EVERY = 50  # files between two reports of progress
 
-Wrong = list[tuple[Path, str]]  # what is wrong with each
+Wrong = list[tuple[Path, str]]  # fault of each
 
 
 class Contents(NamedTuple):
-    """The names in a folder: records of trials, files that stood in the place of a record, files that processes write
-    or could not finish before they were killed, and all else, which chilopod did not write."""
+    """Names in a folder: records of trials, files set aside, unfinished files of running or killed processes, and files
+    that chilopod did not write."""
 
     trials: tuple[Path, ...]
     aside: tuple[Path, ...]
@@ -40,9 +40,9 @@ class Contents(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """A trial that is kept, as its file's header says: path and size of the file (bytes), name of the robot, and
-    :attr:`chilopod.trials.Trial.text`. It is ``found`` if this version of chilopod and of the engine takes it for what
-    it would walk; of an engine of one's own its version is not looked at."""
+    """A kept trial from the header of its file: path and size of the file (bytes), name of the robot, and
+    :attr:`chilopod.trials.Trial.text`. It is ``found`` if this version of chilopod and of the engine would use the
+    file; the version of a user's engine is not checked."""
 
     path: Path
     size: int
@@ -52,7 +52,7 @@ class Kept(NamedTuple):
 
 
 def contents(folder: Path) -> Contents:
-    """The names in a folder, in order. Raises ParameterError if there is no such folder, or it cannot be read."""
+    """Return the names in a folder, in order. Raises ParameterError if the folder is missing or cannot be read."""
     trials, aside, unfinished, foreign = list[Path](), list[Path](), list[Path](), list[Path]()
     try:
         with os.scandir(folder) as entries:
@@ -66,25 +66,25 @@ def contents(folder: Path) -> Contents:
                     paths = unfinished
                 paths.append(folder / entry.name)
     except OSError as error:
-        raise ParameterError(f"is no folder of trials ({error.strerror})", field="folder", value=str(folder)) from None
+        raise ParameterError(f"must be a trial folder ({error.strerror})", field="folder", value=str(folder)) from None
     return Contents(*(tuple(sorted(each)) for each in (trials, aside, unfinished, foreign)))
 
 
 def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
-    """Headers of the files that can be read, and what is wrong with the others."""
+    """Return the headers of readable files, and the faults of the others."""
     return _looked_at(paths, read_header, progress)
 
 
 def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
-    """The same of files that are whole to the last byte, and have the name that their trial has."""
+    """Return the same for files that are complete to the last byte and named after their trial."""
     return _looked_at(paths, partial(read_header, whole=True), progress)
 
 
 def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], Wrong]:
-    """Remove what is no trial's record and was written by chilopod: what was set aside, or left over by who was killed.
+    """Remove files of chilopod that are not records: files set aside, and unfinished files of killed processes.
 
-    With ``old`` the records of other versions go too; with ``dry`` nothing goes. Returns what was (or would be)
-    removed, and what is left for a reason. Raises OutputError if a file cannot be removed.
+    ``old`` also removes the records of other versions; ``dry`` removes nothing. Returns the files that were (or would
+    be) removed, and the files kept with the reason. Raises OutputError if a file cannot be removed.
     """
     found = contents(folder)
     remove = list(found.aside)
@@ -105,9 +105,9 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
 
 @dataclass(frozen=True)
 class Group:
-    """Trials of robots of one name that differ in nothing but the robots' numbers, their seeds, and where the targets
-    of a course are: what they share, number of robots, seeds of those that are disturbed, number of trials, and size of
-    all files, bytes. The target is bearing, rad, and distance, m, or how many a course has."""
+    """Trials of robots of one name that differ only in the robots' numbers, their seeds, and the targets of a course:
+    shared settings, number of robots, seeds of disturbed trials, number of trials, and size of all files, bytes. The
+    target is bearing, rad, and distance, m, or the number of targets of a course."""
 
     robot: str
     engine: str
@@ -122,10 +122,10 @@ class Group:
 
 
 def groups(trials: Sequence[Kept]) -> list[Group]:
-    """Trials in groups, in order of their names."""
+    """Group trials, in order of their names."""
     alike: dict[tuple[Any, ...], list[Kept]] = {}
     for each in trials:
-        # Other versions may tell less, or otherwise.
+        # Other versions may have other fields.
         controller, target = each.told.get("controller"), each.told.get("target")
         name = str(controller.get("class", "")).partition(" ")[0] if isinstance(controller, dict) else None
         if isinstance(target, dict):
@@ -150,7 +150,7 @@ def _looked_at(
     for index, path in enumerate(paths):
         if index % _EVERY == 0:
             progress(index / len(paths), f"{index} of {len(paths)} trials")
-        with suppress(FileNotFoundError):  # somebody was faster
+        with suppress(FileNotFoundError):  # another process was faster
             try:
                 found.append(_kept(path, header_of(path)))
             except UnsoundError as error:
@@ -165,7 +165,7 @@ def _kept(path: Path, header: Header) -> Kept:
     digest = digest_of(text)
     if not path.stem.endswith(f"-{digest}"):
         raise UnsoundError(
-            f"holds another trial, whose name ends in {digest}.nc" if text else "is no record of a trial"
+            f"holds another trial, whose name ends in {digest}.nc" if text else "is not the record of a trial"
         )
     try:
         told = json.loads(text)

@@ -1,6 +1,6 @@
 """Work of a worker of a cluster: one batch at a time, bytes in, bytes out.
 
-Nothing here imports more than it must before it is called: the scheduler, which walks nothing, reads this file too.
+Imports are as few as possible before a call, because the scheduler also loads this file.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
 
 PACKAGES = ("chilopod", "numpy", "numba")
-"""Packages that have to be the same on all machines."""
+"""Packages whose versions must be equal on all machines."""
 
 TWIN_PACKAGE = "mujoco-core"
-"""Package that has to be where there are trials of the twin."""
+"""Package that trials of the twin need."""
 
 _SOURCES = "source code of chilopod"
 _DIGITS = 12  # of a digest, in an error
@@ -36,7 +36,7 @@ _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, str]:
-    """Versions of what makes a record what it is, in this process."""
+    """Versions, in this process, of the software that determines a record."""
     found = {"python": "{}.{}".format(*sys.version_info), _SOURCES: digest()[:_DIGITS]}
     for package in packages:
         if package not in found:
@@ -48,7 +48,7 @@ def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, s
 
 
 def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place: str) -> None:
-    """Raise a ClusterError that says which version is another on a worker, if one is."""
+    """Raise a ClusterError for the first version that differs on a worker."""
     for name, wanted in expected.items():
         there = found.get(name, "none")
         if there != wanted:
@@ -56,22 +56,22 @@ def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place:
 
 
 def packed(batch: Sequence[Trial]) -> bytes:
-    """A batch as it travels to a worker: what it needs there, and its trials. Raises ParameterError if another process
-    could not find, or tell apart, what steers them."""
+    """Pack a batch for a worker: its requirements and its trials. Raises ParameterError if another process could not
+    import or identify the controller."""
     for trial in batch:
         if trial.code[1]:
-            raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="to walk them on this machine")
+            raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="trials run on this machine")
     packages = (*PACKAGES, TWIN_PACKAGE) if batch[0].engine == "twin" else PACKAGES
     try:
         trials = pickle.dumps(list(batch), pickle.HIGHEST_PROTOCOL)
-    except Exception as error:  # whatever a class of one's own does
+    except Exception as error:  # a user class may raise anything
         raise _not_importable(batch[0].controller, error) from error
     return pickle.dumps((versions(packages), [trial.text for trial in batch], trials), pickle.HIGHEST_PROTOCOL)
 
 
 def walked_there(job: bytes, place: str) -> bytes:
-    """Walk a batch on the worker that this is called on; what goes back is for :func:`unpacked`, a fault too: dask
-    would write its traceback on the terminal."""
+    """Walk a batch on this worker and pack its result, or its error, for :func:`unpacked`; dask would write a traceback
+    on the terminal."""
     try:
         with _ONE_AT_A_TIME:  # the batch has all threads of this worker
             answer = pickle.dumps(_walked(job, place), pickle.HIGHEST_PROTOCOL)
@@ -80,13 +80,13 @@ def walked_there(job: bytes, place: str) -> bytes:
         try:
             answer = pickle.dumps(error, pickle.HIGHEST_PROTOCOL)
             pickle.loads(answer)
-        except Exception:  # an exception of somebody else's that does not travel
+        except Exception:  # a foreign exception that cannot be pickled
             answer = pickle.dumps(ClusterError(one_line(f"{type(error).__name__}: {error}")))
     return answer
 
 
 def unpacked(answer: bytes) -> Any:
-    """The records that a worker sent, and how long it walked, s; or what went wrong there."""
+    """Return the records that a worker sent and their computing time, s, or raise the worker's error."""
     found = pickle.loads(answer)
     if isinstance(found, Exception):
         raise found
@@ -94,14 +94,14 @@ def unpacked(answer: bytes) -> Any:
 
 
 def dask_setup(worker: object) -> None:
-    """Called in every worker process that a client starts on its own machine: it dies with its client, not by Ctrl-C.
-    (Dask sees to that too, but only between two batches: compiled code holds the lock.)"""
+    """Set up a worker process on the client's machine, called by dask: it ends with its client and ignores Ctrl-C.
+    (Dask ends it too, but only between two batches, because compiled code holds the lock.)"""
     import ctypes
     import signal
 
-    with suppress(ValueError):  # only the main thread may say so
+    with suppress(ValueError):  # only the main thread may set it
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    sys.stdout = sys.stderr  # what a controller prints there is no result
+    sys.stdout = sys.stderr  # output that a controller prints there is dropped
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -111,7 +111,7 @@ def _walked(job: bytes, place: str) -> Any:
     check_versions(expected, versions(tuple(expected)), place)
     try:
         trials = pickle.loads(packed_trials)
-    except Exception as error:  # whatever somebody else's module does when it is imported
+    except Exception as error:  # importing a foreign module may raise anything
         raise _not_importable(None, error) from error
     from chilopod.trials.description import meanwhile_unchanged
 
@@ -120,7 +120,7 @@ def _walked(job: bytes, place: str) -> Any:
     for trial, there, text in zip(trials, here, texts, strict=True):
         if there != text:
             own = f"engine {trial.engine}" if trial.controller is None else path_of(type(trial.controller))
-            problem = f"the code of {own}, or of what it imports, is another on a worker than here"
+            problem = f"the code of {own}, or of what it imports, differs between a worker and this machine"
             raise ClusterError(problem, field="cluster", value=place)
     import numba
     from distributed import get_worker

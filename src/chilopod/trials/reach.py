@@ -1,10 +1,9 @@
-"""Everything that the code of a class can reach, as a digest: another one when any of it changes.
+"""Digest of everything that the code of a class can reach, which changes with any part of it.
 
-A walk over objects, from a class through its bases, attributes, functions, closures, default values and the globals
-that functions name. Code of others (Python, installed packages, chilopod) is described by name and version, code of
-one's own down to its instructions and constants. What is looked up by names made while the code runs cannot be seen
-so: therefore every module of one's own counts as a whole too, with all modules of one's own that it imports. What is
-none of the kinds in the table below is refused.
+The search goes over objects, from a class through its bases, attributes, functions, closures, default values and the
+globals that functions name. Installed code (Python, packages, chilopod) is described by name and version, user code
+down to its instructions and constants. Names made at run time escape this search: therefore every user module also
+counts as a whole, with all user modules that it imports. Objects of kinds outside the table below are refused.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ from chilopod.trials.chance import by_chance, chance_in
 Parts = Iterator[tuple[str, object]]
 
 _ATOMS = (type(None), bool, int, float, complex, str, bytes, bytearray, range, slice, type(...), type(NotImplemented))
-# May be one object or several with equal contents, as it happens to be compiled.
+# The compiler may make one object or several with equal contents.
 _VALUES = (tuple, frozenset, CodeType)
 _GIVEN = frozenset(
     f"__{name}__"
@@ -68,13 +67,13 @@ _FIELD = ("name", "default", "default_factory", "init", "compare", "kw_only", "m
 
 
 class UnknownKindError(Exception):
-    """Something cannot be described; says in words which, and where it was reached."""
+    """An object cannot be described; the message names it and the path to it."""
 
 
 class Reach:
-    """A digest of everything that can be reached from the objects that it is shown, in order; ``own`` is a top-level
-    package that is one's own even where it is installed. ``chance`` is the first thing seen that answers otherwise
-    every time, see :mod:`chilopod.trials.chance`; empty if nothing."""
+    """Digest of everything that can be reached from the objects passed to :meth:`see`, in order; ``own`` is a top-level
+    package that counts as user code even if installed. ``chance`` is the first source of chance found, see
+    :mod:`chilopod.trials.chance`; empty if there is none."""
 
     def __init__(self, own: str = "") -> None:
         self._own, self.chance = own, ""
@@ -84,16 +83,16 @@ class Reach:
 
     @property
     def digest(self) -> str:
-        """Digest of all that was seen so far."""
+        """Digest of all objects so far."""
         return self._hash.hexdigest()[:16]
 
     def see(self, value: object, path: str) -> None:
-        """Add an object, reached as ``path`` says, and all that can be reached from it, or raise UnknownKindError."""
+        """Add an object, reached by ``path``, and everything that can be reached from it, or raise UnknownKindError."""
         try:
             self._see(value, path)
         except UnknownKindError:
             raise
-        except Exception as error:  # whatever somebody else's objects do when they are looked at
+        except Exception as error:  # foreign objects may raise anything on access
             raise UnknownKindError(f"{path}: {in_words(error)}") from None
 
     def _see(self, value: Any, path: str) -> None:
@@ -128,7 +127,7 @@ class Reach:
         self._hash.update(repr(words).encode())
 
     def _parts(self, value: Any, kind: type, path: str) -> Parts:
-        """Parts of an object, each with what leads there."""
+        """Parts of an object, each with its path."""
         if kind is FunctionType:
             return self._function(value, path)
         if isinstance(value, ModuleType):
@@ -144,7 +143,7 @@ class Reach:
         return _KINDS[kind](value) if kind in _KINDS else self._instance(value, kind, path)
 
     def _instance(self, value: Any, kind: type, path: str) -> Parts:
-        """State that pickle would keep, of classes that hide nothing from it."""
+        """State that pickle would keep, for classes with a complete pickle."""
         own = [vars(each) for each in kind.__mro__ if self._is_own(each.__module__)]
         hiding = [each[how] for each in own for how in each.keys() & _HIDING]
         hides = any(self._is_own(getattr(each, "__globals__", {}).get("__name__", "")) for each in hiding)
@@ -161,7 +160,7 @@ class Reach:
 
     def _function(self, function: FunctionType, path: str) -> Parts:
         if function.__globals__.get("__name__") == "functools" and hasattr(function, "registry"):
-            yield ".registry", function.registry  # of singledispatch, without what it remembers
+            yield ".registry", function.registry  # of singledispatch, without its cache
             return
         yield from _attributes("__code__", "__defaults__", "__kwdefaults__", "__closure__", "__dict__")(function)
         space = function.__globals__
@@ -177,7 +176,7 @@ class Reach:
                 yield ".__module__", home
 
     def _reached(self, names: set[str], space: Mapping[str, object], prefix: str, inside: set[int]) -> Parts:
-        """Whatever these names may lead to, in modules of one's own also theirs."""
+        """Objects that the names may refer to, for user modules also their attributes."""
         for name in sorted(names & space.keys()):
             value = space[name]
             if isinstance(value, ModuleType) or not by_chance(value):  # a mere name may stand for an attribute
@@ -186,7 +185,7 @@ class Reach:
                 yield from self._reached(names, vars(value), f"{prefix}{name}.", inside | {id(value)})
 
     def _module(self, module: ModuleType, path: str) -> Parts:
-        """The text of a module of one's own, and of all those that it imports."""
+        """Text of a user module, and of all user modules that it imports."""
         file = getattr(module, "__file__", None)
         if file is None and hasattr(module, "__path__"):
             return
@@ -221,7 +220,7 @@ class Reach:
     def _imported(
         self, code: CodeType, space: Mapping[str, Any], path: str, nested: bool = True
     ) -> dict[str, ModuleType | None]:
-        """Modules that code imports when it runs, imported now; None where there is none."""
+        """Modules that code imports when it runs, imported now; None for a missing module."""
         found: dict[str, ModuleType | None] = {}
         if nested:
             names = {*code.co_names}
@@ -244,7 +243,7 @@ class Reach:
         return found
 
     def _named(self, value: Any) -> str:
-        """Name and version of what a package of others has under its own name; empty for all else."""
+        """Name and version of an object that an installed package exports under its own name; empty otherwise."""
         module: Any
         name: Any
         if isinstance(value, ModuleType):
@@ -253,7 +252,7 @@ class Reach:
             module, name = "numpy" if hasattr(np, value.__name__) else "scipy.special", value.__name__
         elif callable(value) and not self._is_own(type(value).__module__):
             name = getattr(value, "__qualname__", None)
-            # What wraps another has that one's module.
+            # A wrapper has the module of the wrapped function.
             module = getattr(value, "__globals__", {}).get("__name__", getattr(value, "__module__", None))
         else:
             return ""
@@ -297,7 +296,7 @@ _KINDS: dict[type, Callable[[Any], Parts]] = {
     staticmethod: _attributes("__func__"),
     np.vectorize: _attributes("pyfunc", "otypes", "excluded", "signature"),
     functools.cached_property: _attributes("func"),
-    functools.singledispatchmethod: _attributes("dispatcher", "func"),  # without what it remembers
+    functools.singledispatchmethod: _attributes("dispatcher", "func"),  # without its cache
     type(lru_cache(lambda: 0)): _attributes("__wrapped__"),
     MemberDescriptorType: _SLOT,
     GetSetDescriptorType: _SLOT,
@@ -315,7 +314,7 @@ def _content(cell: CellType) -> object:
 
 
 def _named_in(code: CodeType) -> set[str]:
-    """Names that code looks up, and text in it that may be one."""
+    """Names that code looks up, and texts in it that may be names."""
     names = {*code.co_names, *(each for each in code.co_consts if isinstance(each, str) and each.isidentifier())}
     return names.union(*(_named_in(each) for each in code.co_consts if isinstance(each, CodeType)))
 
@@ -323,13 +322,13 @@ def _named_in(code: CodeType) -> set[str]:
 def _module_named(name: str, space: Mapping[str, Any]) -> ModuleType | None:
     try:
         return import_module(name, space.get("__package__"))
-    except Exception:  # whatever somebody else's module does
+    except Exception:  # a foreign module may raise anything
         return None
 
 
 @lru_cache(maxsize=256)
 def _compiled(content: bytes) -> CodeType | None:
-    """Code of a text; None if it is no Python."""
+    """Code object of a text; None if the text is not valid Python."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -339,7 +338,7 @@ def _compiled(content: bytes) -> CodeType | None:
 
 
 def _brought_by(module: str) -> str:
-    """Name and version of the package that a module of others is in; empty for one's own."""
+    """Name and version of the package of an installed module; empty for user modules."""
     top = module.partition(".")[0]
     if top in ("chilopod", "__main__"):
         return top if top == "chilopod" else ""

@@ -1,4 +1,4 @@
-"""Running trials batch by batch, alone or with other processes that keep theirs in the same folder."""
+"""Runs of trials, batch by batch, alone or with other processes that use the same folder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _Walked = list[tuple[Trial, xr.Dataset]]
 
 _COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
 _LOOK = 0.2  # s between two looks whether other processes are done
-_PATIENCE = 120.0  # s in which they have to be done with one trial; one that is stopped never is
+_PATIENCE = 120.0  # s in which another process must finish a trial; a stopped process never does
 
 
 def run(
@@ -32,19 +32,19 @@ def run(
     progress: Progress = silent,
     executor: Executor | None = None,
 ) -> list[xr.Dataset]:
-    """Run trials, or read what has been run before.
+    """Run trials, or read the records of previous runs.
 
     Parameters
     ----------
     trials
-        In any order; the same trial may occur twice. All their records have to fit into memory, see :func:`run_each`.
+        Trials in any order, with repetitions allowed. All their records must fit into memory, see :func:`run_each`.
     folder
-        Folder of the records, see :class:`chilopod.trials.Store`; without one nothing is kept. Several processes that
-        are given the same one share the work: each walks what no other has begun, and waits for the others' at the end.
+        Folder of the records, see :class:`chilopod.trials.Store`; None keeps nothing. Several processes with the same
+        folder share the work: each walks trials that no other has begun, and waits for the others at the end.
     progress
-        Called with the part done (0 to 1) and a few words.
+        Function of the fraction done (0 to 1) and a few words.
     executor
-        Executor that walks the batches; by default what :func:`using` says, and without that all cores of this machine.
+        Executor that walks the batches; by default that of :func:`using`, else all cores of this machine.
 
     Returns
     -------
@@ -72,20 +72,20 @@ def run_each(
     progress: Progress = silent,
     executor: Executor | None = None,
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
-    """Run trials, or read what has been run before, as :func:`run` does, and give each different one and its record as
-    soon as it is there, in any order: memory holds a batch at a time."""
+    """Run or read trials as :func:`run` does, and yield each distinct trial and its record as soon as it is ready, in
+    any order; memory holds a batch at a time."""
     yield from _each(as_now(trials), folder, progress, executor)
 
 
 def _each(
     trials: Sequence[Trial], folder: str | Path | None, progress: Progress, executor: Executor | None
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
-    asked = {trial.file_name: trial for trial in trials}
+    distinct = {trial.file_name: trial for trial in trials}
     store = None if folder is None else Store(folder)
-    kept = {name: trial for name, trial in asked.items() if store and store.has(trial)}
-    study = _Study(store, current() if executor is None else executor, progress, len(asked), len(kept))
-    # What is missing comes first: a study that is killed again and again gets on however much is there to be read.
-    yield from study.walk([trial for name, trial in asked.items() if name not in kept])
+    kept = {name: trial for name, trial in distinct.items() if store and store.has(trial)}
+    study = _Study(store, current() if executor is None else executor, progress, len(distinct), len(kept))
+    # Missing trials come first, so that a study that is killed repeatedly progresses however much there is to read.
+    yield from study.walk([trial for name, trial in distinct.items() if name not in kept])
     damaged = []
     for trial in kept.values():
         found = store.read(trial) if store else None
@@ -96,15 +96,15 @@ def _each(
     if damaged:
         study.done -= len(damaged)
         yield from study.walk(damaged)
-    progress(1.0, f"{len(asked)} trials")
+    progress(1.0, f"{len(distinct)} trials")
 
 
 def as_now(trials: Sequence[Trial]) -> list[Trial]:
-    """The same trials, with the code and the fields of their controllers as they are now."""
+    """Trials with the present code and fields of their controllers."""
     found = [trial.as_now() for trial in trials]
     with meanwhile_unchanged():
         for trial in found:
-            trial.file_name  # noqa: B018  (from here on it is known what each is)
+            trial.file_name  # noqa: B018  (fixes the identity of each trial)
     return found
 
 
@@ -115,14 +115,14 @@ def together(records: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 class _Study:
-    """So many trials in all, some of which are done already."""
+    """Progress of a study: number of trials in all and done."""
 
     def __init__(self, store: Store | None, executor: Executor, progress: Progress, total: int, done: int) -> None:
         self._store, self._executor, self._progress = store, executor, progress
         self._total, self.done = total, done
 
     def walk(self, missing: Sequence[Trial]) -> Iterator[tuple[Trial, xr.Dataset]]:
-        """Trials with their records, walked here or by others that keep theirs in the same folder."""
+        """Yield trials with their records, walked here or by other processes in the same folder."""
         if self._store:
             check_room(self._store.folder, sum(trial.least_bytes for trial in missing))
         share = batches(missing)
@@ -142,7 +142,7 @@ class _Study:
             brought, elsewhere = list[Trial](), list[Trial]()  # by other processes meanwhile; still with them
 
             def free(batch: list[Trial]) -> list[Trial]:
-                """Those of a batch that are to be walked here; they are claimed."""
+                """Trials of a batch that this process walks, claimed for it."""
                 mine = []
                 for trial in batch:
                     if not claims.take(trial.file_name) and patient:
@@ -178,7 +178,7 @@ class _Study:
                     time.sleep(_LOOK)
 
     def _given(self, walked: _Walked, elsewhere: int = 0) -> Iterator[tuple[Trial, xr.Dataset]]:
-        """Trials with their records, which count as done once they have been taken."""
+        """Yield trials with their records, which count as done once they have been taken."""
         yield from walked
         self.done += len(walked)
         words = f"{self.done} of {self._total} trials{self._executor.words}"
@@ -188,7 +188,7 @@ class _Study:
     def _walked(
         self, share: Iterable[list[Trial]], free: Callable[[list[Trial]], list[Trial]] = list
     ) -> Iterator[_Walked]:
-        """Batches of trials with their records; ``free`` says which of a batch are to be walked when it is begun."""
+        """Yield batches of trials with their records; ``free`` selects the trials of a batch to walk when it begins."""
         begun: list[list[Trial]] = []
 
         def taken() -> Iterator[list[Trial]]:
@@ -202,6 +202,6 @@ class _Study:
             walked = list(zip(begun[index], records, strict=True))
             for trial, record in walked:
                 if record.attrs.get("trial") != trial.text:
-                    problem = "gave the record of another trial, or one that other code walked"
+                    problem = "must return the record of this trial, computed by this code"
                     raise AnalysisError(problem, field=type(self._executor).__name__)
             yield walked

@@ -1,4 +1,4 @@
-"""A folder of records: what is in it is what it says, or it is not there."""
+"""Folder of records whose files are verified or treated as missing."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _logger = logging.getLogger(__name__)
 
 
 class Store:
-    """A folder that keeps the records of trials, each in a netCDF-3 file of its own.
+    """Folder that keeps the records of trials, each in a netCDF-3 file.
 
-    Every file is there whole or not at all, has a name derived from all that makes its trial, holds that as text, and a
-    checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, and whoever
-    walks the same trial writes the same file. The folder is made with the first record where there is none. ``tell`` is
-    given a line about every file that is not what it should be; by default it is the logger of this module.
+    Every file is complete or absent, has a name derived from everything that defines its trial, holds that as text, and
+    has a checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, and
+    equal trials give equal files. A missing folder is created with the first record. ``tell`` receives a line about
+    every faulty file; by default it is the logger of this module.
 
     Raises OutputError if files cannot be written into the folder.
     """
@@ -40,14 +40,14 @@ class Store:
         self._tell, self._said = tell, set[str]()
 
     def has(self, trial: Trial) -> bool:
-        """True if there is something that has the name of a trial's record."""
+        """True if the folder has a file with the name of a trial's record."""
         return os.path.lexists(self.folder / trial.file_name)
 
     def read(self, trial: Trial) -> xr.Dataset | None:
-        """The record of a trial; None if there is none.
+        """Return the record of a trial, or None if it is missing.
 
-        A file that is damaged, was edited, or holds another trial counts as none and gets the ending ``.aside``. Raises
-        OutputError if it cannot be moved, or memory to read it is missing.
+        A file that is damaged, was edited, or holds another trial counts as missing and gets the ending ``.aside``.
+        Raises OutputError if it cannot be moved, or memory to read it is missing.
         """
         path = self.folder / trial.file_name
         try:
@@ -62,10 +62,10 @@ class Store:
             return None
 
     def write(self, trial: Trial, record: xr.Dataset) -> None:
-        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept. Raises
-        OutputError if it is another trial's record, or the file cannot be written."""
+        """Keep a record, durably once :meth:`sync` has been called, unless it is marked as not to be kept. Raises
+        OutputError for another trial's record, or if the file cannot be written."""
         if record.attrs.get("trial") != trial.text:
-            problem = "is that of another trial, or was walked by other code"
+            problem = "must belong to this trial and to this code"
             raise OutputError(problem, field="record", allowed=f"a record for {trial.file_name}")
         if NOT_KEPT in record.attrs:
             words = trial.not_kept(record.attrs.pop(NOT_KEPT))
@@ -73,18 +73,18 @@ class Store:
                 self._tell(words)
             self._said.add(words)
             return
-        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come: it is made again.
+        # A folder that is deleted while trials walk is created again; only its old content is lost.
         write_atomic(self.folder / trial.file_name, content_of(record), durable=True, temporary=_UNFINISHED)
 
     @contextmanager
     def claims(self) -> Iterator[Claims]:
-        """For what this process walks and keeps here: others walk other trials. The folder is made."""
+        """Return the claims of this process in the folder, which is created; other processes walk other trials."""
         with made_folder(self.folder), Claims(self.folder, self._sweep) as claims:
             yield claims
 
     def sync(self) -> None:
-        """Make sure that what has been written is there even after a power failure."""
-        with suppress(FileNotFoundError):  # somebody deleted it
+        """Make all written records survive a power failure."""
+        with suppress(FileNotFoundError):  # it was deleted
             sync_folder(self.folder)
 
     def _move_aside(self, path: Path, why: str) -> None:
@@ -98,9 +98,9 @@ class Store:
             return  # another process was faster
         except OSError as error:
             raise OutputError(f"{why}, and cannot be moved aside ({error.strerror})", source=str(path)) from None
-        self._tell(f"{path} {why}: walked again, what was there is {aside.name}")
+        self._tell(f"{path} {why}: walked again; the old file is now {aside.name}")
 
     def _sweep(self) -> None:
-        """Remove what somebody who was killed did not finish."""
+        """Remove unfinished files of killed processes."""
         for path in self.folder.glob(f"{_UNFINISHED}*"):
             path.unlink()

@@ -1,4 +1,4 @@
-"""Summary of a walk: its mean shape at the end, how tightly it turned, and where the robot got to."""
+"""Summary of a walk: mean shape at the end, radius of its curve, and final position."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from chilopod.record import Array
 from chilopod.robot import Robot
 
 AVERAGED = 5.0
-"""s at the end of a walk over which the paper averages joint angles."""
+"""Time at the end of a walk over which the paper averages joint angles, s."""
 
 
 @dataclass(frozen=True)
 class WalkSummary:
-    """The end of one walk.
+    """Summary of the end of one walk.
 
     Attributes
     ----------
     status
-        A label of :class:`chilopod.engine.Status`.
+        Label of :class:`chilopod.engine.Status`.
     joint_angles, axis_radius
-        Means over the last :data:`AVERAGED` s, rad, shape (N-1,), NaN if the walk failed; and radius by these, see
-        :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
+        Means over the last :data:`AVERAGED` s, rad, shape (N-1,), NaN if the walk failed; and radius from these angles,
+        see :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
     x, y
-        Place of the centre of module 1 at the end, m.
+        Position of the centre of module 1 at the end, m.
     """
 
     status: str
@@ -45,7 +45,7 @@ class WalkSummary:
 
     @property
     def sentence(self) -> str:
-        """The status in words."""
+        """Status in words."""
         return next(each.sentence for each in Status if each.label == self.status)
 
     @property
@@ -54,7 +54,7 @@ class WalkSummary:
         return [float(angle) for angle in np.rad2deg(self.joint_angles)]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain numbers; null for what a failed walk does not have, and for an infinite radius."""
+        """Plain numbers; null for missing values of a failed walk, and for an infinite radius."""
         return {
             "status": self.status,
             "x_m": finite(self.x),
@@ -65,13 +65,13 @@ class WalkSummary:
 
 
 def finite(value: float | None) -> float | None:
-    """A number for JSON; None for what is not finite."""
+    """Number for JSON; None if it is not finite."""
     return float(value) if value is not None and np.isfinite(value) else None
 
 
 def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: float = 0.0) -> xr.DataArray:
-    """Joint angles averaged over some seconds that end so long ``before`` the end of a record (s), rad, over (robot,
-    joint). The first moment does not count, so that whole cycles have equal weights: 5 s at 10 Hz are 50 samples."""
+    """Joint angles averaged over some seconds that end ``before`` s before the end of a record, rad, over (robot,
+    joint). The first sample does not count, so that whole cycles have equal weights: 5 s at 10 Hz are 50 samples."""
     times = record.time.values
     last = times[-1] - before + 1e-9  # samples are at round times, up to round-off
     first, end = np.searchsorted(times, [last - seconds, last])
@@ -79,13 +79,13 @@ def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: flo
 
 
 def straight(record: xr.Dataset) -> bool:
-    """True if no joint bends ever, to the last bit: nothing told left from right, and a straight walk stays straight
-    even where it is unstable."""
+    """True if no joint ever bends, to the last bit: without a difference between left and right a straight walk stays
+    straight even where it is unstable."""
     return not record.joint_angle.values.any()
 
 
 def summaries(robot: Robot, record: xr.Dataset) -> Sequence[WalkSummary]:
-    """The end of every walk of a record."""
+    """Summary of every walk of a record."""
     angles = mean_joint_angles(record).transpose("robot", "joint").values
     radii = robot.axis_radius(angles)
     ends = record.position.isel(time=-1).transpose("robot", "axis").values

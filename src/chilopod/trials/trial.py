@@ -1,4 +1,4 @@
-"""One walk with its conditions: all that makes it, its disturbances drawn from a seed, and the name of its file."""
+"""One walk with its conditions, its disturbances drawn from a seed, and the name of its file."""
 
 from __future__ import annotations
 
@@ -24,49 +24,49 @@ from chilopod.trials.disturbance import NONE, Disturbance
 from chilopod.trials.reach import UnknownKindError
 
 _DIGITS = 16
-_MOST_BENT = 1.5  # rad; at a right angle modules run into each other
+_MOST_BENT = 1.5  # rad; at a right angle modules collide
 _FLAG = bool | np.bool_, "True or False"
 _KINDS = {
     "robot": (Robot, "a chilopod.Robot"),
-    "engine": (str, "its name"),
+    "engine": (str, "the name of an engine"),
     "target": (Target | Course | None, "a chilopod.steering.Target or Course, or None"),
     "disturbance": (Disturbance, "a chilopod.trials.Disturbance"),
     **dict.fromkeys(("forces", "poses", "brief"), _FLAG),
 }
 _ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks")
-"""Subpackages that no walk is made with: who edits these finds trials that were kept before."""
+"""Subpackages that do not affect walks: editing them keeps earlier trials valid."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Everything that makes a walk.
+    """Everything that defines a walk.
 
     Attributes
     ----------
     robot, duration
-        Robot with the springs of this trial; s.
+        Robot with the springs of this trial, and duration of the walk, s.
     seed, disturbance
         Seed and size of the differences from trial to trial.
     joint_angles
-        Joint angles at the start, before disturbance, rad: one a joint, front to rear, one for all, or none for
-        straight.
+        Joint angles at the start, before disturbance, rad: one for each joint, front to rear, one for all, or none for
+        a straight robot.
     target
         Target of the robot, if any: one target, or a course of them, which ends the walk.
     controller
-        Controller, if any: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
-        fields, and everything that the code of its class can reach, are part of what the trial is.
+        Controller, if any: a frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its fields, and
+        everything that the code of its class can reach, are part of the trial.
     rate, forces, poses
         See :class:`chilopod.record.Recording`.
     engine
-        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+        Name of an engine, one of :data:`chilopod.engine.ENGINES` or ``package.module:object``.
     brief
         True to keep only the outcomes of a course's targets, not its motion over time.
 
     Raises
     ------
     ParameterError
-        If something is out of range, there is no such engine, it does not know such a robot, or the controller cannot
-        be told from others.
+        If a value is out of range, the engine is unknown or cannot walk the robot, or the controller cannot be
+        identified by its code and fields.
     """
 
     robot: Robot
@@ -85,7 +85,7 @@ class Trial:
     def __post_init__(self) -> None:
         for name, (kind, allowed) in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise ParameterError("is none", field=name, value=getattr(self, name), allowed=allowed)
+                raise ParameterError("has the wrong type", field=name, value=getattr(self, name), allowed=allowed)
         seeds = as_seeds([self.seed], "seed")
         # Equal trials have one text, whatever kinds of numbers they were given.
         plain_values = {
@@ -100,36 +100,41 @@ class Trial:
         in_range("duration", self.duration, LONGEST, "s")
         course, engine = self.course, engine_named(self.engine)
         if self.brief and course is None:
-            raise ParameterError("is for courses", field="brief", value=True, allowed="False, or a course as target")
+            raise ParameterError(
+                "must be False: only courses have brief records",
+                field="brief",
+                value=True,
+                allowed="False, or a course as target",
+            )
         if course is not None and self.duration != course.duration:
             allowed = f"{course.duration:g} s"
-            raise ParameterError("is not that of the course", field="duration", value=self.duration, allowed=allowed)
+            raise ParameterError("must be that of the course", field="duration", value=self.duration, allowed=allowed)
         engine.common(self.robot)
         if self.recording.poses and not engine.traits.poses:
-            raise ParameterError("this engine has none", field="poses", value=True, allowed="False")
+            raise ParameterError("must be False: this engine has no poses in space", field="poses", value=True)
         if self.controller is not None:
             check_controller(self.controller)
-            self.steering  # noqa: B018  (as it is now; what is in a frozen dataclass may still change)
+            self.steering  # noqa: B018  (as it is now; the content of a frozen dataclass may still change)
 
     def _every_joint_angle(self) -> tuple[float, ...]:
-        """Joint angles at the start, one a joint, or none."""
+        """Joint angles at the start, one for each joint, or none."""
         angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
         problem, allowed = "", ""
         if angles.shape not in ((0,), (1,), (joints,)):
-            problem, allowed = f"are {angles.size} angles", f"{joints}, or one for all"
+            problem, allowed = f"must be one angle for each joint, not {angles.size}", f"{joints}, or one for all"
         elif not (np.abs(angles) <= _MOST_BENT).all():
-            problem, allowed = "are bent too far", f"{_MOST_BENT} rad (85 deg) to either side"
+            problem, allowed = "must be smaller", f"-{_MOST_BENT} to {_MOST_BENT} rad (85 deg)"
         if problem:
             raise ParameterError(problem, field="joint_angles", value=self.joint_angles, allowed=allowed)
         return tuple(np.broadcast_to(angles, joints if angles.size else 0).tolist())
 
     def __getstate__(self) -> dict[str, Any]:
-        # Another process finds out anew what it makes of a trial: its versions may be others.
+        # Another process derives these again, because its versions may differ.
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def course(self) -> Course | None:
-        """The target if it is a course."""
+        """The target if it is a course, else None."""
         return self.target if isinstance(self.target, Course) else None
 
     @property
@@ -139,7 +144,7 @@ class Trial:
 
     @property
     def least_bytes(self) -> float:
-        """Least memory of its record."""
+        """Least memory of its record, bytes."""
         return 0.0 if self.brief else self.recording.least_bytes(self.robot.body.modules, self.duration)
 
     @cached_property
@@ -149,36 +154,41 @@ class Trial:
 
     @cached_property
     def code(self) -> tuple[str, str, str]:
-        """Digest of what the code of controller and engine is; why no other process could find that, if so; and why
-        it could not walk the same, if so."""
+        """Digest of the code of controller and engine; reason why another process could not import it, if so; and
+        reason why its walks are not reproducible, if so."""
         known_here = "__main__:" in self.engine or not all(map(is_findable, classes_in(self.controller)))
-        why = "it is known to this process only; put it at the top of a module that can be imported"
+        why = "it must be defined at the top of a module that can be imported"
         try:
             digest, chance = code_of(self.controller)
-            again = f"{chance}, which answers otherwise every time; chance with a seed does not" if chance else ""
+            again = f"{chance}, whose result varies from call to call; use random numbers with a seed" if chance else ""
             return digest + sources_of(self.engine), why if known_here else "", again
         except UnknownKindError as error:
             can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
             return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}", ""
 
     def repeated(self, seed: int | None = None, repeats: int = 1) -> tuple[Trial, ...]:
-        """The same trial so many times, with seeds that count up; undisturbed where the seed is None. Raises
-        ParameterError if there would be no walks, or several that are all alike."""
+        """Repeat the trial with consecutive seeds, or once without disturbance if the seed is None. Raises
+        ParameterError for no walks, or several identical ones."""
         if repeats < 1:
             raise ParameterError("must be positive", field="repeats", value=repeats)
         if repeats > 1 and seed is None:
-            raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
+            raise ParameterError(
+                "must be 1 without a seed, because the trials would be identical",
+                field="repeats",
+                value=repeats,
+                allowed="1, or a seed",
+            )
         spread = NONE if seed is None else self.disturbance
         return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 
     def as_now(self) -> Trial:
-        """The same trial, with code and fields of its controller as they are now."""
+        """The same trial with the present code and fields of its controller."""
         own = ":" in self.engine or any(not is_ours(kind) for kind in classes_in(self.controller))
         return replace(self) if own else self
 
     @cached_property
     def text(self) -> str:
-        """All of it as JSON; equal texts are equal trials."""
+        """Complete trial as JSON; equal texts mean equal trials."""
         plain_names = ("engine", "duration", "seed", "rate", "forces", "poses", "brief")
         target: Any = self.target
         if isinstance(target, Target):
@@ -205,15 +215,15 @@ class Trial:
         return f"{kind}-{digest_of(self.text)}.nc"
 
     def not_kept(self, why: str) -> str:
-        """A line for whoever wonders why a folder does not have this trial."""
+        """Message that explains why a folder does not keep this trial."""
         who = f"engine {self.engine}" if self.controller is None else f"controller {path_of(type(self.controller))}"
-        return f"{who}: its trials walk and are not kept: {why}"
+        return f"{who}: its trials run but are not kept: {why}"
 
 
 def versions_of(engine: str) -> dict[str, Any]:
-    """Versions of what makes a record, as they stand in a trial's text."""
+    """Versions of the software that determines a record, as written in a trial's text."""
     return {
-        # What else a version says of a checkout, the sources say better.
+        # The rest of a checkout's version is covered by the digest of the sources.
         "chilopod": chilopod.__version__.partition("+")[0],
         "sources": digest(_ABOVE)[:_DIGITS],
         "engine_version": engine_named(engine).traits.version,
@@ -221,5 +231,5 @@ def versions_of(engine: str) -> dict[str, Any]:
 
 
 def digest_of(text: str) -> str:
-    """Digest of a trial's text: the name of its file."""
+    """Digest of a trial's text, which names its file."""
     return hashlib.sha256(text.encode()).hexdigest()[:20]

@@ -1,8 +1,8 @@
-"""The whole robot in three dimensions, in MuJoCo: bodies, legs with servos, feet on the floor, scanner."""
+"""Robot in three dimensions in MuJoCo: bodies, legs with servos, feet on the floor, scanner."""
 
 from chilopod.twin import gl
 
-# A graphics backend that is not there must not keep the physics from being imported.
+# A missing graphics backend must not prevent the import of the physics.
 gl.import_mujoco()
 
 from chilopod.twin.creep import Creep, foot_creep  # noqa: E402

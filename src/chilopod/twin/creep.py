@@ -1,8 +1,8 @@
-"""How fast standing feet creep: MuJoCo's friction holds nothing still, it lets it slip a little, like a viscous damper.
+"""Creep of standing feet: MuJoCo's friction lets a foot slip slowly, like a viscous damper.
 
 Below the Coulomb limit a foot that is pushed sideways slips at a speed in proportion to the push. The coefficient
-depends on the contact settings and on the inertia that the leg shows the floor, so it is measured, on the robot as it
-is: standing on all feet at mid-stroke, pushed at the centre of every module by a few per cent of its weight.
+depends on the contact settings and on the inertia that the leg shows the floor, so it is measured on the robot itself:
+it stands on all feet at mid-stroke and is pushed at the centre of every module by a few per cent of its weight.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class Creep:
     across: float
 
     def speed(self, force: float) -> float:
-        """How fast a foot creeps sideways under a force (N), m/s."""
+        """Speed of the sideways creep of a foot under a force (N), m/s."""
         return force / self.across
 
 
 def foot_creep(robot: Robot) -> Creep:
-    """Push the standing robot ahead and to the side and see how fast it slips."""
+    """Measure the creep speed of the standing robot under a push ahead and to the side."""
     with silence():
         return Creep(*(_coefficient(robot, axis) for axis in range(2)))
 
@@ -56,7 +56,7 @@ def _coefficient(robot: Robot, axis: int) -> float:
     data.qpos[plan.leg_positions] = stance
     data.ctrl[plan.leg_controls] = stance
     modules = [model.body(f"module{i}").id for i in range(1, robot.body.modules + 1)]
-    # Both ways: what drifts by itself cancels.
+    # Pushes in both directions cancel a drift.
     start, speeds = data.qpos.copy(), []
     push = _PUSH * robot.module_mass * GRAVITY
     for sign in (1.0, -1.0):

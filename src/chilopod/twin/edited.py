@@ -1,4 +1,4 @@
-"""The twin with changes of one's own."""
+"""The twin with user-defined changes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Array = NDArray[np.float64]
 
 
 class Edited:
-    """The twin with changes of one's own to its description for MuJoCo: an engine, see :class:`chilopod.engine.Engine`.
+    """Twin with user-defined changes to its description for MuJoCo: an engine, see :class:`chilopod.engine.Engine`.
 
-    What MuJoCo can describe and a robot file cannot (joints between modules that roll, dry friction in a gear, a floor
-    with bumps) is tried in a few lines::
+    It adds features of MuJoCo that a robot file lacks (roll joints between modules, dry friction in a gear, a floor
+    with bumps) in a few lines::
 
         def rolls(spec, robot):
             for i in range(2, robot.body.modules + 1):
@@ -33,11 +33,11 @@ class Edited:
     Parameters
     ----------
     name
-        As it is recorded.
+        Name of the engine in records.
     edit
         A function, called with the description (``mujoco.MjSpec``, names as in :class:`TwinModel`) and the robot,
-        before the step is taken into account (:mod:`chilopod.twin.step`). Trials are told apart by its code and the
-        numbers of its module that it uses, not by functions that it calls.
+        before the corrections for the step (:mod:`chilopod.twin.step`). Its code and the numbers of its module that it
+        uses are part of a trial; functions that it calls are not.
     """
 
     def __init__(self, name: str, edit: Edit) -> None:
@@ -48,24 +48,24 @@ class Edited:
         self._edit = edit
 
     def common(self, robot: Robot) -> Robot:
-        """As of the twin."""
+        """See :func:`chilopod.twin.common`."""
         return common(robot)
 
     def initial_states(self, *arguments: Any, **named: Any) -> Array:
-        """As of the twin."""
+        """See :func:`chilopod.twin.initial_states`."""
         return initial_states(*arguments, **named, edit=self._edit)
 
     def start(self, *arguments: Any, **named: Any) -> TwinWalk:
-        """As of the twin."""
+        """See :func:`chilopod.twin.start`."""
         return start(*arguments, **named, edit=self._edit, traits=self.traits)
 
     def resume(self, saved: bytes, threads: int = 0) -> TwinWalk:
-        """As of the twin."""
+        """See :func:`chilopod.twin.resume`."""
         return resume(saved, threads, edit=self._edit, traits=self.traits)
 
 
 def _content(code: CodeType, edit: Any) -> tuple[Any, ...]:
-    """Code of a function, and the plain values of its module that it uses: trials with another edit are others."""
+    """Code of a function, and the plain values of its module that it uses, as part of a trial's name."""
     used = {name: edit.__globals__.get(name) for name in code.co_names}
     plain = {name: value for name, value in used.items() if isinstance(value, int | float | str | tuple)}
     inner = [_content(each, edit) if isinstance(each, CodeType) else repr(each) for each in code.co_consts]

@@ -1,4 +1,4 @@
-"""The robot as a file for other programs: MJCF, the same model to the bit, and URDF, as far as that goes."""
+"""Export of the robot for other programs: MJCF, the same model to the bit, and URDF, which is incomplete."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from chilopod.twin.model import SIDES, TwinModel, build
 _CARRIER = 1e-6
 _FASTEST = 100.0  # rad/s: URDF wants a limit, the model has none
 
-# What MuJoCo writes of each named element, with its name in the compiled model where that differs.
+# Attributes that MuJoCo writes of each named element, with their names in the compiled model where they differ.
 _NUMBERS = {
     "body": {"pos": "pos"},
     "inertial": {"pos": "ipos", "mass": "mass", "diaginertia": "inertia"},
@@ -35,11 +35,11 @@ _KINDS = {"inertial": "body", "general": "actuator"}
 
 
 def mjcf(robot: Robot) -> str:
-    """The robot, one with a twin, as the text of an MJCF file.
+    """Return a robot with a twin as the text of an MJCF file.
 
-    MuJoCo makes of it the model that :func:`chilopod.twin.simulate` uses, every number to the bit. For the viewer there
-    are a floor one can see, a light, a camera that follows, and the keyframe ``start``: the robot before it walks, with
-    the servo targets of that instant. ParameterError if the twin cannot be built.
+    MuJoCo builds from it the model of :func:`chilopod.twin.simulate`, every number to the bit. For the viewer it has a
+    visible floor, a light, a camera that follows the robot, and the keyframe ``start``: the robot at time 0 with its
+    servo targets. ParameterError if the twin cannot be built.
     """
     twin = TwinModel(robot)
     spec = build(robot)
@@ -55,10 +55,10 @@ def mjcf(robot: Robot) -> str:
 
 
 def urdf(robot: Robot) -> str:
-    """The robot as the text of a URDF file; ParameterError as for :func:`mjcf`.
+    """Return the robot as the text of a URDF file; ParameterError as for :func:`mjcf`.
 
-    Links are named as in MuJoCo; that of module 1 is the root and floats. Feet alone collide. URDF has no springs, no
-    servos and no friction of the floor: a comment in the file says what they are.
+    Links are named as in MuJoCo; that of module 1 is the root and floats. Feet alone collide. URDF has no springs,
+    servos or floor friction; a comment in the file lists them.
     """
     twin, model = twin_of(robot), TwinModel(robot).model
     root = ET.Element("robot", name=robot.name)
@@ -93,19 +93,19 @@ def urdf(robot: Robot) -> str:
 
 
 FORMATS: dict[str, tuple[str, Callable[[Robot], str]]] = {".xml": ("MJCF", mjcf), ".urdf": ("URDF", urdf)}
-"""By suffix of the file: the name of the format, and what writes it."""
+"""Name of the format and its writer, by suffix of the file."""
 
 
 def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:
-    """The format that goes with a suffix, such as ``.urdf``; ParameterError if none does."""
+    """Return the format of a suffix, such as ``.urdf``; ParameterError for another suffix."""
     if suffix.lower() not in FORMATS:
         allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
-        raise ParameterError("is the suffix of no format", field="out", value=suffix, allowed=allowed)
+        raise ParameterError("must be the suffix of a format", field="out", value=suffix, allowed=allowed)
     return FORMATS[suffix.lower()]
 
 
 def _decorate(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """Add what is only to be looked at."""
+    """Add parts that are only visible."""
     spec.add_texture(
         name="floor",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
@@ -133,7 +133,7 @@ def _decorate(spec: mujoco.MjSpec, robot: Robot) -> None:
 
 
 def _write_all_digits(root: ET.Element, model: mujoco.MjModel) -> None:
-    """Put the numbers of the compiled model in the place of those that MuJoCo rounded to six digits."""
+    """Replace the numbers that MuJoCo rounded to six digits by those of the compiled model."""
     option = root.find("option")
     assert option is not None
     option.set("timestep", repr(float(model.opt.timestep)))
@@ -175,7 +175,7 @@ def _add_link(root: ET.Element, model: mujoco.MjModel, name: str, shift: Sequenc
     for number in range(int(body.geomadr[0]), int(body.geomadr[0] + body.geomnum[0])):
         geom = model.geom(number)
         for kind in ("visual", "collision") if geom.name.endswith("_foot") else ("visual",):
-            # Names are for collisions; MuJoCo warns where something to be seen has the same one.
+            # Only collision geometry gets names; MuJoCo warns if visible geometry has the same one.
             element = ET.SubElement(link, kind, {"name": geom.name} if kind == "collision" else {})
             ET.SubElement(element, "origin", xyz=_numbers(geom.pos + shift), rpy="0 0 0")
             _shape(ET.SubElement(element, "geometry"), geom)
@@ -214,7 +214,7 @@ def _add_joint(
 
 
 def _servo_limit(joint: ET.Element, model: mujoco.MjModel) -> None:
-    """A whole turn, and the torque of the servo when it is half a turn off."""
+    """Limits of a servo: a whole turn, and the torque at an error of half a turn."""
     _limit(joint, math.pi, effort=math.pi * float(model.actuator(joint.get("name")).gainprm[0]))
 
 
@@ -224,7 +224,7 @@ def _limit(joint: ET.Element, most: float, effort: float) -> None:
 
 
 def _numbers(values: ArrayLike) -> str:
-    """All digits that it takes to read the same numbers back; no negative zeros."""
+    """Numbers with all digits that reproduce them, without negative zeros."""
     return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in np.ravel(values))
 
 

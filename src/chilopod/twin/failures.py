@@ -1,4 +1,4 @@
-"""Robots that no longer walk: which, how, and from which step on."""
+"""Detection of failures: robots that no longer walk, their status and the step of the failure."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def failures(
     yaw_positions: NDArray[np.intp],
     warned: NDArray[np.bool_],
 ) -> dict[int, tuple[int, Status]]:
-    """Failures of the robots of a batch in some steps: by robot, the first step that is no longer a walk's, and how it
-    ended.
+    """Failures of the robots of a batch in some steps: for each robot the first step after its walk, and its status.
 
     Positions and rates are MuJoCo's ``qpos`` and ``qvel`` after every step, shapes (robots, steps, nq) and (robots,
-    steps, nv), ``before`` the same before the first step, (robots, nq) and (robots, nv). The yaw joints have their
-    places in ``qpos``, (N-1,). MuJoCo stops a robot that it warned of, (robots,), and repeats its last state.
+    steps, nv), ``before`` the same before the first step, (robots, nq) and (robots, nv). ``yaw_positions`` are
+    the indices of the yaw joints in ``qpos``, (N-1,). MuJoCo stops a robot with a warning, (robots,), and repeats its
+    last state.
     """
     bends = positions[..., yaw_positions]
     with np.errstate(invalid="ignore", over="ignore"):
@@ -37,7 +37,7 @@ def failures(
         upright = 1.0 - 2.0 * (positions[..., 4] ** 2 + positions[..., 5] ** 2)
         most = (np.abs(rates).max(), np.abs(positions).max(), np.abs(bends).max(), -upright.min())
         if not warned.any() and np.less(most, (_FASTEST, _FARTHEST, _MOST_BENT, -_UPRIGHT)).all():
-            return {}  # as nearly always, and that takes no time
+            return {}  # the usual case, and fast
         quiet = (np.abs(rates).max(2) < _FASTEST) & (np.abs(positions).max(2) < _FARTHEST)
         straight, standing = np.abs(bends).max(2) <= _MOST_BENT, upright > _UPRIGHT
     found = {}
@@ -52,7 +52,7 @@ def failures(
 
 
 def _stopped(positions: Array, rates: Array, before: tuple[Array, Array]) -> int:
-    """The first step that only repeats the state before it, up to the end."""
+    """First step from which on the state only repeats, up to the end."""
     places, speeds = np.vstack([before[0], positions]), np.vstack([before[1], rates])
     moved = (np.diff(places, axis=0) != 0.0).any(axis=1) | (np.diff(speeds, axis=0) != 0.0).any(axis=1)
     return int(np.flatnonzero(moved)[-1]) + 1 if moved.any() else 0

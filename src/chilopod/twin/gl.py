@@ -1,9 +1,8 @@
-"""Choice of an OpenGL that can draw the robot off-screen here. Only films and stills need one, nothing else does.
+"""Choice of an OpenGL backend that can draw the robot off-screen. Only films and stills need one.
 
 MuJoCo reads ``MUJOCO_GL`` once, when it is imported, and takes GLFW where it is not set: that needs a display. Here the
 class that makes a context is taken from the backend's own module instead, so it does not matter whether MuJoCo has been
-imported before. Before that, another process tries every backend, because what is wrong with a driver shows in a crash
-or in waiting for ever.
+imported before. Before that, another process tries every backend, because a faulty driver crashes or hangs.
 """
 
 from __future__ import annotations
@@ -49,8 +48,8 @@ context.free()
 
 @dataclass(frozen=True)
 class Found:
-    """Backend that was found, ``egl``, ``osmesa``, ``glfw`` or ``cgl``, and the name of its driver; or None, what is
-    missing in a few words, and the one thing to do about it."""
+    """Backend that was found, ``egl``, ``osmesa``, ``glfw`` or ``cgl``, and the name of its driver; or None, the
+    missing part in a few words, and the remedy."""
 
     backend: str | None
     renderer: str = ""
@@ -85,7 +84,7 @@ def find() -> Found:
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo even where ``MUJOCO_GL`` names what is not there; on its own, MuJoCo does not survive that."""
+    """Import MuJoCo even if ``MUJOCO_GL`` names a missing backend, on which its own import fails."""
     try:
         importlib.import_module("mujoco")
     except ImportError:
@@ -103,8 +102,8 @@ def import_mujoco() -> None:
 
 @contextmanager
 def context(width: int, height: int) -> Iterator[None]:
-    """Make OpenGL ready to draw off-screen within, so many pixels; OutputError if no backend works, with what to do
-    about it."""
+    """Make OpenGL ready to draw off-screen within the block, at a size in pixels; OutputError with the remedy if no
+    backend works."""
     found = find()
     if found.backend is None:
         raise OutputError(f"films and stills in 3-D need OpenGL; {found.missing}; to mend it: {found.mend}")
@@ -122,7 +121,7 @@ def _candidates(known: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _tried(name: str) -> tuple[str, str]:
-    """Name that the driver of a backend gives itself, and what is wrong with it, if anything."""
+    """Name of the driver of a backend, and its fault, if any."""
     # Without the folder that Python was started in, where a file could be called as a module is.
     command = [sys.executable, "-P", "-c", _TRIAL, name]
     environment = {**os.environ, "MUJOCO_GL": name}
@@ -140,7 +139,7 @@ def _tried(name: str) -> tuple[str, str]:
     last = one_line(printed[-1]) if printed else ""
     if not done.returncode:
         return last, ""
-    # What PyOpenGL says of a library that it cannot find.
+    # PyOpenGL's message about a missing library.
     if "'NoneType' object has no attribute" in last or "Unable to load" in last:
         return "", "its library is not installed"
     return "", last[:_LONGEST] or f"fails with exit code {done.returncode}"

@@ -1,4 +1,4 @@
-"""How a leg is driven: the path of its tip, the two pitch joints that put the tip there, the servo targets over time.
+"""Motion of the legs: path of the tip, angles of the two pitch joints, servo targets over time.
 
 The tip stands for a straight line from the AEP to the PEP at constant speed, and swings back along the upper half of
 an ellipse (paper, section Robot). Angles are measured from a straight leg that hangs down: the hip's swings the leg
@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 
 
 def tip_path(robot: Robot, phase: ArrayLike) -> Array:
-    """Where the tip of a leg is to be at a phase in cycles, any shape (0 is touch-down at the AEP): ahead of and above
-    the middle of the stance line, m, shape (..., 2)."""
+    """Desired position of the tip of a leg at a phase in cycles, any shape (0 is touch-down at the AEP): ahead of and
+    above the middle of the stance line, m, shape (..., 2)."""
     gait, clearance = robot.gait, twin_of(robot).clearance
     cycles = np.asarray(phase, dtype=np.float64) % 1.0
     above = np.where(gait.stands(cycles), 0.0, clearance * np.sin(gait.swing_angle(cycles)))
@@ -26,8 +26,8 @@ def tip_path(robot: Robot, phase: ArrayLike) -> Array:
 
 
 def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
-    """Inverse kinematics of the two pitch joints: hip and knee, rad, shape (..., 2), that put the foot's centre so far
-    ahead of and below the hip, m. ParameterError if the leg is too short, or its links too unlike, to get there."""
+    """Inverse kinematics of the two pitch joints: hip and knee, rad, shape (..., 2), for a position of the foot's
+    centre ahead of and below the hip, m. ParameterError if the leg cannot reach it."""
     x, z = np.broadcast_arrays(np.asarray(ahead, dtype=np.float64), np.asarray(below, dtype=np.float64))
     upper, lower = twin.upper_link, twin.lower_link
     distance = np.hypot(x, z)
@@ -37,7 +37,10 @@ def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
     ):
         if wrong.any():
             raise ParameterError(
-                "the leg cannot reach its path", field="twin.hip_height", value=f"{1e3 * worst:.4g} mm", allowed=allowed
+                "must be lower: the leg cannot reach its path",
+                field="twin.hip_height",
+                value=f"{1e3 * worst:.4g} mm",
+                allowed=allowed,
             )
     knee = -np.arccos(np.clip((distance**2 - upper**2 - lower**2) / (2.0 * upper * lower), -1.0, 1.0))
     hip = np.arctan2(x, z) - np.arctan2(lower * np.sin(knee), upper + lower * np.cos(knee))
@@ -53,15 +56,15 @@ def servo_targets(robot: Robot, times: ArrayLike) -> Array:
 
 
 def check_reach(robot: Robot) -> None:
-    """Make sure, before anything is simulated, that the legs reach all of their path; ParameterError if they do not."""
+    """Check, before any simulation, that the legs reach their whole path; ParameterError otherwise."""
     tip = tip_path(robot, np.linspace(0.0, 1.0, 721))
     joint_angles(twin_of(robot), tip[:, 0], twin_of(robot).hip_height - tip[:, 1])
 
 
 def twin_of(robot: Robot) -> Twin:
-    """The robot's [twin]; ParameterError if it has none."""
+    """The table [twin] of the robot; ParameterError if it is missing."""
     if robot.twin is None:
-        problem = "this robot has none, so the three-dimensional model cannot be built"
+        problem = "must be given in the robot file for the three-dimensional model"
         allowed = "the keys of [twin] in the robot file; the preset aoi2022 has them"
         raise ParameterError(problem, field="twin", allowed=allowed)
     return robot.twin

@@ -1,4 +1,4 @@
-"""The whole robot as a MuJoCo model, built from its description.
+"""The robot as a MuJoCo model, built from its description.
 
 Modules are boxes in a row, joined by passive yaw joints with springs. Every leg has two links on two pitch joints, on
 module 1 a yaw joint above them; every leg joint has a position servo. Only round feet touch the floor. The frame of a
@@ -31,51 +31,52 @@ from chilopod.twin.step import with_step
 Array = NDArray[np.float64]
 
 Edit = Callable[[mujoco.MjSpec, Robot], None]
-"""Changes a robot's description for MuJoCo in place, before it is compiled."""
+"""Function that changes a robot's description for MuJoCo in place, before it is compiled."""
 
 SIDES = ("left", "right")
 
 POLE_GROUP = 4
-"""Geom group of the pole that marks a target, the only thing that the scanner sees."""
+"""Geom group of the pole that marks a target, the only geometry that the scanner detects."""
 
 AWAY = (0.0, 0.0, -10.0)
-"""Where that pole is when there is no target, m."""
+"""Position of that pole without a target, m."""
 
 _POLE_HEIGHT = 0.4  # m
 _SCANNER_ABOVE = 0.03  # m, of its beams above the body
-_SUNK = 1e-6  # m, of feet at the start, where else round-off would decide which of them touch the floor
+_SUNK = 1e-6  # m, depth of feet at the start; at 0 round-off would decide which of them touch the floor
 _ROLLING = (0.0, 0.0)  # feet do not resist turning on the spot nor rolling
 
 
 class TwinModel:
-    """A robot compiled for MuJoCo, and where its parts are in MuJoCo's arrays; ParameterError if there is none such.
+    """A robot compiled for MuJoCo, and the indices of its parts in MuJoCo's arrays; ParameterError if MuJoCo cannot
+    build it.
 
     Parameters
     ----------
     robot
-        With a twin.
+        Robot with a table [twin].
     forces
         True to measure the force on every foot (sensors, in the order of :attr:`feet`).
     edit
-        Makes of MuJoCo's description of the robot one's own, see :class:`chilopod.twin.Edited`.
+        Function that changes MuJoCo's description of the robot, see :class:`chilopod.twin.Edited`.
 
     Attributes
     ----------
     robot, twin
         As given.
     model
-        Compiled; not to be changed.
+        Compiled model, not to be changed.
     yaw_joints, yaw_positions, yaw_rates
-        Numbers of the yaw joints, front to rear, and their places in ``qpos`` and ``qvel``, (N-1,).
+        Numbers of the yaw joints, front to rear, and their indices in ``qpos`` and ``qvel``, (N-1,).
     feet
         Geom of every foot, (N, 2).
     leg_positions, leg_controls
-        Places of hip and knee in ``qpos``, and of their servos in ``ctrl``, (N, 2, 2).
+        Indices of hip and knee in ``qpos``, and of their servos in ``ctrl``, (N, 2, 2).
     leg_yaw_positions, leg_yaw_controls
-        Places of the leg yaw joints of module 1, likewise, (2,).
+        Indices of the leg yaw joints of module 1, likewise, (2,).
     spring_controls
-        Places in ``ctrl`` of the actuators that change the springs, (N-1,): N*m/rad above the spring's own stiffness;
-        empty if none does.
+        Indices in ``ctrl`` of the actuators that change the springs, (N-1,), in N*m/rad above the spring's own
+        stiffness; empty without such actuators.
     """
 
     def __init__(self, robot: Robot, forces: bool = False, edit: Edit | None = None) -> None:
@@ -95,7 +96,7 @@ class TwinModel:
         servo_of = {int(self.model.actuator_trnid[i, 0]): i for i in range(self.model.nu)}
         names = [f"spring{i}" for i in range(1, count)] if _adjustable(robot) else []
         feet = [[int(self.model.geom(f"{leg}_foot").id) for leg in _legs(i)] for i in range(count)]
-        # Models are shared, so nobody may write into these.
+        # Models are shared, so their arrays are read-only.
         self.yaw_joints = read_only(np.array(yaw))
         self.yaw_positions, self.yaw_rates = read_only(at[yaw]), read_only(rate[yaw])
         self.leg_positions, self.leg_yaw_positions = read_only(at[legs]), read_only(at[leg_yaw])
@@ -131,7 +132,7 @@ def build(robot: Robot, forces: bool = False, edit: Edit | None = None) -> mujoc
     spec.option.impratio = twin.impedance_ratio
     # The same motion, and the faster for it: a chain with twelve legs has few pairs of joints that act on each other.
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    # A robot that blows up is to be seen to, not put back to where it started.
+    # A diverging robot must be detected, not reset to its start.
     spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     world = spec.worldbody
     world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05], contype=0, conaffinity=1)
@@ -181,18 +182,18 @@ def build(robot: Robot, forces: bool = False, edit: Edit | None = None) -> mujoc
 
 
 def scanner_place(twin: Twin) -> Array:
-    """Where the beams of the scanner come from, in the frame of module 1, m."""
+    """Origin of the beams of the scanner in the frame of module 1, m."""
     return np.array([twin.scanner_offset, 0.0, 0.5 * twin.body_height + _SCANNER_ABOVE])
 
 
 @lru_cache(maxsize=64)
 def compiled(robot: Robot, forces: bool = False, edit: Edit | None = None) -> TwinModel:
-    """The model of a robot, shared between calls with the same arguments."""
+    """Return the model of a robot, shared between calls with the same arguments."""
     return TwinModel(robot, forces, edit)
 
 
 def without_springs(robot: Robot) -> Robot:
-    """The robot as far as the model is concerned that a batch shares."""
+    """The robot without the properties that may differ within a batch."""
     joints = robot.body.modules - 1
     adjustable = (True,) * joints if _adjustable(robot) else None
     same = Springs(stiffness=(1.0,) * joints, damping=(0.0,) * joints, adjustable=adjustable)
@@ -201,7 +202,7 @@ def without_springs(robot: Robot) -> Robot:
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """Keep MuJoCo from telling of robots that blow up: on stderr, and in a file in the present folder."""
+    """Suppress MuJoCo's warnings of diverging robots on stderr and in a file of the current folder."""
     before, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     silent.logto_console = silent.logto_file = False
     silent.set()
@@ -213,12 +214,12 @@ def silence() -> Iterator[None]:
 
 @contextmanager
 def _in_our_words() -> Iterator[None]:
-    """Errors of MuJoCo in one line, also where it would only warn."""
+    """Turn errors and warnings of MuJoCo into an error of one line."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             yield
-    except (ValueError, UserWarning) as error:  # ours has no better words
+    except (ValueError, UserWarning) as error:  # MuJoCo's own message is the best one
         raise ParameterError(f"MuJoCo cannot build this robot ({error})", field="twin") from None
 
 
@@ -228,17 +229,17 @@ def _legs(module: int) -> list[str]:
 
 def _check_bodies(robot: Robot, twin: Twin) -> None:
     if 4.0 * twin.link_mass >= robot.module_mass:
-        problem = "leaves no mass for the bodies: a module has four links"
+        problem = "must leave mass for the body: a module has four links"
         allowed = f"less than {0.25 * robot.module_mass:.4g} kg"
         raise ParameterError(problem, field="twin.link_mass", value=f"{twin.link_mass:g} kg", allowed=allowed)
     if 0.5 * twin.body_height >= twin.hip_height + twin.foot_radius:
-        problem = "the body would touch the floor"
+        problem = "must keep the body above the floor"
         allowed = f"less than {2e3 * (twin.hip_height + twin.foot_radius):g} mm"
         raise ParameterError(problem, field="twin.body_height", value=f"{1e3 * twin.body_height:g} mm", allowed=allowed)
     low, high = yaw_inertia_range(robot.body, robot.legs, twin)
     if not low <= robot.module_yaw_inertia <= high:
         raise ParameterError(
-            "no module of this mass and size has it with its legs",
+            "must fit the mass and size of the module and its legs",
             field="body.yaw_inertia",
             value=f"{robot.module_yaw_inertia:.4g} kg*m^2",
             allowed=f"{low:.4g} to {high:.4g} kg*m^2",
@@ -251,7 +252,7 @@ def _add_box(body: mujoco.MjsBody, robot: Robot, twin: Twin) -> None:
     body.explicitinertial = True
     body.mass, body.ipos = body_mass(robot.body, twin), [0.0, 0.0, 0.0]
     body.inertia = body_inertia(robot.body, robot.legs, twin)
-    # A little shorter than it is, so that a bend shows.
+    # Slightly shorter than the module, so that a bend is visible.
     body.add_geom(
         name=f"{body.name}_box",
         type=mujoco.mjtGeom.mjGEOM_BOX,

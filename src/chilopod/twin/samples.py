@@ -1,4 +1,4 @@
-"""Simulation steps that the samples of a record are taken at."""
+"""Simulation steps of the samples of a record."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Sampling:
-    """Samples at the steps that are nearest to their times: samples per second, 0 for none, and the timestep, s."""
+    """Samples at the steps nearest to their times, from samples per second, 0 for none, and the timestep, s."""
 
     rate: float
     timestep: float
 
     def steps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
-        """The steps of samples, of their shape."""
+        """Steps of samples, of their shape."""
         return np.rint(samples / (self.rate or 1.0) / self.timestep).astype(np.intp)
 
     def count(self, step: int) -> int:
-        """How many samples are at steps up to one."""
+        """Number of samples up to a step."""
         if self.rate == 0.0 or step < 0:
             return 0
         in_a_step = self.rate * self.timestep
@@ -28,5 +28,5 @@ class Sampling:
         return int(near[self.steps(near) <= step][-1]) + 1
 
     def between(self, after: int, up_to: int) -> NDArray[np.intp]:
-        """The samples at steps after one and up to another."""
+        """Numbers of the samples after one step and up to another."""
         return np.arange(self.count(after), self.count(up_to))

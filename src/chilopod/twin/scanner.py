@@ -1,7 +1,8 @@
-"""The laser range scanner on module 1 (Hokuyo URG-04LX in the paper), by ray casts, and what it makes of a target.
+"""The laser range scanner on module 1 (Hokuyo URG-04LX in the paper), by ray casts, and the detection of a target in a
+scan.
 
-Beams leave the scanner in the plane of the body, one every step of its view. A target is a pole on the floor; nothing
-else is as high as the scanner. Distances are rounded to the scanner's resolution and have normal noise.
+Beams leave the scanner in the plane of the body, one at every step of its view. A target is a pole on the floor;
+nothing else reaches the height of the scanner. Distances are rounded to the scanner's resolution and have normal noise.
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ def beams(twin: Twin) -> Array:
 
 
 class Scanner:
-    """The scanners of a batch of robots, where they start: a scan every so often, looked at when it is asked for.
+    """Scanners of a batch of robots at their start: periodic scans, evaluated on demand.
 
-    Its noise has a seed for each robot, which the walk may replace, or there is none.
+    The noise has a seed for each robot, which the walk may replace, or is absent.
     """
 
     def __init__(self, twin: Twin, batch: Batch, seeds: NDArray[np.object_] | None) -> None:
@@ -42,10 +43,10 @@ class Scanner:
         self._seen = np.empty((2, len(self._poses)))
 
     def passed(self, before: int, now: int, poses: Array, ids: NDArray[np.intp]) -> None:
-        """Take note of where robots were, for the last scan up to now.
+        """Keep the poses of robots for the last scan up to now.
 
-        Times are control intervals gone by since the start. Poses of module 1, place and quaternion, are those at the
-        end of every interval from ``before`` on, shape (len(ids), intervals, 7).
+        Times are control intervals since the start. Poses of module 1, position and quaternion, are those at the end of
+        every interval from ``before`` on, shape (len(ids), intervals, 7).
         """
         number = int(now / self._every + _SAME_INSTANT)
         while self._tick_of(number) > now:  # the same number, however time is cut
@@ -55,18 +56,18 @@ class Scanner:
             self._number = number
 
     def _tick_of(self, number: int) -> int:
-        """Control intervals gone by when a scan is taken."""
+        """Number of control intervals before a scan."""
         return int(np.ceil(number * self._every - _SAME_INSTANT))
 
     def restart(self, ids: NDArray[np.intp], anew: bool) -> None:
-        """Some robots have been put elsewhere; with ``anew`` the noise of their scans is counted from this one."""
+        """Restart the scanners of robots that were moved; with ``anew`` the noise of their scans begins again."""
         self._poses[ids] = self._batch.bind("qpos")[ids, :7]
         if anew:
             self._first[ids] = self._number
         self.forget()
 
     def forget(self) -> None:
-        """Make nothing of what was seen: targets are elsewhere now."""
+        """Discard the detections, because the targets were moved."""
         self._looked = -1
 
     def look(self, ids: NDArray[np.intp]) -> Array:
@@ -84,20 +85,20 @@ class Scanner:
         return self._seen[:, ids]
 
     def state(self) -> dict[str, Array]:
-        """All there is to it, for :meth:`restore`."""
+        """Complete state, for :meth:`restore`."""
         return {"number": np.array(self._number), "poses": self._poses, "first": self._first}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Become as another was, of the same robots."""
+        """Take over the state of scanners of the same robots."""
         self._number, self._poses, self._first = int(state["number"]), state["poses"], state["first"]
         self.forget()
 
 
 def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: Array | None = None) -> Array:
-    """One scan of some robots: distances, m, shape (len(ids), beams); NaN where there is nothing within range.
+    """One scan of some robots: distances, m, shape (len(ids), beams); NaN where nothing is within range.
 
-    Poses of module 1 are those of all robots at the time of the scan, place and quaternion, shape (robots, 7). Noise is
-    given as standard normal deviates, shape (len(ids), beams).
+    Poses of module 1 are those of all robots at the time of the scan, position and quaternion, shape (robots, 7). Noise
+    is given as standard normal deviates, shape (len(ids), beams).
     """
     angles = beams(twin)
     local = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
@@ -117,7 +118,7 @@ def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: A
 
 def detect(twin: Twin, distances: Array) -> tuple[float, float]:
     """Bearing (left positive, rad) and distance (m) of the pole's axis from the centre of module 1 in one scan, m,
-    (beams,): the widest run of neighbouring beams that see something. NaN if it is not seen."""
+    (beams,): the widest run of neighbouring beams that hit something. NaN without a hit."""
     seen = np.flatnonzero(np.isfinite(distances))
     if not len(seen):
         return float("nan"), float("nan")
@@ -125,7 +126,7 @@ def detect(twin: Twin, distances: Array) -> tuple[float, float]:
     run = max(runs, key=len)
     angles, near = beams(twin)[run], distances[run]
     middle = 0.5 * (angles[0] + angles[-1])
-    # Each beam says where the axis is, if the axis is in the middle of the run; their mean has the least noise.
+    # Each beam gives an estimate of the axis, which lies in the middle of the run; the mean has the least noise.
     across = near * np.sin(angles - middle)
     beyond = np.sqrt(np.maximum(twin.pole_radius**2 - across**2, 0.0))
     away = float(np.mean(near * np.cos(angles - middle) + beyond))

@@ -1,4 +1,4 @@
-"""Whole walks of many robots at a time in three dimensions, straight on or steered, as a record over time."""
+"""Whole walks of many robots at a time in three dimensions, straight or steered, as a record over time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def simulate(
     tolerance: float = TOLERANCE,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Let robots walk on the floor; each one alone, all of them at the same time.
+    """Simulate walks of robots on the floor; the robots do not interact.
 
     Parameters
     ----------
@@ -40,17 +40,17 @@ def simulate(
     duration, forces, progress
         As for :func:`chilopod.planar.simulate`.
     controller
-        Asked for commands at its events, which act at the first servo target from then on.
+        Controller, called at its events; its commands act from the next servo target on.
     rate
-        Samples per second; they are taken at the nearest step.
+        Samples per second, taken at the nearest step.
     poses
         True to add the positions of all joints, from which the robot can be drawn.
 
     Returns
     -------
-    Dataset as that of :func:`chilopod.planar.simulate`, with ``leg_yaw`` as the joints are, not as they should be; with
-    a target and a controller also ``seen_bearing`` and ``seen_distance`` over (event, robot), what the controller saw,
-    NaN where the pole was out of view; with ``poses``, ``pose`` over (time, robot, coordinate).
+    Dataset as that of :func:`chilopod.planar.simulate`, with ``leg_yaw`` as measured at the joints, not as commanded;
+    with a target and a controller also ``seen_bearing`` and ``seen_distance`` over (event, robot), observed by the
+    controller, NaN where the pole was out of view; with ``poses``, ``pose`` over (time, robot, coordinate).
     """
     in_range("duration", duration, LONGEST, "s")
     walk = start(

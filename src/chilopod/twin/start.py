@@ -1,4 +1,4 @@
-"""Start of a batch of walks: robots that go together, where they start, their floor and their targets."""
+"""Start of a batch of walks: robots, initial states, floor and targets."""
 
 from __future__ import annotations
 
@@ -83,40 +83,43 @@ def start(
     edit: Edit | None = None,
     traits: Traits = traits,
 ) -> TwinWalk:
-    """Put robots on the floor, see :class:`chilopod.engine.Engine`.
+    """Start walks on the floor, see :class:`chilopod.engine.Engine`.
 
     Parameters
     ----------
     robots, friction, record, expected
-        As there. Robots may differ in the numbers of their springs and in nothing else.
+        See :class:`chilopod.engine.Engine`. Robots may differ only in the numbers of their springs.
     initial
         From :func:`initial_states`, shape (walks, nq) or (nq,), or from ``states`` of a walk, (walks, nq + nv).
     target
-        Place of a pole on the floor, m, shape (2,) or (walks, 2); what is seen of it is what the scanner made of its
-        last scan.
+        Position of a pole on the floor, m, shape (2,) or (walks, 2); observations come from the scanner's last scan.
     seeds
-        Seeds of the scanner's noise, one a walk.
+        Seeds of the scanner's noise, one for each walk.
     threads
-        At most; 0 for all cores. Results are the same to the bit at any number.
+        Largest number of threads; 0 for all cores. Results are the same to the bit for any number.
     tolerance
-        At which MuJoCo's solver of contact forces stops, relative.
+        Relative tolerance of MuJoCo's solver of contact forces.
     edit, traits
         See :class:`Edited`.
     """
     tolerance, expected = in_range("tolerance", tolerance, 1.0), check_wishes(record, expected)
     if as_number("threads", threads) not in range(1 << 16):
-        raise ParameterError("is no number of threads", field="threads", value=threads, allowed="0 (all cores) or more")
+        raise ParameterError("must be a thread count", field="threads", value=threads, allowed="0 (all cores) or more")
     if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
-        raise ParameterError("are none", field="edit, traits", allowed="a function or None; a chilopod.engine.Traits")
+        raise ParameterError(
+            "must be a function and the traits of an engine",
+            field="edit, traits",
+            allowed="a function or None; a chilopod.engine.Traits",
+        )
     given = as_robots(robots)
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
-        raise ParameterError("may differ in their springs only", field="robots")
+        raise ParameterError("must be equal except for their springs", field="robots")
     size, standing_still = state_size(compiled(first, edit=edit), initial), initial_states(given[0], edit=edit)
     begun = begin(given, standing_still, size, initial, friction, target, seeds)
     return TwinWalk(begun, record, tolerance, expected, traits=traits, threads=int(threads), edit=edit)
 
 
 def resume(saved: bytes, threads: int = 0, *, edit: Edit | None = None, traits: Traits = traits) -> TwinWalk:
-    """A walk that was saved, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
+    """Continue a saved walk, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
     return resumed(traits, saved, partial(TwinWalk, traits=traits, threads=threads, edit=edit))

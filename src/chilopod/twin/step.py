@@ -6,14 +6,14 @@ the joint had h D / 2 more inertia than it has; and they compute contact forces 
 go with the step, and with legs as overdamped as this robot's they are not small: at 2 ms a curve was 10 % too tight.
 
 The trapezoidal rule takes the damper at the mean of both rates. Solved for w', that is an *explicit* step of a joint
-with h D / 2 more inertia, (I + h D / 2) (w' - w) = h (M - D w). So that much is added to the joints (``armature``), and
-the explicit integrator does the rest: of second order, stable at every damping, and the same to the contact solver,
-which knows inertias only. Where h D / 2 is more than I the rate would change its sign at every step; there the joint
-is given h D, and stops within a step.
+with h D / 2 more inertia, (I + h D / 2) (w' - w) = h (M - D w). Therefore h D / 2 is added to the joints
+(``armature``), and the explicit integrator does the rest: of second order, stable at every damping, and consistent with
+the contact solver, which uses inertias only. Where h D / 2 is more than I the rate would change its sign at every step;
+there the joint is given h D, and stops within a step.
 
-MuJoCo scales how far a contact gives way by the inertia that the foot shows the floor. That is not to follow the step,
-so feet's impedance d is changed to keep the regularisation R = (1 - d) / d * A, and their reference acceleration with
-it (MuJoCo documentation, Computation, "Solver parameters").
+MuJoCo scales how far a contact gives way by the inertia that the foot shows the floor. That must not depend on the
+step, so the feet's impedance d is changed to keep the regularisation R = (1 - d) / d * A, and their reference
+acceleration with it (MuJoCo documentation, Computation, "Solver parameters").
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ _WIDTH, _MIDDLE, _POWER = 0.001, 0.5, 2.0  # of how impedance grows with depth: 
 
 
 def with_step(spec: mujoco.MjSpec, twin: Twin) -> None:
-    """Give a description what its joints and feet need for the step of the twin; its servos' joints have the inertia of
-    their motors as ``armature``, its feet are geoms named ``*_foot``."""
+    """Adapt the joints and feet of a description to the step of the twin; servo joints have the inertia of their motors
+    as ``armature``, feet are geoms named ``*_foot``."""
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     feet = [geom for geom in spec.geoms if geom.name.endswith("_foot")]
     own = _mobility(spec, feet)
@@ -51,6 +51,6 @@ def with_step(spec: mujoco.MjSpec, twin: Twin) -> None:
 
 
 def _mobility(spec: mujoco.MjSpec, feet: list[mujoco.MjsGeom]) -> Array:
-    """Inverse of the mass that each foot shows the floor, as MuJoCo takes it, 1/kg."""
+    """Inverse of the effective mass of each foot at the floor, as MuJoCo defines it, 1/kg."""
     model = spec.compile()
     return np.array([model.body_invweight0[model.geom_bodyid[model.geom(foot.name).id], 0] for foot in feet])

@@ -1,4 +1,4 @@
-"""Walks of many robots at a time in three dimensions that go on step by step."""
+"""Walks of many robots at a time in three dimensions, advanced step by step."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from chilopod.twin.scanner import Scanner, rotation
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-8
-"""Default of the contact solver, MuJoCo's own."""
+"""Default tolerance of the contact solver, MuJoCo's own."""
 
-_LONGEST_STRETCH = 0.6  # s that are stepped without a look, and kept step by step meanwhile
+_LONGEST_STRETCH = 0.6  # s stepped without a check, with every step kept meanwhile
 _MOST_KEPT = 5e7  # numbers, of these steps
 _TARGETS_AHEAD = 2048  # ticks for which servo targets are computed at a time
 _SAME_INSTANT = 1e-9  # ticks
@@ -41,10 +41,10 @@ _STATE = ("time", "qpos", "qvel", "qacc_warmstart", "qfrc_applied")
 
 @one_thread
 class TwinWalk(BatchWalk):
-    """Robots under way on the floor, see :class:`chilopod.engine.Walk`; :func:`chilopod.twin.start` makes one.
+    """Walk on the floor, see :class:`chilopod.engine.Walk`; made by :func:`chilopod.twin.start`.
 
-    Time goes in servo targets (ticks), every control interval: a walk is advanced to the first of them that is not
-    before the time asked for, and commands act from there. A target is seen as in the scanner's last scan.
+    Time advances in ticks, one for each control interval: a walk advances to the first tick that is not before the
+    given time, and commands act from there. Observations of a target come from the scanner's last scan.
     """
 
     def __init__(
@@ -90,13 +90,13 @@ class TwinWalk(BatchWalk):
 
     @property
     def _longest_stretch(self) -> int:
-        """Ticks that are stepped at a time: at least one, and no more than there is memory for."""
+        """Number of ticks stepped at a time: at least one, limited by memory."""
         model, twin = self._plan.model, self._plan.twin
         numbers = model.nq + model.nv + model.nu + model.nsensordata
         most = _MOST_KEPT / (len(self._robots) * self._plan.steps_per_control * numbers)
         if most < 1.0:
             raise ParameterError(
-                f"is {self._plan.steps_per_control:g} steps, more than can be kept of {len(self._robots)} robots",
+                f"must be shorter: no memory for {self._plan.steps_per_control:g} steps of {len(self._robots)} robots",
                 field="twin.control_interval",
                 value=f"{twin.control_interval:g} s",
                 allowed=f"{most * twin.control_interval:.2g} s or less with this timestep",
@@ -105,7 +105,7 @@ class TwinWalk(BatchWalk):
 
     @property
     def status(self) -> tuple[Status, ...]:
-        """One a robot."""
+        """Status of each robot."""
         return tuple(self._status)
 
     def observe(self) -> Observation:
@@ -121,7 +121,7 @@ class TwinWalk(BatchWalk):
         return pose
 
     def aim(self, target: ArrayLike) -> None:
-        """See :class:`chilopod.engine.Walk`; a pole is seen in its new place from where the last scan was taken."""
+        """See :class:`chilopod.engine.Walk`; the last scan is repeated with the pole at its new position."""
         self._targets.move(self._time, target)
         self._put_poles()
 
@@ -142,7 +142,7 @@ class TwinWalk(BatchWalk):
         friction: ArrayLike | None = None,
         seeds: Sequence[int] | None = None,
     ) -> None:
-        """See :class:`chilopod.engine.Walk`; the scanner goes on to scan when it would."""
+        """See :class:`chilopod.engine.Walk`; the times of the scans do not change."""
         arguments = {
             "initial": (initial, (state_size(self._plan, initial),)),
             "friction": (friction, self._factors.shape[1:]),
@@ -150,7 +150,9 @@ class TwinWalk(BatchWalk):
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
         states, ids = rows["initial"], np.flatnonzero(marked)
         if seeds is not None and self._seeds is None:
-            raise ParameterError("this walk has no noise", field="seeds", allowed="None, or seeds at the start")
+            raise ParameterError(
+                "must be None: this walk has no noise", field="seeds", allowed="None, or seeds at the start"
+            )
         if states is None:
             return
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -186,12 +188,12 @@ class TwinWalk(BatchWalk):
                 tick = min(last, self._tick + longest)
                 if len(self._walking):
                     self._step_to(tick)
-                else:  # scans are counted all the same, for whoever is put on the floor anew
+                else:  # scans are counted all the same, for robots that are restarted
                     self._scanner.passed(self._tick, tick, np.empty((0, tick - self._tick, 7)), self._walking)
                 self._tick = tick
         self._time = until
         if not len(self._walking):
-            # Nobody walks on, but the record goes on with nothing.
+            # All robots have stopped; the record continues with NaN.
             for store in self._kept().values():
                 store.grown(self._sampling.count(self._tick * self._plan.steps_per_control))
 
@@ -228,7 +230,7 @@ class TwinWalk(BatchWalk):
         self._put_poles()
 
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
-        """The record so far, see :func:`chilopod.twin.simulate`; without a copy if the walk ends here."""
+        """Record so far, see :func:`chilopod.twin.simulate`; without a copy if the walk ends here."""
         plan, count = self._plan, 0 if self._record is None else len(self._record.samples(self._time))
         positions, rates = (each.grown(0)[:count] for each in (self._positions, self._rates))
         positions, rates = (each.copy() if copy else each for each in (positions, rates))
@@ -239,7 +241,7 @@ class TwinWalk(BatchWalk):
             position=positions[..., :2],
             heading=np.unwrap(_heading(turn), axis=0),
             velocity=rates[..., :2],
-            # Of the free joint, MuJoCo gives the rate of turn in the frame of the body.
+            # MuJoCo gives the angular velocity of the free joint in the frame of the body.
             heading_rate=np.einsum("...j,...j->...", turn[..., 2, :], rates[..., 3:6]),
             joint_angle=positions[..., plan.yaw_positions],
             joint_rate=rates[..., plan.yaw_rates],
@@ -257,7 +259,7 @@ class TwinWalk(BatchWalk):
             shape = (*forces.shape[:2], plan.robot.body.modules, len(SIDES), 3)
             data.coords["module"] = np.arange(1, plan.robot.body.modules + 1)
             over = ("time", "robot", "module", "side")
-            # The sensor gives what the foot does to the floor.
+            # The sensor gives the force of the foot on the floor.
             data["foot_force"] = ((*over, "axis"), -forces.reshape(shape)[..., :2], {"units": "N"})
             data["foot_load"] = (over, -forces.reshape(shape)[..., 2], {"units": "N"})
         if self._record and self._record.poses:
@@ -269,13 +271,13 @@ class TwinWalk(BatchWalk):
     # ---------------------------------------------------------------------------------------------------------------
 
     def _put(self, ids: NDArray[np.intp], states: Array) -> None:
-        """Robots where they are to be; at rest, if states do not say how fast they move."""
+        """Set the states of robots; at rest, if states have no velocities."""
         coordinates = self._plan.model.nq
         self._batch.bind("qpos")[ids] = states[:, :coordinates]
         self._batch.bind("qvel")[ids] = states[:, coordinates:] if states.shape[1] > coordinates else 0.0
 
     def _rub(self) -> None:
-        """Let feet have their friction."""
+        """Set the friction of the feet."""
         plan = self._plan
         self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * self._factors
 
@@ -296,7 +298,7 @@ class TwinWalk(BatchWalk):
         return seen[0], seen[1]
 
     def _put_poles(self) -> None:
-        """Put the poles where the targets are."""
+        """Move the poles to the targets."""
         there, poles = self._targets.there, self._batch.bind("mocap_pos")
         poles[:, 0] = AWAY
         poles[there, 0, :2], poles[there, 0, 2] = self._targets.present[there], 0.0
@@ -325,7 +327,7 @@ class TwinWalk(BatchWalk):
             for store in kept.values():
                 store.grown(0)[samples[at >= step], walking[row]] = np.nan
         if found:
-            # Where a robot that failed is stepped on to hangs on how time is cut: it is put back to where it is made.
+            # The later states of a failed robot depend on the division of time, so it is reset.
             ended = walking[list(found)]
             self._walking = np.delete(walking, list(found))
             batch.reset(ended, stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -345,7 +347,7 @@ class TwinWalk(BatchWalk):
         if self._actuators.driven.any() and len(plan.spring_controls):
             edges = np.arange(self._tick * per_tick, tick * per_tick + 1) * plan.twin.timestep
             change = self._actuators.mean_stiffness(np.asarray(edges, dtype=np.float64)) - self._springs
-            # Robots that were told nothing walk to the same bits whatever the others of the batch were told.
+            # Robots without commands walk to the same bits whatever the others of the batch are commanded.
             change[:, ~self._actuators.driven] = 0.0
             control[..., plan.spring_controls] = np.swapaxes(change, 0, 1)[self._walking]
         return control
@@ -361,7 +363,7 @@ class TwinWalk(BatchWalk):
 
 
 def state_size(plan: TwinModel, initial: ArrayLike | None) -> int:
-    """Numbers of a state: MuJoCo's ``qpos``, with ``qvel`` behind if that was given."""
+    """Length of a state: MuJoCo's ``qpos``, followed by ``qvel`` if given."""
     both = plan.model.nq + plan.model.nv
     return both if initial is not None and as_array("initial", initial).shape[-1:] == (both,) else plan.model.nq
 

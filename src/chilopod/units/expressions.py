@@ -1,12 +1,12 @@
 """Reading and writing quantities: a number and a product of units.
 
-The table of units is closed and small, so this is a page of code instead of a dependency whose import alone would cost
-0.3 s of every command. Three things are done on purpose:
+The table of units is closed and small, so this short module replaces a dependency whose import alone would cost 0.3 s
+of every command. Three design decisions:
 
-- An angle is a dimension of its own. A torsional stiffness is N*m/rad, and "3 N*m" is refused where one is asked for.
+- An angle is a dimension of its own. A torsional stiffness is in N*m/rad, and "3 N*m" is refused for one.
 - Arithmetic is rational, with pi to 50 digits, and rounded once at the end: "41 N*mm/deg" is the double nearest to
   0.041 * 180/pi, and `format` finds the shortest text that `parse` reads back to the same bits.
-- Text is hostile until proven otherwise: length, exponents and nesting are bounded before anything is computed.
+- Text may be hostile: length, exponents and nesting are bounded before anything is computed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _NUMBER: Final = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE]([+-]?
 # An operator or bracket, or a name with its power. Powers have one digit and belong to names, never to brackets, so no
 # text can make a number too big to compute with.
 _TOKEN: Final = re.compile(r"\s*(?:([*/()])|([A-Za-z]+|1)(?:\s*(?:\^|\*\*)\s*([+-]?[0-9]))?(?![0-9]))\s*")
-# The typographic forms people paste from papers.
+# Typographic forms that are common in papers.
 _PLAIN: Final = str.maketrans({"·": "*", "⋅": "*", "×": "*", "µ": "u", "μ": "u", "°": "deg", "²": "^2", "³": "^3"})
 
 
@@ -92,7 +92,7 @@ _PREFIXES: Final = {
     "M": Fraction(10**6),
 }
 _SPELT_OUT: Final = {"degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "sec": "s", "kgs": "kg"}
-# What people ask for by name, and an example each for the error message.
+# Named dimensions, each with an example for the error message.
 _KINDS: Final = {
     (0, 0, 0, 0): "a plain number",
     (1, 0, 0, 0): "a length such as m or cm",
@@ -154,7 +154,7 @@ def parse(value: object, si_unit: str) -> float:
     value
         A number, taken as SI (radians for angles), or text: a number and, unless it is SI, its unit.
     si_unit
-        A unit of the dimension asked for, such as ``N*m/rad``; only its dimension counts.
+        A unit of the required dimension, such as ``N*m/rad``; only its dimension counts.
 
     Returns
     -------
@@ -169,15 +169,15 @@ def parse(value: object, si_unit: str) -> float:
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise UnitError("not a finite number", value=value, allowed=kind)
+            raise UnitError("must be a finite number", value=value, allowed=kind)
         return number
     if not isinstance(value, str):
-        raise UnitError("not a quantity", value=value, allowed=f"{kind}, as a number or as text with its unit")
+        raise UnitError("must be a quantity", value=value, allowed=f"{kind}, as a number or as text with its unit")
     if len(value) > _LONGEST_TEXT:
         raise UnitError("too long for a quantity", value=value, allowed=f"up to {_LONGEST_TEXT} characters")
     match = _NUMBER.fullmatch(value)
     if match is None:
-        raise UnitError("does not start with a finite number", value=value, allowed=kind)
+        raise UnitError("must start with a finite number", value=value, allowed=kind)
     digits, exponent, unit_text = match.groups()
     if exponent and len(exponent) > _LONGEST_EXPONENT:
         raise UnitError("the exponent is out of range", value=value, allowed=kind)
@@ -215,7 +215,7 @@ def format(value: float, unit_text: str, digits: int | None = None) -> str:
         Significant digits; by default the fewest that `parse` reads back to exactly the same double.
     """
     if not math.isfinite(value):
-        raise UnitError("not a finite number", value=value)
+        raise UnitError("must be a finite number", value=value)
     if digits is not None:
         number = f"{from_si(value, unit_text):.{digits}g}"
     elif value == 0.0:

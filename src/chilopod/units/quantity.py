@@ -16,7 +16,7 @@ from chilopod.units.expressions import format, parse
 # Far outside anything that walks, and far inside what products and quotients of a few quantities need to stay finite.
 _SMALLEST: Final = 1e-12
 _LARGEST: Final = 1e9
-# What pydantic says of the few kinds of mistake it finds itself, in the words of a robot file.
+# Messages of pydantic for its own kinds of mistakes, in the words of a robot file.
 _PLAIN_WORDS: Final = {"model_type": "must be a table"}
 
 
@@ -27,11 +27,11 @@ class Quantity:
     Attributes
     ----------
     si
-        SI unit of the value inside, radians for angles; empty for a plain number.
+        SI unit of the stored value, radians for angles; empty for a plain number.
     display
-        Unit it is written in.
+        Unit in robot files and messages.
     at_least, at_most
-        Range in SI units, both ends included. By default positive, and not beyond all reason.
+        Range in SI units, both ends included. By default positive numbers of a plausible size.
     integer
         True if only whole numbers are allowed.
     each
@@ -49,8 +49,8 @@ class Quantity:
     optional: bool = False
 
     def check(self, value: float, given: object = None) -> float:
-        """Return `value` (SI units) if it is in range; an int where whole numbers are asked for. Otherwise the
-        ParameterError shows `given`, what the user wrote, where there is such a thing."""
+        """Return `value` (SI units) if it is in range; an int for whole numbers. Otherwise the ParameterError shows
+        `given`, the user's text, if there is one."""
         if self.at_least <= value <= self.at_most and not (self.integer and value != math.floor(value)):
             return int(value) if self.integer else value
         shown = value if given is None else given
@@ -74,7 +74,7 @@ class Quantity:
         return self.check(parse(value, self.si), given=value)
 
     def read_field(self, value: object) -> Any:
-        """Read what a whole field may hold: a value, a tuple of them, or None."""
+        """Read the value of a whole field: a value, a tuple of them, or None."""
         if value is None and self.optional:
             return None
         if not self.each:
@@ -112,24 +112,24 @@ class Flag(Quantity):
     def check(self, value: float, given: object = None) -> bool:
         """Return whether `value` is 1; a ParameterError if it is neither that nor 0."""
         if value not in (0, 1):
-            raise ParameterError("is neither true nor false", value=value if given is None else given)
+            raise ParameterError("must be true or false", value=value if given is None else given)
         return bool(value)
 
     def read(self, value: object) -> bool:
         """Read true or false, as such or as text."""
         text = str(value).strip().lower()
         if text not in ("true", "false"):
-            raise ParameterError("is neither true nor false", value=value, allowed="true or false")
+            raise ParameterError("must be true or false", value=value, allowed="true or false")
         return text == "true"
 
 
 class Description(BaseModel):
-    """Base of the frozen objects that describe a robot: unknown keys are refused, errors say one line.
+    """Base of the frozen objects that describe a robot; unknown keys are refused, and errors are one line.
 
     Raises
     ------
     UnitError, ParameterError
-        On construction, naming the first field that is wrong.
+        On construction; the message names the first wrong field.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -157,9 +157,9 @@ def is_list(value: object) -> TypeGuard[Collection[Any]]:
 
 
 def _explained(error: ValidationError, model: type[Description]) -> ChilopodError:
-    """Turn pydantic's report into the one error that helps most."""
+    """Turn pydantic's report into the most helpful single error."""
     found = error.errors(include_url=False)
-    # A misspelt key also leaves its right spelling missing; the misspelling is the news.
+    # A misspelt key also leaves its right spelling missing; report the misspelling.
     first = next((item for item in found if item["type"] == "extra_forbidden"), found[0])
     field = ".".join(str(part) for part in first["loc"])
     cause = first.get("ctx", {}).get("error")

@@ -50,6 +50,6 @@ def test_files_of_others_are_not_taken_for_those_of_a_report(tmp_path):
         check_report(tmp_path, [MODE], Size.TINY)
     check_report(tmp_path, [MODE], Size.TINY, replace=True)
     os.mkfifo(tmp_path / "index.html")
-    with pytest.raises(OutputError, match="no regular file"):
+    with pytest.raises(OutputError, match="not a regular file"):
         check_report(tmp_path, [MODE], Size.TINY, replace=True)
     assert not (tmp_path / "new").exists()

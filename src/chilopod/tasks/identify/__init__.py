@@ -1,4 +1,4 @@
-"""Finding constants that are hard to measure, from what a robot's walks came to."""
+"""Identification of constants that are hard to measure, from the results of a robot's walks."""
 
 from typing import TYPE_CHECKING
 

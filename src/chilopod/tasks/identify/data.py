@@ -1,4 +1,4 @@
-"""Data that constants are fitted to: results of a robot's walks, the paper's or one's own."""
+"""Data for the identification of constants: results of a robot's walks, from the paper or the user."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class CriticalMode:
 
 @dataclass(frozen=True)
 class BaseSeries:
-    """Walks of a robot with several first springs: the data that the constants are fitted to.
+    """Walks of a robot with several first springs, to which the constants are fitted.
 
     All springs are in N*mm/deg.
 
@@ -43,10 +43,10 @@ class BaseSeries:
     radii, speeds
         Radius of the curve (m), and speed of module 1 along its way (m/s), at some springs.
     onset
-        Spring at which curves set in, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
+        Spring at the onset of curves, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
     law, shape
-        Bends that evaluations begin near, roughly those of the data: all joints together
-        ``law[0] * sqrt(1/k1 - law[1])`` rad, of which each joint has the share ``shape``, front to rear, (N-1,).
+        Bends at the start of evaluations, roughly those of the data: all joints together ``law[0] * sqrt(1/k1 -
+        law[1])`` rad, of which each joint has the share ``shape``, front to rear, (N-1,).
     tolerance
         Tolerance of radii, speeds and onset, relative.
     """
@@ -78,7 +78,7 @@ class BaseSeries:
         )
 
     def start(self, springs: Sequence[float]) -> Array:
-        """Joint angles that walks begin with, rad, shape (springs, N-1)."""
+        """Joint angles at the start of the walks, rad, shape (springs, N-1)."""
         bend = self.law[0] * np.sqrt(np.maximum(1.0 / np.array(springs) - self.law[1], 0.0))
         angles: Array = np.maximum(bend, 0.1)[:, None] * np.array(self.shape)
         return angles

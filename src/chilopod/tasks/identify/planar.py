@@ -1,7 +1,7 @@
-"""Finding the planar model's constants that are hard to measure, from where the straight walk bends and how.
+"""Identification of the planar model's constants from the pitchfork of the straight walk and its mode.
 
 Foot friction, half-width and forward offset are fitted to the critical k1 and the mode of a robot. Every number is
-weighted by its tolerance: a residual of 1 is exactly what that allows (of printed numbers, half their last digit). The
+weighted by its tolerance: a residual of 1 is equal to the tolerance (for printed numbers half their last digit). The
 range of a constant is the projection of the set in which no residual exceeds 1. The profile over the forward offset
 shows the valley: at each offset the other two make the largest residual as small as it can be.
 """
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""
 
-# Starting points of the fit, in the units of `_scale`: far from the answer on purpose.
+# Starting points of the fit, in the units of `_scale`: far from the answer, so that agreement is meaningful.
 _STARTS = ((0.6, 0.2, 0.15), (1.5, 0.45, 0.3), (0.8, 0.4, 0.1))
 _LEAST, _MOST = np.array([0.05, 0.02, -0.6]), np.array([20.0, 3.0, 1.2])
 """Bounds of the search, in the same units."""
@@ -61,7 +61,7 @@ class Identification(Summary):
     Attributes
     ----------
     given, best
-        The robot as it was given, and with the best constants.
+        The given robot, and the robot with the best constants.
     residuals, preset_residuals
         Critical k1 and the components of the mode less the data, in units of their tolerance, shape (N,), at the best
         constants and for ``given``.
@@ -73,8 +73,8 @@ class Identification(Summary):
     cut
         True where a bound of the search ends a range, shape (3, 2).
     profile
-        Dataset over ``forward_offset``: the fitted constants, the largest residual, and what each point predicts for
-        the numbers that were not fitted.
+        Dataset over ``forward_offset``: the fitted constants, the largest residual, and the predictions of each point
+        for numbers that were not fitted.
     """
 
     given: Robot
@@ -113,7 +113,7 @@ class Identification(Summary):
 
     @property
     def title(self) -> str:
-        """Robot, and how well its constants meet the data."""
+        """Robot, and the largest residual of its constants."""
         largest = np.abs(self.residuals).max()
         return f"{self.given.name}: largest residual {largest:.2f}; 1 is what the tolerances of the data allow"
 
@@ -135,7 +135,7 @@ def residuals(robot: Robot, data: CriticalMode) -> Array:
     """Computed numbers less the data, over their tolerance, shape (N,)."""
     count = len(data.components) + 1
     if robot.body.modules != count:
-        problem = f"the mode of the data is that of {count} modules"
+        problem = f"must be {count}, the number of modules in the mode of the data"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules)
     low, high = data.between
     try:
@@ -170,13 +170,13 @@ def identify_planar(
     Parameters
     ----------
     robot, data
-        Robot, whose free constants are only looked at for comparison, and the data that are fitted.
+        Robot, whose free constants serve only for comparison, and data to fit.
     points
         Points of the profile.
     variants
         Settings of the robot, by name, of which each point of the profile predicts the critical k1.
     progress
-        Called as the work goes on.
+        Function that receives the progress.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def identify_planar(
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     if (best[1] == _NO_PITCHFORK).all():
-        problem = "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted"
+        problem = "must have a pitchfork on its straight walk, and none of the constants tried gives one"
         raise AnalysisError(problem, field="robot", value=robot.name)
     ranges, cut = _ranges(robot, data, best[0])
     progress(0.4, "ranges")

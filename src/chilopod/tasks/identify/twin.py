@@ -1,12 +1,13 @@
-"""Finding the constants of the three-dimensional robot that are hard to measure, from one series of its walks alone.
+"""Identification of constants of the three-dimensional robot from one series of its walks.
 
 The series is walks with several first springs (:class:`chilopod.tasks.identify.BaseSeries`): which of them curve and
 which are straight, how tightly some turn, and where by a square-root fit to the bend of joint 1 the curve sets in.
-Everything else is left to predict. A few numbers and yes-or-no answers do not determine nine constants. Every constant
-therefore has a plausible range, and where the data leave it open its middle is preferred: the misfit to the data plus a
-weak prior is minimised by evolution strategies from several starts, with every evaluation kept. Evaluations begin near
-the bends that the data ask for, which saves the minute that a bend takes to grow; the best is that of those whose walks
-from straight on get there too. All others that meet the data as well say how far the data determine each constant.
+All other results serve as predictions. A few numbers and yes-or-no answers do not determine nine constants. Every
+constant therefore has a plausible range, and its middle is preferred where the data do not determine it: the misfit to
+the data plus a weak prior is minimised by evolution strategies from several starts, with every evaluation kept.
+Evaluations begin near the bends of the data, which saves the minute in which a bend grows; the best is chosen among
+those whose straight starts reach the same bends. The other evaluations that meet the data show how well the data
+determine each constant.
 """
 
 from __future__ import annotations
@@ -40,17 +41,17 @@ from chilopod.tasks.radius_law import end_of_walk
 from chilopod.trials import Trial, run
 
 VERSION = 3
-"""Goes up whenever the same constants would give other bends; evaluations of other versions are left alone."""
+"""Version of evaluations, increased whenever the same constants would give other bends; other versions are ignored."""
 
 GOOD = 1.0
-"""A set of constants does as well as any if its misfit is below this: then each datum is within its tolerance."""
+"""Misfit below which a set of constants is good: each datum is then within its tolerance."""
 
 _PRIOR = 0.25  # of its range: standard deviation of a constant about the middle
 _POPULATION = 10
 _NEAR = 3.5  # misfit of evaluations that a linear law is fitted to
 _REFINED, _STEPS = 12, 3  # evaluations that are refined, and steps of each
 _CLOSE = 0.5  # misfit at which that ends
-_TRIALS = 10  # from straight on, at each of two springs
+_TRIALS = 10  # walks from a straight start at each of two springs
 _MOST_CONFIRMED = 20
 
 
@@ -88,8 +89,8 @@ class Fit:
 
 @dataclass(frozen=True)
 class TwinIdentification(Short):
-    """Result of a search for the constants of the twin: robot with what is not fitted, data, and all evaluations, first
-    the best of those that walk into the curve from straight on, then by their objective."""
+    """Result of a search for the constants of the twin: robot with the constants that are not fitted, data, and all
+    evaluations, first the best of those that reach the curve from a straight start, then by objective."""
 
     given: Robot
     data: BaseSeries
@@ -102,11 +103,11 @@ class TwinIdentification(Short):
 
     @property
     def good(self) -> list[Fit]:
-        """Those that meet the data within their tolerance."""
+        """Fits that meet the data within their tolerance."""
         return [fit for fit in self.fits if fit.misfit <= GOOD]
 
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """From the smallest to the largest value of each constant among the good fits, SI."""
+        """Smallest and largest value of each constant among the good fits, SI."""
         values = np.array([fit.constants for fit in self.good or self.fits[:1]])
         ends = zip(values.min(axis=0).tolist(), values.max(axis=0).tolist(), strict=True)
         return {each.path: span for each, span in zip(FREE, ends, strict=True)}
@@ -133,7 +134,7 @@ class TwinIdentification(Short):
 
 
 def evaluate(robot: Robot, constants: Array, data: BaseSeries, folder: Path | None = None) -> Fit:
-    """Walk the series with a set of constants, or read what came of it before."""
+    """Walk the series with a set of constants, or read an earlier result."""
     given = with_constants(robot, constants)
     series = [data.springs, data.law, data.shape]
     text = json.dumps([VERSION, given.with_(name="robot", provenance={}).to_toml(), series, DURATION])
@@ -142,7 +143,7 @@ def evaluate(robot: Robot, constants: Array, data: BaseSeries, folder: Path | No
     if found is None:
         try:
             found = base_series(given, data)
-        except ChilopodError:  # legs too short, say
+        except ChilopodError:  # legs too short, for example
             lost = np.full((len(data.springs), given.body.modules - 1), np.nan)
             found = Series(lost, lost, lost[:, 0])
         if path is not None:
@@ -168,7 +169,7 @@ def search(
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> list[Fit]:
-    """Look for constants by evolution strategies (CMA-ES) from several starts.
+    """Search for constants by evolution strategies (CMA-ES) from several starts.
 
     Parameters
     ----------
@@ -178,9 +179,9 @@ def search(
         Number of starts, spread over the ranges of the constants, and of generations of ten evaluations from each; seed
         of both.
     folder
-        Folder of the evaluations; a stopped search is resumed, because it asks for the same ones.
+        Folder of the evaluations; a stopped search resumes, because it repeats the same ones.
     progress
-        Called as evaluations are done.
+        Function that receives the progress.
 
     Returns
     -------
@@ -194,22 +195,21 @@ def search(
         bounds = np.tile([0.0, 1.0], (len(FREE), 1))
         strategy = CMA(mean=mean, sigma=0.15, bounds=bounds, population_size=_POPULATION, seed=seed + number)
         for generation in range(generations):
-            told = []
+            results = []
             for _ in range(_POPULATION):
                 parts = strategy.ask()
                 fit = evaluate(robot, values_at(parts), data, kept)
-                told.append((parts, fit.objective))
+                results.append((parts, fit.objective))
                 fits.append(fit)
                 best = min(fits, key=lambda each: each.objective)
                 done = len(fits) / (starts * generations * _POPULATION)
                 progress(done, f"start {number + 1}, generation {generation + 1}: best misfit {best.misfit:.2f}")
-            strategy.tell(told)
+            strategy.tell(results)
     return sorted(fits, key=lambda fit: fit.objective)
 
 
 def unlike(fits: Sequence[Fit], count: int) -> list[Fit]:
-    """The first of some fits, and those that lie farthest from it and from each other, in parts of the constants'
-    ranges."""
+    """The first of some fits, and the fits farthest from it and from each other, relative to the constants' ranges."""
     places = np.array([parts_of(fit.constants) for fit in fits])
     chosen = [0]
     while len(chosen) < min(count, len(fits)):
@@ -226,7 +226,7 @@ def damped_step(law: Array, off: Array, moved: Array | float = 0.0) -> Array:
 
 
 def corrected(law: Array, step: Array, change: Array) -> Array:
-    """The law that is right about a step that was made, and else as it was (Broyden)."""
+    """Linear law corrected by the result of a step (Broyden's update)."""
     better: Array = law + np.outer(change - law @ step, step) / max(float(step @ step), 1e-12)
     return better
 
@@ -234,12 +234,11 @@ def corrected(law: Array, step: Array, change: Array) -> Array:
 def refined(
     robot: Robot, data: BaseSeries, fits: Sequence[Fit], folder: Path | None = None, progress: Progress = silent
 ) -> list[Fit]:
-    """Evaluations on the way from the ``fits`` that are near the data to where they are met; none if too few are near.
+    """Evaluations on the way from ``fits`` near the data to a fit within the tolerances; empty if too few are near.
 
-    From those near that are most unlike each other the constants are moved by damped least squares (Levenberg), along a
-    law of the residuals that is linear in the parts of their ranges: fitted to all that are near, then corrected by
-    what each step finds (Broyden). No step knows of the middle of the ranges, so what is found lies spread along the
-    valley that the data leave open.
+    Starting from the near fits that differ most, damped least squares (Levenberg) move the constants along a linear law
+    of the residuals, which is fitted to all near fits and corrected by every step (Broyden). The steps do not use the
+    middle of the ranges, so the results spread along the valley that the data leave open.
     """
     near = [fit for fit in fits if fit.misfit <= _NEAR]
     if len(near) <= 2 * len(FREE):
@@ -265,7 +264,7 @@ def refined(
 
 
 def known() -> list[Fit]:
-    """The sets of constants that come with chilopod, best first; their residuals are those of the paper's series."""
+    """Sets of constants included in chilopod, best first, with the residuals of the paper's series."""
     text = files("chilopod.tasks.identify").joinpath("twin_fits.json").read_text(encoding="utf-8")
     return [
         Fit(
@@ -277,15 +276,15 @@ def known() -> list[Fit]:
 
 
 def confirmed(robot: Robot, data: BaseSeries) -> bool:
-    """True if walks from straight on end where evaluations begin near: at the stiffest spring that curves most of them
-    in a curve, to both sides, and at the softest that does not most of them straight."""
+    """True if walks from a straight start agree with the data: at the stiffest curved spring most of them curve, to
+    both sides, and at the softest straight spring most of them stay straight."""
     curves, stays = max(data.curved), min(data.straight)
-    asked = [
+    trials = [
         Trial(robot.with_value(K1, stiffness(spring)), LONG, seed, rate=10.0, engine="twin")
         for spring in (curves, stays)
         for seed in range(_TRIALS)
     ]
-    ends = xr.concat([end_of_walk(record, robot) for record in run(asked)], "trial")
+    ends = xr.concat([end_of_walk(record, robot) for record in run(trials)], "trial")
     sides = ends.direction.values.reshape(2, _TRIALS)
     bent = np.isin(sides, ("left", "right")).sum(axis=1)
     return bool(2 * bent[0] > _TRIALS > 2 * bent[1] and {"left", "right"} <= set(sides[0]))
@@ -301,10 +300,10 @@ def identify_twin(
     fresh: bool = False,
     progress: Progress = silent,
 ) -> TwinIdentification:
-    """Find the constants: the known ones first, then a :func:`search`, whose best are :func:`refined`, then the best of
-    all that walk into the curve from straight on, as a robot does.
+    """Identify the constants: the known sets first, then a :func:`search`, whose best are :func:`refined`, then the
+    best of those that reach the curve from a straight start, like the robot.
 
-    With ``fresh`` it begins without the known ones; else see :func:`search`.
+    ``fresh`` ignores the known sets; for the other arguments see :func:`search`.
     """
     engine_named("twin").common(robot)  # refuses a robot without a twin
     kept, fits = None if folder is None else check_folder(folder), []

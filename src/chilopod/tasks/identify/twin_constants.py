@@ -1,4 +1,4 @@
-"""The constants of the whole robot that are hard to measure: which are open, where they are looked for."""
+"""Free constants of the three-dimensional robot, which are hard to measure, and their ranges."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from chilopod.robot import Robot
 
 @dataclass(frozen=True)
 class Constant:
-    """One that is fitted: its path in the robot's description and the ends of its range, SI, evenly searched by its
-    logarithm if ``logarithmic``; both of its ratio to another constant, before it among :data:`FREE`, if ``per`` is
-    given."""
+    """Fitted constant: its path in the robot's description and the ends of its range, SI, on a logarithmic scale if
+    ``logarithmic``; with ``per``, the range is that of its ratio to an earlier constant of :data:`FREE`."""
 
     path: str
     low: float
@@ -72,5 +71,5 @@ def with_constants(robot: Robot, constants: Sequence[float] | Array) -> Robot:
 
 
 def constants_of(robot: Robot) -> Array:
-    """Its values of :data:`FREE`."""
+    """Values of :data:`FREE` of a robot."""
     return np.array([robot.get(path) for path in _PATHS])

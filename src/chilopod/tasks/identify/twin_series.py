@@ -1,4 +1,4 @@
-"""The walks that a robot's constants are fitted to: what they come to, and how far that is from the data."""
+"""Walks for the identification of a robot's constants, their measures and their residuals."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from chilopod.tasks.identify.data import BaseSeries
 from chilopod.twin.walk import TOLERANCE
 
 DURATION = 60.0
-"""s, of the walks."""
+"""Duration of the walks, s."""
 
 LOST = 30.0
-"""Every residual of constants with which the robot does not walk."""
+"""Value of every residual for constants with which the robot cannot walk."""
 
 _SOONER = 36.0  # s, when walks that are far off are given up
 _HOPELESS = 4.0  # misfit
@@ -50,12 +50,12 @@ def base_series(
     engine: str = "twin",
     duration: float = DURATION,
 ) -> Series:
-    """Walk a series, or other values of k1, N*mm/deg, from near the bends that its data ask for, with a tolerance of
-    the contact solver, in the twin or one that is edited, see :class:`chilopod.twin.Edited`, for a duration, s.
+    """Walk a series, or other values of k1, N*mm/deg, from starts near the bends of its data, with a tolerance of the
+    contact solver, in the twin or an edited one, see :class:`chilopod.twin.Edited`, for a duration, s.
 
-    Walks of all springs of the data that are far off after 36 s are left there.
+    Walks of all springs of the data stop after 36 s if they are far off by then.
     """
-    walks: Any = engine_named(engine)  # with arguments that only the twin knows
+    walks: Any = engine_named(engine)  # with arguments that only the twin has
     robots = [robot.with_value(K1, stiffness(spring)) for spring in springs or data.springs]
     initial = walks.initial_states(robot, data.start(springs or data.springs))
     record = Recording(rate=_PER_CYCLE / robot.gait.period)
@@ -84,7 +84,7 @@ def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
     """Residuals of a series: computed less the data, one number for each of ``data.names``.
 
     These are radii, speeds and onset (each over the tolerance of it); bend where the robot is straight beyond 0.1 rad
-    in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the same); motion between the
+    in all (over 0.05 rad); the deficit from 0.3 rad at the stiffest curved spring (over the same); motion between the
     averages beyond 0.1 rad (over 0.1 rad).
     """
     springs = data.springs
