@@ -167,7 +167,8 @@ def planar(
 
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
-    from chilopod.show import files_of, identification_files
+    from chilopod.paper.straight.identification import identification_files
+    from chilopod.show import files_of
     from chilopod.tasks.identify import identify_planar
 
     free([*files_of("identification", out), *_identified(out)], force)

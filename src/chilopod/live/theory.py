@@ -32,26 +32,14 @@ _GROWTH = 30.0  # s that a short question may take
 
 @dataclass(frozen=True)
 class Theory:
-    """Theory of a robot with any first spring; None where something is not known, with a remark that says why.
-
-    Attributes
-    ----------
-    robot
-        The robot.
-    pitchfork
-        First spring below which the straight walk gives way, N*m/rad.
-    springs, radii, stable
-        Curved walks from there on: first spring (N*m/rad), radius (m) and True if the walk is stable, (points,).
-    law
-        Radius law of the springs, for strategies.
-    """
+    """Theory of a robot with any first spring; None where something is not known, with a remark that says why."""
 
     robot: Robot | None = None
-    pitchfork: float | None = None
-    springs: Array = field(default_factory=lambda: np.empty(0))
-    radii: Array = field(default_factory=lambda: np.empty(0))
-    stable: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
-    law: RadiusLaw | None = None
+    pitchfork: float | None = None  # first spring below which the straight walk gives way, N*m/rad
+    springs: Array = field(default_factory=lambda: np.empty(0))  # of the curved walks from there on, N*m/rad, (points,)
+    radii: Array = field(default_factory=lambda: np.empty(0))  # of these walks, m
+    stable: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # True if the walk is stable
+    law: RadiusLaw | None = None  # radius law of the springs, for strategies
     remark: str = ""
 
     def settled(self, spring: float) -> float | None:

@@ -26,22 +26,13 @@ DRAWN = 200
 
 @dataclass(frozen=True)
 class RadiusRatio:
-    """Radius of a variant over that of the robot as built.
+    """Radius of a variant over that of the robot as built; NaN where nothing is in common."""
 
-    Attributes
-    ----------
-    distance, distance_error
-        At equal distances from each one's own onset, with its standard error; NaN if they have no distance in common.
-    springs, springs_error, compared
-        At equal springs, mean over those (``compared``, N*mm/deg) at which two trials of both curve; NaN if there is
-        none.
-    """
-
-    distance: float
-    distance_error: float
-    springs: float
+    distance: float  # at equal distances from each one's own onset
+    distance_error: float  # standard error
+    springs: float  # at equal springs, mean over those compared
     springs_error: float
-    compared: tuple[float, ...]
+    compared: tuple[float, ...]  # springs at which two trials of both curve, N*mm/deg
 
 
 def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed: int = 0) -> RadiusRatio:

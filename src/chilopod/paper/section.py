@@ -44,46 +44,25 @@ class Size(Enum):
 
 @dataclass(frozen=True)
 class Context:
-    """Ground that sections are computed from.
+    """Ground that sections are computed from; the paper's numbers are those of ``aoi2022-planar`` and ``aoi2022``."""
 
-    Attributes
-    ----------
-    robot, whole
-        Robot of the planar model, and whole robot of the sections in three dimensions, with a twin; the paper's numbers
-        are those of ``aoi2022-planar`` and ``aoi2022``.
-    size, folder
-        Amount of every computation, and folder of the records of trials, with which a stopped computation is resumed;
-        without one nothing is kept.
-    """
-
-    robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))
-    whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))
-    size: Size = Size.FULL
-    folder: Path | None = None
+    robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))  # of the planar model
+    whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))  # of the sections in three dimensions
+    size: Size = Size.FULL  # amount of every computation
+    folder: Path | None = None  # of the records of trials, by which a stopped computation is resumed
 
 
 @dataclass(frozen=True)
 class Movie:
-    """A film of walks side by side.
+    """A film of walks side by side."""
 
-    Attributes
-    ----------
-    name, heading, titles
-        Name of its files, heading above all panels, and titles of these.
-    speed, stills
-        Seconds of the walks per second of the film, and moments of it that are pictured in three dimensions, s; none of
-        a film from above.
-    size
-        Width and height of a film from above, pixels; that of three panels in a row.
-    """
-
-    name: str
-    heading: str
-    titles: tuple[str, ...]
+    name: str  # of its files
+    heading: str  # above all panels
+    titles: tuple[str, ...]  # of the panels
     record: xr.Dataset
-    speed: float
-    stills: tuple[float, ...] = ()
-    size: tuple[int, int] = (1280, 320)
+    speed: float  # seconds of the walks per second of the film
+    stills: tuple[float, ...] = ()  # moments of it that are pictured in three dimensions, s; none of a film from above
+    size: tuple[int, int] = (1280, 320)  # of a film from above, pixels; that of three panels in a row
 
 
 def nothing(*found: object) -> Sequence[Any]:

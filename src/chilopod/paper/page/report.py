@@ -16,9 +16,9 @@ from chilopod.errors import OutputError
 from chilopod.output import check_files, check_folder, write_atomic
 from chilopod.paper.page.page import Drawn, Film, Shown, State, page
 from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size
+from chilopod.paper.straight import schematic
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
-from chilopod.show.figures import schematic
 from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
 from chilopod.show.scene.encoder import has_encoder

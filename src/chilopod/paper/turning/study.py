@@ -46,30 +46,17 @@ ROUGH_SPRINGS = (6, 7, 8, 8.5, 9, 9.5, 10, 11, 12, 13, 15, 21)
 
 @dataclass(frozen=True)
 class Turning:
-    """Everything the turning studies found.
-
-    Attributes
-    ----------
-    robot, laws, tasks
-        The robot, its radius laws, and the paper's two tasks, by letter.
-    hopf, rough, hopf_point
-        Task A with uniform springs, and with a disturbance :data:`ROUGH` times as large; the Neimark-Sacker point of
-        uniform springs, N*mm/deg.
-    without
-        Task A with and without leg yaw, at the best spring and at the law's.
-    settled, farther
-        See :func:`settled_start` and :func:`farther_targets`.
-    """
+    """Everything the turning studies found."""
 
     robot: Robot
     laws: RadiusLaws
-    tasks: Mapping[str, TurningTask]
-    hopf: TurningTask
-    rough: TurningTask
-    hopf_point: float
-    without: xr.Dataset
-    settled: xr.Dataset
-    farther: xr.Dataset
+    tasks: Mapping[str, TurningTask]  # the paper's two, by letter
+    hopf: TurningTask  # task A with uniform springs
+    rough: TurningTask  # task A with a disturbance :data:`ROUGH` times as large
+    hopf_point: float  # Neimark-Sacker point of uniform springs, N*mm/deg
+    without: xr.Dataset  # task A with and without leg yaw, at the best spring and at the law's
+    settled: xr.Dataset  # see :func:`settled_start`
+    farther: xr.Dataset  # see :func:`farther_targets`
 
 
 def turning(context: Context, progress: Progress = silent) -> Turning:

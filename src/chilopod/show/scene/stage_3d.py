@@ -65,29 +65,15 @@ def framing(points: ArrayLike, aspect: float) -> View:
 
 @dataclass(frozen=True)
 class Look:
-    """Appearance of a robot in a picture.
+    """Appearance of a robot in a picture."""
 
-    Attributes
-    ----------
-    pose
-        MuJoCo's ``qpos``; None shows the floor alone.
-    stands
-        True for each foot on the floor, (N, 2).
-    walks
-        False of a robot that has failed: it is pale.
-    path, target
-        Path of module 1 so far, (P, 2), and place of the target, (2,), or None, m.
-    radius, arrived
-        Radius of arrival, m, and True if the target has been reached.
-    """
-
-    pose: Array | None
-    stands: NDArray[np.bool_]
-    walks: bool
-    path: Array
-    target: Array | None
-    radius: float
-    arrived: bool
+    pose: Array | None  # MuJoCo's ``qpos``; None shows the floor alone
+    stands: NDArray[np.bool_]  # True for each foot on the floor, (N, 2)
+    walks: bool  # False of a robot that has failed: it is pale
+    path: Array  # of module 1 so far, m, (P, 2)
+    target: Array | None  # its place, m, (2,)
+    radius: float  # of arrival, m
+    arrived: bool  # True if the target has been reached
 
 
 class Studio:
