@@ -99,7 +99,6 @@ class Controls:
         self.words.content = f"**This page has failed**: {why}"
 
     # -- parts of the panel
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _slide(self, gui: viser.GuiApi) -> None:
         """Every slider, those of a folder in it."""
@@ -188,7 +187,6 @@ class Controls:
         gui.add_command("Help", hotkey="H").on_trigger(self._help)
 
     # -- what they do
-    # ---------------------------------------------------------------------------------------------------------------
 
     def drag(self, joint: int, aside: float, ended: bool) -> None:
         """Pull a joint that is dragged aside, m to the left, until it is let go."""

@@ -85,7 +85,8 @@ def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None
             law = radius_law(
                 robot, engine, progress=lambda done, words: told(replace(known, remark=_share(done, "how it turns")))
             )
-            told(_of_law(known, law))
+            stable = np.ones(len(law.values), dtype=np.bool_)
+            told(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
     except ChilopodError as error:
         told(replace(known, remark=error.problem))
 
@@ -123,18 +124,6 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
     except ChilopodError as error:
         known = replace(known, remark=error.problem)
     told(known)
-
-
-def _of_law(known: Theory, law: RadiusLaw) -> Theory:
-    values, radii = law.values[::-1], law.radii[::-1]
-    return replace(
-        known,
-        pitchfork=law.pitchfork,
-        springs=values,
-        radii=radii,
-        stable=np.ones(len(values), dtype=np.bool_),
-        law=law,
-    )
 
 
 def _share(done: float, what: str) -> str:

@@ -48,10 +48,7 @@ def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool =
     """The sections asked for, by default all but those that are computed on request, in the order they are computed; a
     quick report leaves out some that are not named, and one of the paper what goes beyond its own experiments.
 
-    Raises
-    ------
-    ParameterError
-        If one of them does not exist, or goes beyond the paper's own experiments though only these are asked for.
+    A ParameterError if one of them does not exist, or goes beyond though only the paper's are asked for.
     """
     sections = {section.name: section for section in load_sections()}
     if only is None:

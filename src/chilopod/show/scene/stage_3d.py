@@ -109,13 +109,7 @@ class Studio:
         self.context.free()
 
     def picture(self, look: Look, view: View) -> Pixels:
-        """Pixels of shape (height, width, 3); the next picture overwrites them.
-
-        Raises
-        ------
-        ParameterError
-            If the pose is not one of this robot.
-        """
+        """Pixels of shape (height, width, 3), overwritten by the next; a ParameterError for another robot's pose."""
         model, data, scene = self.model, self.data, self.scene
         if look.pose is not None:
             if look.pose.shape != data.qpos.shape:
