@@ -106,7 +106,7 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
 
 
 def _computed(options: ReportOptions, sections: list[Section[Any]]) -> tuple[Found, Report, Exception | None]:
-    """What was found, its report, and the error that stopped it, if one did."""
+    """Results, their report, and the error that stopped the work, if one did."""
     from chilopod.errors import OutputError
     from chilopod.paper import section as computed
     from chilopod.paper.page import Report, check_report

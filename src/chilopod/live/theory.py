@@ -104,13 +104,11 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
     loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
     known = replace(known, pitchfork=loss.point.value)
     told(replace(known, remark="following the curved walks"))
-    walks = curved_walks(
-        robot,
-        K1,
-        (low, high),
-        side=-1,
-        progress=lambda done, words: told(replace(known, remark=_share(done, "following the curved walks"))),
-    )
+
+    def follow(done: float, words: str) -> None:
+        told(replace(known, remark=_share(done, "following the curved walks")))
+
+    walks = curved_walks(robot, K1, (low, high), side=-1, progress=follow)
     possible = walks.verdict.values != Status.OUT_OF_RANGE.label
     known = replace(
         known,

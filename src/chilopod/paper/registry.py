@@ -57,13 +57,8 @@ def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool =
     asked = list(only)
     for name in asked:
         if name not in sections:
-            raise ParameterError(
-                "no such section",
-                field="only",
-                value=name,
-                allowed=", ".join(sections),
-                nearest=nearest_name(name, sections),
-            )
+            near, allowed = nearest_name(name, sections), ", ".join(sections)
+            raise ParameterError("no such section", field="only", value=name, allowed=allowed, nearest=near)
     found = [section for name, section in sections.items() if name in asked]
     for section in found:
         if paper and section.beyond:

@@ -173,19 +173,9 @@ def undulations(
     bootstrap; NaN if they determine no point.
     """
     wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(robot.body.modules - 1) * np.pi / 2.0))
-    records = measures.spring_walks(
-        robot,
-        springs,
-        duration,
-        repeats=repeats,
-        seeds=measures.spring_seeds(springs),
-        parameter=ALL,
-        folder=folder,
-        progress=progress,
-        joint_angles=wave,
-        engine=engine,
-        rate=_PER_CYCLE / robot.gait.period,
-    )
+    walk: dict[str, Any] = {"joint_angles": wave, "engine": engine, "rate": _PER_CYCLE / robot.gait.period}
+    walk |= {"seeds": measures.spring_seeds(springs), "folder": folder, "progress": progress}
+    records = measures.spring_walks(robot, springs, duration, repeats=repeats, parameter=ALL, **walk)
     shape, last, amplitudes = (len(springs), repeats), round(_WINDOW / robot.gait.period), []
     for record in records:
         angles = record.joint_angle.isel(robot=0).transpose("time", "joint").values[1:]

@@ -78,7 +78,7 @@ def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
             (shown[1], 0.17, style.ORANGE, "D", "white", (0, (3, 2)), 2, "robot, paper"),
         ):
             axes[letter].hlines(rows + shift, 0.0, values, color=color, lw=1.6, linestyle=line)
-            look = {"color": color, "markersize": 8, "markeredgewidth": 1.8, "markerfacecolor": fill}
+            look: dict[str, Any] = {"color": color, "markersize": 8, "markeredgewidth": 1.8, "markerfacecolor": fill}
             axes[letter].plot(values, rows + shift, marker, label=label, **look)
             for value, row in list(zip(values, rows + shift, strict=True))[letter == "B" :]:
                 text = number(value, digits) if letter == "A" else f"{signed(value)} %"
@@ -251,7 +251,7 @@ def _bent_body(axes: Axes, components: np.ndarray) -> None:
         draw_joints(axes, joints, style.BLACK)
         draw_heading(axes, centres[0], headings[0], 1.0, color)
         tip = centres[0] + 1.25 * np.array([np.cos(headings[0]), np.sin(headings[0])])
-        axes.text(*tip, f"turns\n{side}", ha="center", va="bottom" if tip[1] > 0.0 else "top")
+        axes.text(tip[0], tip[1], f"turns\n{side}", ha="center", va="bottom" if tip[1] > 0.0 else "top")
         top = max(top, abs(tip[1]))
     draw_heading(axes, straight[0][0], 0.0, 1.0, style.GREY)
     axes.text(straight[0][0, 0] + 0.6, -0.3, "straight,\nunstable", va="top", ha="left", fontsize=style.SMALL)

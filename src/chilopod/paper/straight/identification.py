@@ -70,6 +70,10 @@ def _valley(fit: Identification) -> str:
     )
 
 
+def _variants_of(data: xr.Dataset) -> list[str]:
+    return [name for name in printed.VARIANTS if name in data]
+
+
 def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
     if not inside.any():
         return "So nothing can be said of numbers that were not fitted."
@@ -80,7 +84,7 @@ def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
 
     return (
         "What does that leave open? Along the shaded valley the variants, which were not fitted, move little: "
-        + listing(f"{span(name)} for {typeset(name)}" for name in printed.VARIANTS)
+        + listing(f"{span(name)} for {typeset(name)}" for name in _variants_of(data))
         + f" (all in {SPRING_UNIT}). The critical spring of a uniform body moves much more: "
         f"{span('uniform')} {SPRING_UNIT}. That one number, had it been printed for the planar "
         "model, would narrow the forward offset."
@@ -146,15 +150,15 @@ def _mark(axes: dict[str, Axes], robot: Robot, residuals: Array, marker: str, **
 
 def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
     axes.set_title("Not fitted: variants")
-    for index, name in enumerate(printed.VARIANTS):
+    for index, name in enumerate(_variants_of(data)):
         values = data[name].values
         axes.plot(x, values, color=style.CURVES[index], linestyle=("-", "--", "-.")[index % 3])
         # Curves rise: there is room above the left of the highest and below the right of the others.
         place, away, ha, va = len(x) // 3, -5, "left", "top"
-        if name == max(printed.VARIANTS, key=lambda each: float(data[each].mean())):
+        if name == max(_variants_of(data), key=lambda each: float(data[each].mean())):
             place, away, ha, va = int(0.75 * len(x)), 5, "right", "bottom"
         style.note(axes, typeset(name), (x[place], values[place]), (0, away), ha=ha, va=va)
-    values = np.array([data[name].values for name in printed.VARIANTS])
+    values = np.array([data[name].values for name in _variants_of(data)])
     axes.set(ylim=(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5), ylabel=f"critical k₁ ({SPRING_UNIT})")
 
 

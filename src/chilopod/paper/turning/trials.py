@@ -94,10 +94,8 @@ def turning_task(
     target: Target,
     springs: Sequence[float] = SPRINGS,
     repeats: int = printed.REPEATS,
-    strategy: str = "pitchfork",
     *,
     time: float | None = None,
-    duration: float = DURATION,
     shown: Sequence[float] | None = None,
     folder: Folder = None,
     progress: Progress = silent,
@@ -106,21 +104,21 @@ def turning_task(
     """Walk towards a target with every spring (N*mm/deg), several times, with the seeds 0, 1, ...
 
     Epsilon 1 to 3 are taken at ``time`` (s), by default the earliest arrival of any of these trials, as in the paper,
-    and ``duration`` if none arrives. That is the duration of every trial, s, at least the paper's. ``shown`` are the
-    springs of ``paths`` (N*mm/deg), ``walk`` other fields of the trials, such as their engine and disturbance.
+    and their duration if none arrives. ``shown`` are the springs of ``paths`` (N*mm/deg). ``walk`` is the rest of
+    :func:`to_target`: strategy, duration (s, at least the paper's), engine, disturbance.
     """
     asked: list[Trial] = []
     for spring in springs:
-        one = to_target(robot, target, spring, strategy, duration=duration, **walk)
+        one = to_target(robot, target, spring, **walk)
         asked += [replace(one, seed=seed) for seed in range(repeats)]
     record = trials.together(trials.run(asked, folder, progress))
-    earliest = earliest_arrival(record)
+    earliest, duration = earliest_arrival(record), asked[0].duration
     when = time if time is not None else earliest if np.isfinite(earliest) else duration
     criteria = _criteria(record, (when, DURATION), springs, repeats)
     criteria.attrs = {
         "robot": robot.name,
         "target": str(target),
-        "strategy": strategy,
+        "strategy": walk.get("strategy", "pitchfork"),
         "duration_s": duration,
         "earliest_arrival_s": earliest,
         "radius_m": target.radius,

@@ -99,11 +99,8 @@ def robot_of(record: xr.Dataset) -> Robot:
         raise ParameterError("has no robot", field="record", allowed="the text of a robot file in attrs['robot']")
     robot = Robot.from_toml(record.attrs["robot"])
     if record.sizes["joint"] != robot.body.modules - 1:
-        raise ParameterError(
-            f"has {record.sizes['joint']} joints",
-            field="record",
-            allowed=f"{robot.body.modules - 1}, those of its robot",
-        )
+        allowed = f"{robot.body.modules - 1}, those of its robot"
+        raise ParameterError(f"has {record.sizes['joint']} joints", field="record", allowed=allowed)
     return robot
 
 

@@ -31,11 +31,11 @@ def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
     plan = compiled(shown.frames.robot)
     found = record["pose"].transpose("time", "robot", "coordinate")
     if found.sizes["coordinate"] != plan.model.nq:
-        raise ParameterError(
+        problem, allowed = (
             f"has poses of {found.sizes['coordinate']} coordinates",
-            field="record",
-            allowed=f"{plan.model.nq}, those of its robot",
+            f"{plan.model.nq}, those of its robot",
         )
+        raise ParameterError(problem, field="record", allowed=allowed)
     poses = _continued(found.sel(time=shown.frames.time).values, _quaternions(plan.model))
     origin, step = _scale(shown, poses)
     steps = packed(poses, origin, step)

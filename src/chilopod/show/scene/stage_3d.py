@@ -113,12 +113,8 @@ class Studio:
         model, data, scene = self.model, self.data, self.scene
         if look.pose is not None:
             if look.pose.shape != data.qpos.shape:
-                raise ParameterError(
-                    "does not go with its robot",
-                    field="pose",
-                    value=look.pose.size,
-                    allowed=f"{data.qpos.size} numbers",
-                )
+                allowed = f"{data.qpos.size} numbers"
+                raise ParameterError("does not go with its robot", field="pose", value=look.pose.size, allowed=allowed)
             data.qpos[:] = look.pose
         strength = 1.0 if look.walks else _PALE
         stands, swings = to_rgb(COLORS["ink"]), to_rgb(COLORS["air"])
