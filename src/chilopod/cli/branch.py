@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import (
-    OutOption,
-    ParameterOption,
-    RobotOptions,
-    deliver,
-    free,
-    interval,
-    print_json,
-    with_options,
-)
+from chilopod.cli import options as shared
+from chilopod.cli.options import OutOption, ParameterOption, RobotOptions, print_json, with_options
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -75,7 +67,7 @@ def branch(
     """
     described = options.described
     chosen = between or (None if resume else _BETWEEN)
-    limits = interval(described, parameter, chosen) if chosen else None
+    limits = shared.interval(described, parameter, chosen) if chosen else None
     from chilopod.analysis.branch import as_json as plain
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
 
@@ -86,7 +78,7 @@ def branch(
     if folder:
         from chilopod.show import files_of
 
-        free(files_of("branch", folder), replace)
+        shared.free(files_of("branch", folder), replace)
     with progress_bar("branch") as show:
         how: dict[str, Any] = {"points": points, "longest": longest, "progress": partial(show, "branch")}
         if saved is None:
@@ -100,7 +92,7 @@ def branch(
 
         return write_branch(data, folder, replace=replace) if folder else []
 
-    deliver(write, lambda: print_json(plain(data)) if options.as_json else typer.echo("\n".join(_lines(data))))
+    shared.deliver(write, lambda: print_json(plain(data)) if options.as_json else typer.echo("\n".join(_lines(data))))
 
 
 def _lines(data: xr.Dataset) -> list[str]:
@@ -108,22 +100,15 @@ def _lines(data: xr.Dataset) -> list[str]:
 
     unit, about = data.parameter.attrs["units"], data.attrs
     agrees = "confirms" if about["direction_confirms"] == "yes" else "does not confirm"
-    cells = [(unit, "axis radius (m)", "path radius (m)", "speed (m/s)", "cost of transport", "stability")]
+    head = (unit, "axis radius (m)", "path radius (m)", "speed (m/s)", "cost of transport", "stability")
+    cells: list[tuple[str, ...]] = [head]
     for i in range(data.sizes["point"]):
         at = data.isel(point=i)
         special, verdict = str(at.special.values), str(at.verdict.values)
         # At a special point a multiplier is 1, and nothing else is to be said of stability.
         shown = special if special and verdict == "undecided" else ", ".join(filter(None, (special, verdict)))
-        radii = f"{float(at.axis_radius):.4g}", f"{float(at.path_radius):.4g}"
-        cells.append(
-            (
-                f"{float(at.parameter):.6g}",
-                *radii,
-                f"{float(at.speed):.4g}",
-                f"{float(at.cost_of_transport):.3g}",
-                shown,
-            )
-        )
+        numbers = (f"{float(value):.4g}" for value in (at.axis_radius, at.path_radius, at.speed))
+        cells.append((f"{float(at.parameter):.6g}", *numbers, f"{float(at.cost_of_transport):.3g}", shown))
     return [
         f"{about['robot']}: curved walks over {about['varied']}; the branch ends: {about['ending']}",
         f"  the normal form says {about['criticality']}; the direction in which the branch leaves {agrees} it",

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import traceback
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,101 +24,77 @@ from chilopod.cli.options import (
     print_json,
     read_robot,
     walking_on,
+    with_options,
 )
 from chilopod.cli.progress import progress_bar
 from chilopod.paper.registry import REGISTRY, chosen
 
 if TYPE_CHECKING:
-    from chilopod.paper.table import RobotRow, Row
+    from chilopod.output import Content
+    from chilopod.paper.page import Report
+    from chilopod.paper.section import Found, Section
     from chilopod.robot import Robot
+
+    Files = Iterable[tuple[Path, bytes]]
 
 PRESET, WHOLE = "aoi2022-planar", "aoi2022"
 
 identify_app = new_app("Find constants of a model from measured or printed numbers.")
 
 
-def reproduce(
-    ctx: typer.Context,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--only",
-            metavar="SECTION",
-            help=f"Just this section; may be repeated: {', '.join(REGISTRY)}.",
-            autocompletion=lambda: list(REGISTRY),
-        ),
-    ] = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
-    ] = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False,
-    tiny: Annotated[
-        bool, typer.Option("--tiny", help="Hardly anything of every section: to see that all works, not what it finds.")
-    ] = False,
-    paper: Annotated[
-        bool, typer.Option("--paper", help="The paper's own experiments, not what goes beyond them.")
-    ] = False,
-    cluster: ClusterOption = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
-    overrides: Annotated[list[str] | None, typer.Option("--set", hidden=True)] = None,
-) -> None:
+OnlyOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--only",
+        metavar="SECTION",
+        help=f"Just this section; may be repeated: {', '.join(REGISTRY)}.",
+        autocompletion=lambda: list(REGISTRY),
+    ),
+]
+ReportOption = Annotated[
+    Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
+]
+TinyOption = Annotated[
+    bool, typer.Option("--tiny", help="Hardly anything of every section: to see that all works, not what it finds.")
+]
+PaperOption = Annotated[bool, typer.Option("--paper", help="The paper's own experiments, not what goes beyond them.")]
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """Options of ``reproduce``, as they were typed."""
+
+    only: OnlyOption = None
+    out: ReportOption = Path("report")
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False
+    tiny: TinyOption = False
+    paper: PaperOption = False
+    cluster: ClusterOption = None
+    force: ForceOption = False
+    as_json: JsonOption = False
+    overrides: Annotated[list[str] | None, typer.Option("--set", hidden=True)] = None
+
+
+@with_options
+def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
     """Repeat the paper with its planar model and with its robot in 3-D, and write a report beside its own numbers.
 
     The page is there at once and fills in. Trials are kept in the folder, so a run that was stopped goes on where it
     was. It takes no robot and no --set: the numbers beside which it puts its own are those of the paper's robot.
     """
-    if overrides:
+    if options.overrides:
         from chilopod.errors import ParameterError
 
         raise ParameterError(
             "reproduce changes nothing about the robot: the paper's numbers are those of the paper's",
-            value=overrides[0],
+            value=options.overrides[0],
             allowed="no --set; stability, bifurcation, branch, walk and turn take any robot",
         )
-    sections = chosen(only, quick or tiny, paper)  # refuses an unknown section
-    from chilopod.errors import OutputError, in_words
-    from chilopod.paper import section as computed
-    from chilopod.paper.page import Report, check_report
-    from chilopod.paper.section import Context, Found, Section, Size
+    sections = chosen(options.only, options.quick or options.tiny, options.paper)  # refuses an unknown section
+    from chilopod.errors import in_words
 
-    size = Size.TINY if tiny else Size.QUICK if quick else Size.FULL
-    check_report(out, sections, size, replace=force)
-    context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, out / "trials")
-    found, stopped = Found(context), None
-
-    def add(now: Found, section: Section[Any]) -> None:
-        nonlocal found
-        found = now
-        report.add(now, [section])
-
-    try:
-        with (
-            walking_on(cluster),
-            progress_bar("reproduce") as progress,
-            Report(sections, context, out, progress) as report,
-        ):
-            typer.echo(f"The page is {report.page.resolve()}", err=as_json)
-            computed.reproduce(sections, context, progress, add)
-    except OutputError as error:
-        if not found.values:
-            raise
-        stopped = error  # what was found is printed all the same
-    rows, robot_rows = [row for part in found.planar_rows().values() for row in part], found.robot_rows()
-    if as_json:
-        print_json(
-            {
-                "robot": context.robot.name,
-                "whole_robot": context.whole.name,
-                "report": str(report.page),
-                "rows": [row.data() for row in rows],
-                "robot_rows": [row.data() for row in robot_rows],
-                "seconds": {section.name: value for section, value in found.seconds.items()},
-                "failures": {section.name: in_words(failure) for section, failure in report.failures.items()},
-            }
-        )
-    else:
-        _print(rows, robot_rows, report.page)
+    found, report, stopped = _computed(options, sections)
+    _print(options, found, report)
     for section, failure in report.failures.items():
         typer.echo(f"failed: {section.sentence}: {in_words(failure)}", err=True)
         if ctx.find_root().params.get("debug"):
@@ -126,21 +105,61 @@ def reproduce(
         raise typer.Exit(1)
 
 
-def _print(rows: list[Row], robot_rows: list[RobotRow], page: Path) -> None:
+def _computed(options: ReportOptions, sections: list[Section[Any]]) -> tuple[Found, Report, Exception | None]:
+    """Results, their report, and the error that stopped the work, if one did."""
+    from chilopod.errors import OutputError
+    from chilopod.paper import section as computed
+    from chilopod.paper.page import Report, check_report
+    from chilopod.paper.section import Context, Found, Size
+
+    size = Size.TINY if options.tiny else Size.QUICK if options.quick else Size.FULL
+    check_report(options.out, sections, size, replace=options.force)
+    context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, options.out / "trials")
+    found, stopped = Found(context), None
+
+    def add(now: Found, section: Section[Any]) -> None:
+        nonlocal found
+        found = now
+        report.add(now, [section])
+
+    try:
+        with (
+            walking_on(options.cluster),
+            progress_bar("reproduce") as progress,
+            Report(sections, context, options.out, progress) as report,
+        ):
+            typer.echo(f"The page is {report.page.resolve()}", err=options.as_json)
+            computed.reproduce(sections, context, progress, add)
+    except OutputError as error:
+        if not found.values:
+            raise
+        stopped = error  # what was found is printed all the same
+    return found, report, stopped
+
+
+def _print(options: ReportOptions, found: Found, report: Report) -> None:
+    from chilopod.errors import in_words
+
+    rows, robot_rows = [row for part in found.planar_rows().values() for row in part], found.robot_rows()
+    if options.as_json:
+        print_json(
+            {
+                "robot": found.context.robot.name,
+                "whole_robot": found.context.whole.name,
+                "report": str(report.page),
+                "rows": [row.data() for row in rows],
+                "robot_rows": [row.data() for row in robot_rows],
+                "seconds": {section.name: value for section, value in found.seconds.items()},
+                "failures": {section.name: in_words(failure) for section, failure in report.failures.items()},
+            }
+        )
+        return
     for row in rows:
-        typer.echo(f"{row.verdict:<12} {row.quantity}")
-        typer.echo(f"{'':<12}   paper: {row.paper}")
-        typer.echo(f"{'':<12}   here:  {row.computed.words}")
+        _print_row(row.verdict, row.quantity, {"paper": row.paper, "here": row.computed.words})
     for line in robot_rows:
-        typer.echo(f"{line.verdict:<12} {line.quantity} ({line.kind})")
-        typer.echo(f"{'':<12}   robot:  {line.robot}")
-        if line.twin:
-            typer.echo(f"{'':<12}   twin:   {line.twin.words}")
-        if line.planar:
-            typer.echo(f"{'':<12}   planar: {'; '.join(each.words for each in line.planar)}")
-    typer.echo("")
-    typer.echo(f"The report is {page}")
-    typer.echo("Next, try:")
+        said = {name: line.data()[name] for name in ("robot", "twin", "planar")}
+        _print_row(line.verdict, f"{line.quantity} ({line.kind})", said)
+    typer.echo(f"\nThe report is {report.page}\nNext, try:")
     for command in (
         "chilopod stability aoi2022-planar",
         'chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]" --between "2 N*mm/deg" "75 N*mm/deg"',
@@ -148,6 +167,14 @@ def _print(rows: list[Row], robot_rows: list[RobotRow], page: Path) -> None:
         "chilopod robot new my.toml --modules 8",
     ):
         typer.echo(f"  {command}")
+
+
+def _print_row(verdict: str, quantity: str, said: dict[str, str]) -> None:
+    typer.echo(f"{verdict:<12} {quantity}")
+    width = max(map(len, said)) + 1
+    for who, words in said.items():
+        if words:
+            typer.echo(f"{'':<12}   {who + ':':<{width}} {words}")
 
 
 @identify_app.command(short_help="Constants of the planar model from printed numbers.")
@@ -163,44 +190,36 @@ def planar(
 
     Writes the profile over the forward offset as a figure and as data, and the robot with the best constants.
     """
-    from chilopod.output import write_all
 
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
-    from chilopod.show import files_of, identification_files
+    from chilopod.paper.straight.identification import identification_files
+    from chilopod.show import files_of
     from chilopod.tasks.identify import identify_planar
 
     free([*files_of("identification", out), *_identified(out)], force)
     with progress_bar("identification") as progress:
-        found = identify_planar(
-            described,
-            critical_mode_data(),
-            points,
-            variant_settings(),
-            lambda done, words: progress("identification", done, words),
-        )
-    result = {"robot": described.name, **found.as_json()}
-
-    def write() -> list[Path]:
-        texts = zip(_identified(out), _texts(result, found.best), strict=True)
-        return write_all(chain(texts, identification_files(found, out)), replace=force)
-
-    def show() -> None:
-        if as_json:
-            print_json(result)
-            return
-        typer.echo("\n".join([*found.lines(), f"profile, figure and robot file are in {out}"]))
-
-    deliver(write, show)
+        told = partial(progress, "identification")
+        found = identify_planar(described, critical_mode_data(), points, variant_settings(), told)
+    lines = [*found.lines(), f"profile, figure and robot file are in {out}"]
+    result, more = {"robot": described.name, **found.as_json()}, identification_files(found, out)
+    _deliver(out, result, found.best, lines, more, force=force, as_json=as_json)
 
 
 def _identified(folder: Path) -> tuple[Path, Path]:
     return folder / "identification.json", folder / "identified.toml"
 
 
-def _texts(result: dict[str, Any], best: Robot) -> tuple[str, str]:
-    """Texts of the files of :func:`_identified`."""
-    return json_text(result) + "\n", best.with_(name="identified").to_toml()
+def _deliver(
+    out: Path, result: dict[str, Any], best: Robot, lines: list[str], more: Files = (), *, force: bool, as_json: bool
+) -> None:
+    """Write a result, the robot with the best constants and more files, and print it."""
+    from chilopod.output import write_all
+
+    texts = json_text(result) + "\n", best.with_(name="identified").to_toml()
+    files: Iterable[tuple[Path, Content]] = chain(zip(_identified(out), texts, strict=True), more)
+    show = partial(print_json, result) if as_json else partial(typer.echo, "\n".join(lines))
+    deliver(lambda: write_all(files, replace=force), show)
 
 
 @identify_app.command(short_help="Constants of the 3-D robot from the paper's walks.")
@@ -224,7 +243,7 @@ def twin(
     Half an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
     was, and with --force one that has ended goes on with more. The preset aoi2022 is what this finds by default.
     """
-    from chilopod.output import check_folder, write_all
+    from chilopod.output import check_folder
 
     described = read_robot(robot, overrides)
     free(_identified(out), force)
@@ -232,31 +251,14 @@ def twin(
     from chilopod.tasks.identify import identify_twin
 
     with progress_bar("identification") as progress:
-        found = identify_twin(
-            described,
-            base_series_data(),
-            starts,
-            generations,
-            seed,
-            check_folder(out / "evaluations"),
-            fresh,
-            lambda done, words: progress("identification", done, words),
-        )
+        kept, told = check_folder(out / "evaluations"), partial(progress, "identification")
+        found = identify_twin(described, base_series_data(), starts, generations, seed, kept, fresh, told)
     result = {"robot": described.name, **found.as_json()}
-
-    def show() -> None:
-        if as_json:
-            print_json(result)
-            return
-        for name, value in result["constants"].items():
-            typer.echo(f"{name} = {value['text']}  (fits as good: {value['good_fits_text']})")
-        typer.echo(
-            f"misfit {result['misfit']:.2f} (1: every datum within 5 %), {result['good']} of {result['evaluations']} "
-            "evaluations are below 1"
-        )
-        typer.echo(f"fits and robot file are in {out}")
-
-    deliver(
-        lambda: write_all(zip(_identified(out), _texts(result, found.best), strict=True), replace=force),
-        show,
-    )
+    constants = result["constants"].items()
+    lines = [
+        *(f"{name} = {value['text']}  (fits as good: {value['good_fits_text']})" for name, value in constants),
+        f"misfit {result['misfit']:.2f} (1: every datum within 5 %), {result['good']} of {result['evaluations']} "
+        "evaluations are below 1",
+        f"fits and robot file are in {out}",
+    ]
+    _deliver(out, result, found.best, lines, force=force, as_json=as_json)

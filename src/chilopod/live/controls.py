@@ -99,7 +99,6 @@ class Controls:
         self.words.content = f"**This page has failed**: {why}"
 
     # -- parts of the panel
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _slide(self, gui: viser.GuiApi) -> None:
         """Every slider, those of a folder in it."""
@@ -124,24 +123,14 @@ class Controls:
         self._pause = gui.add_button("Pause (space)")
         self._pause.on_click(lambda _: self._toggle_pause())
         gui.add_button("One gait cycle (N)").on_click(lambda _: self._put(wishes.Step(1.0)))
-        self._seed: Any = gui.add_number(
-            "seed",
-            self._settings.seed,
-            min=0,
-            max=wishes.LARGEST_SEED,
-            step=1,
-            hint="Seed of the start and of the nudges",
-        )
+        hint, largest = "Seed of the start and of the nudges", wishes.LARGEST_SEED
+        self._seed: Any = gui.add_number("seed", self._settings.seed, min=0, max=largest, step=1, hint=hint)
         gui.add_button("Begin anew (R)").on_click(lambda _: self._put(wishes.Reset(self._seed.value)))
 
     def _targets(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Target", expand_by_default=False):
-            self._strategy: Any = gui.add_dropdown(
-                "strategy",
-                list(ON_THE_WAY),
-                initial_value=self._settings.strategy,
-                hint="Way of steering to the target",
-            )
+            names, hint = list(ON_THE_WAY), "Way of steering to the target"
+            self._strategy: Any = gui.add_dropdown("strategy", names, initial_value=self._settings.strategy, hint=hint)
             self._strategy.on_update(lambda _: self._put(wishes.Steering(self._strategy.value)))
             hint = "Angle of the target from the heading, left positive, deg"
             self._bearing: Any = gui.add_number("bearing", 45.0, min=-360.0, max=360.0, step=5.0, hint=hint)
@@ -188,7 +177,6 @@ class Controls:
         gui.add_command("Help", hotkey="H").on_trigger(self._help)
 
     # -- what they do
-    # ---------------------------------------------------------------------------------------------------------------
 
     def drag(self, joint: int, aside: float, ended: bool) -> None:
         """Pull a joint that is dragged aside, m to the left, until it is let go."""

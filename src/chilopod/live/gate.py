@@ -104,7 +104,6 @@ class Gate:
         return serve(handler, *where, process_request=partial(self._answer, process_request), **how)
 
     # -- requests
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _answer(self, answer: Any, connection: ServerConnection, request: Request) -> Response | None:
         host = _only(request.headers.get_all("Host")) or ""
@@ -165,7 +164,6 @@ class Gate:
             _LOG.warning("the page refused %s; what else it refuses is only counted", what)
 
     # -- messages
-    # ---------------------------------------------------------------------------------------------------------------
 
     def message(self, connection: ServerConnection, raw: Any) -> bytes | None:
         """Checked part of a message, written down anew for viser to read; None if it is refused."""

@@ -84,7 +84,6 @@ class View:
             visible=False,
             **plain,
         )
-        self._centre = np.zeros(3)
         server.initial_camera.position = (-0.9 * length, -1.0 * length, 0.9 * length)
         server.initial_camera.look_at = (0.1 * length, 0.0, 0.0)
 

@@ -169,7 +169,6 @@ class Live:
                 self._server.stop()
 
     # -- the thread of the walk
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
@@ -277,7 +276,6 @@ class Live:
             self._controls.words.content = text
 
     # -- recordings
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _recorder(self, client: viser.ClientHandle | None) -> None:
         self._wants_record = client
@@ -317,7 +315,6 @@ class Live:
             self._send(*self.undelivered.pop(0), client)
 
     # -- what browsers do in the picture; these only leave wishes
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _follow(self, follow: bool) -> None:
         self._view.follow = follow

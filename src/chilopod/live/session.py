@@ -102,27 +102,25 @@ class Session:
         self._begin()
 
     # -- what there is
-    # ---------------------------------------------------------------------------------------------------------------
 
     def seen(self) -> Seen:
         """State of the walk now."""
-        looked = self._walk.observe()
-        means = np.array(self._looks).mean(axis=0)
+        walk, looked = self._walk, self._walk.observe()
         return Seen(
-            self._before + self._walk.time,
-            self._walk.time,
-            self._walk.robots[0],
-            self._walk.status[0],
-            self._walk.pose()[0],
+            self._before + walk.time,
+            walk.time,
+            walk.robots[0],
+            walk.status[0],
+            walk.pose()[0],
             looked.joint_angles[0],
             looked.stiffness[0],
             looked.leg_yaw[0],
-            means,
+            np.array(self._looks).mean(axis=0),
             self._turning(),
             self._pull.copy(),
             self._target,
             self._steering,
-            self._walk.states()[0],
+            walk.states()[0],
         )
 
     def said(self) -> list[str]:
@@ -137,7 +135,6 @@ class Session:
         return records
 
     # -- what is done
-    # ---------------------------------------------------------------------------------------------------------------
 
     def obey(self) -> bool:
         """Grant all wishes, or say why not; True if there was one."""
@@ -171,7 +168,6 @@ class Session:
         self._keep_record()
 
     # -- inside
-    # ---------------------------------------------------------------------------------------------------------------
 
     @property
     def _walks(self) -> bool:

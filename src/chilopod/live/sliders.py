@@ -21,42 +21,22 @@ _SOFTEST, _STIFFEST = 0.05, 1.5  # of the stiffest spring of the file
 
 @dataclass(frozen=True)
 class Slider:
-    """A number of the walk that can be changed while it goes on.
+    """A number of the walk that can be changed while it goes on."""
 
-    Attributes
-    ----------
-    name
-        Name in wishes; of a number of the robot file its path there.
-    label, hint
-        Words beside the slider, and those that appear where the mouse rests on it.
-    unit, si
-        Unit at the page, and unit of all values here.
-    limits, step
-        Smallest and largest value, and the step in the unit of the page.
-    read, apply
-        Function of settings: their value; and of settings and a value: settings with it.
-    keys
-        Hot keys that make the value smaller and larger by the factor, each with what it does in words.
-    moves
-        Names of the sliders that follow this one at the page.
-    folder
-        Folder of the panel, empty for none.
-    """
-
-    name: str
-    label: str
-    hint: str
-    unit: str
-    si: str
-    limits: tuple[float, float]
-    step: float
-    read: Callable[[Settings], float]
-    apply: Callable[[Settings, float], Settings]
-    keys: tuple[tuple[str, str], ...] = ()
-    shift: bool = False
-    factor: float = 1.1
-    moves: tuple[str, ...] = ()
-    folder: str = ""
+    name: str  # in wishes; of a number of the robot file its path there
+    label: str  # words beside the slider
+    hint: str  # words that appear where the mouse rests on it
+    unit: str  # at the page
+    si: str  # unit of all values here
+    limits: tuple[float, float]  # smallest and largest value
+    step: float  # in the unit of the page
+    read: Callable[[Settings], float]  # value of settings
+    apply: Callable[[Settings, float], Settings]  # settings with a value
+    keys: tuple[tuple[str, str], ...] = ()  # hot keys: smaller, larger, each with its words
+    shift: bool = False  # True if the keys are pressed with shift
+    factor: float = 1.1  # by which a key changes the value
+    moves: tuple[str, ...] = ()  # names of the sliders that follow this one at the page
+    folder: str = ""  # of the panel, empty for none
 
     def at_page(self, value: float) -> float:
         """A value in the unit of the page."""

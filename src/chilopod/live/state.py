@@ -18,50 +18,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Seen:
-    """State of a walk at an instant.
+    """State of a walk at an instant; a robot has N modules."""
 
-    Attributes
-    ----------
-    time, clock
-        Time since the last reset, and time of the gait, which is at phase 0 at 0; s.
-    robot
-        Robot that walks, with its floor and steps; its springs may have changed since.
-    status
-        Status of the walk, ``WALKED`` while it goes on.
-    pose
-        x, y (m) and heading (rad) of module 1.
-    joint_angles, stiffness
-        Joint angles (rad) and stiffness (N*m/rad) of the yaw joints, (N-1,).
-    leg_yaw
-        Leg yaw of the legs of module 1, rad, (2,).
-    mean_angles
-        Mean angles of the joints over the last gait cycle, rad, (N-1,).
-    turning
-        Rate at which the sum of their sizes grows, rad/s.
-    pulled
-        Torques by which somebody pulls at joints, N*m, (N-1,).
-    target
-        Place of the target, m; None without one.
-    steering
-        Name of the strategy that steers there, which is leg yaw while those of springs are not known; else empty.
-    state
-        State as ``initial`` of the engine's ``start`` takes it, (n,).
-    """
-
-    time: float
-    clock: float
-    robot: Robot
-    status: Status
-    pose: Array
-    joint_angles: Array
-    stiffness: Array
-    leg_yaw: Array
-    mean_angles: Array
-    turning: float
-    pulled: Array
-    target: tuple[float, float] | None
-    steering: str
-    state: Array
+    time: float  #: s since the last reset
+    clock: float  #: s, of the gait, which is at phase 0 at 0
+    robot: Robot  #: with its floor and steps; its springs may have changed since
+    status: Status  #: WALKED while it goes on
+    pose: Array  #: x, y (m) and heading (rad) of module 1
+    joint_angles: Array  #: rad, (N-1,)
+    stiffness: Array  #: of the yaw joints, N*m/rad, (N-1,)
+    leg_yaw: Array  #: of the legs of module 1, rad, (2,)
+    mean_angles: Array  #: of the joints over the last gait cycle, rad, (N-1,)
+    turning: float  #: rate at which the sum of their sizes grows, rad/s
+    pulled: Array  #: torques by which somebody pulls at joints, N*m, (N-1,)
+    target: tuple[float, float] | None  #: m
+    steering: str  #: name of the strategy that steers there: leg yaw while those of springs are not known; else ""
+    state: Array  #: as ``initial`` of the engine's ``start`` takes it, (n,)
 
     @property
     def bend(self) -> float:
@@ -71,27 +43,15 @@ class Seen:
 
 @dataclass(frozen=True)
 class Settings:
-    """Wishes that were granted.
+    """Wishes that were granted."""
 
-    Attributes
-    ----------
-    robot
-        Robot with the springs, floor and steps that it is to walk with.
-    friction
-        Friction of the floor, relative to that of the file.
-    strategy, speed, paused, seed
-        Name of the strategy, seconds of walking a second, True if it stands still, and seed of start and nudges.
-    recording
-        True if the walk is being recorded, or about to be.
-    """
-
-    robot: Robot
-    friction: float
-    strategy: str
-    speed: float
-    paused: bool
-    seed: int
-    recording: bool
+    robot: Robot  #: with the springs, floor and steps that it is to walk with
+    friction: float  #: of the floor, relative to that of the file
+    strategy: str  #: name of one of :data:`chilopod.steering.ON_THE_WAY`
+    speed: float  #: seconds of walking a second
+    paused: bool  #: True if it stands still
+    seed: int  #: of start and nudges
+    recording: bool  #: True if the walk is being recorded, or about to be
 
 
 def but_springs(robot: Robot) -> tuple[object, ...]:

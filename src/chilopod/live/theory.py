@@ -32,26 +32,14 @@ _GROWTH = 30.0  # s that a short question may take
 
 @dataclass(frozen=True)
 class Theory:
-    """Theory of a robot with any first spring; None where something is not known, with a remark that says why.
-
-    Attributes
-    ----------
-    robot
-        The robot.
-    pitchfork
-        First spring below which the straight walk gives way, N*m/rad.
-    springs, radii, stable
-        Curved walks from there on: first spring (N*m/rad), radius (m) and True if the walk is stable, (points,).
-    law
-        Radius law of the springs, for strategies.
-    """
+    """Theory of a robot with any first spring; None where something is not known, with a remark that says why."""
 
     robot: Robot | None = None
-    pitchfork: float | None = None
-    springs: Array = field(default_factory=lambda: np.empty(0))
-    radii: Array = field(default_factory=lambda: np.empty(0))
-    stable: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
-    law: RadiusLaw | None = None
+    pitchfork: float | None = None  # first spring below which the straight walk gives way, N*m/rad
+    springs: Array = field(default_factory=lambda: np.empty(0))  # of the curved walks from there on, N*m/rad, (points,)
+    radii: Array = field(default_factory=lambda: np.empty(0))  # of these walks, m
+    stable: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # True if the walk is stable
+    law: RadiusLaw | None = None  # radius law of the springs, for strategies
     remark: str = ""
 
     def settled(self, spring: float) -> float | None:
@@ -97,7 +85,8 @@ def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None
             law = radius_law(
                 robot, engine, progress=lambda done, words: told(replace(known, remark=_share(done, "how it turns")))
             )
-            told(_of_law(known, law))
+            stable = np.ones(len(law.values), dtype=np.bool_)
+            told(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
     except ChilopodError as error:
         told(replace(known, remark=error.problem))
 
@@ -115,13 +104,11 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
     loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
     known = replace(known, pitchfork=loss.point.value)
     told(replace(known, remark="following the curved walks"))
-    walks = curved_walks(
-        robot,
-        K1,
-        (low, high),
-        side=-1,
-        progress=lambda done, words: told(replace(known, remark=_share(done, "following the curved walks"))),
-    )
+
+    def follow(done: float, words: str) -> None:
+        told(replace(known, remark=_share(done, "following the curved walks")))
+
+    walks = curved_walks(robot, K1, (low, high), side=-1, progress=follow)
     possible = walks.verdict.values != Status.OUT_OF_RANGE.label
     known = replace(
         known,
@@ -135,18 +122,6 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
     except ChilopodError as error:
         known = replace(known, remark=error.problem)
     told(known)
-
-
-def _of_law(known: Theory, law: RadiusLaw) -> Theory:
-    values, radii = law.values[::-1], law.radii[::-1]
-    return replace(
-        known,
-        pitchfork=law.pitchfork,
-        springs=values,
-        radii=radii,
-        stable=np.ones(len(values), dtype=np.bool_),
-        law=law,
-    )
 
 
 def _share(done: float, what: str) -> str:

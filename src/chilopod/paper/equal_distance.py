@@ -1,12 +1,10 @@
 """How tightly a variant of a robot turns, like with like: at an equal distance from where its own curved walks set in.
 
 By the square-root law the bend is A sqrt(1/k1 - 1/k*): two robots of equal A that set in at different k* turn alike at
-equal 1/k1 - 1/k*, and at equal springs the one that sets in at a softer spring turns more widely. The ratio of the
-amplitudes A of two fits would do if the law held; it is only the first term of a series, the bend saturates, and fits
-over different ranges then differ in A where the walks do not. So the measured bends themselves are compared: squared,
-as they are nearly linear in 1/k1 then, joined by straight lines, over the distances at which there are trials of both.
-Only the onsets come from fits, to the summed bend of the trials of each. These move with saturation too, but both to
-stiffer springs, so that little of it remains in the ratio.
+equal 1/k1 - 1/k*. The ratio of the amplitudes A of two fits would do if the law held, but the bend saturates. So the
+measured bends themselves are compared: squared, as they are nearly linear in 1/k1 then, joined by straight lines, over
+the distances at which there are trials of both. Only the onsets come from fits, to the summed bend of the trials of
+each; these move with saturation too, but both to stiffer springs, so that little of it remains in the ratio.
 """
 
 from __future__ import annotations
@@ -26,22 +24,13 @@ DRAWN = 200
 
 @dataclass(frozen=True)
 class RadiusRatio:
-    """Radius of a variant over that of the robot as built.
+    """Radius of a variant over that of the robot as built; NaN where nothing is in common."""
 
-    Attributes
-    ----------
-    distance, distance_error
-        At equal distances from each one's own onset, with its standard error; NaN if they have no distance in common.
-    springs, springs_error, compared
-        At equal springs, mean over those (``compared``, N*mm/deg) at which two trials of both curve; NaN if there is
-        none.
-    """
-
-    distance: float
-    distance_error: float
-    springs: float
+    distance: float  # at equal distances from each one's own onset
+    distance_error: float  # standard error
+    springs: float  # at equal springs, mean over those compared
     springs_error: float
-    compared: tuple[float, ...]
+    compared: tuple[float, ...]  # springs at which two trials of both curve, N*mm/deg
 
 
 def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed: int = 0) -> RadiusRatio:

@@ -40,18 +40,11 @@ def spring_walks(
     progress: Progress = silent,
     **walk: Any,
 ) -> list[xr.Dataset]:
-    """Records of walks with some springs, one spring after the other.
+    """Records of walks with some springs (N*mm/deg; a stiffness by its path), one spring after the other.
 
-    Parameters
-    ----------
-    springs, parameter
-        Values of a stiffness, N*mm/deg, and its path.
-    duration
-        Duration of all walks, or of those with each spring, s.
-    repeats, seeds
-        Number of walks with each spring, and seed of the first of them, from which the others count up; by default 0.
-    walk
-        Other fields of :class:`chilopod.trials.Trial`.
+    All walks last as long (s), or those with each spring. ``repeats`` is the number of walks with each spring,
+    ``seeds`` are those of the first of them (0 by default), from which the others count up; ``walk`` are other fields
+    of :class:`chilopod.trials.Trial`.
     """
     durations = np.broadcast_to(duration, len(springs)).tolist()
     asked = [

@@ -48,10 +48,7 @@ def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool =
     """The sections asked for, by default all but those that are computed on request, in the order they are computed; a
     quick report leaves out some that are not named, and one of the paper what goes beyond its own experiments.
 
-    Raises
-    ------
-    ParameterError
-        If one of them does not exist, or goes beyond the paper's own experiments though only these are asked for.
+    A ParameterError if one of them does not exist, or goes beyond though only the paper's are asked for.
     """
     sections = {section.name: section for section in load_sections()}
     if only is None:
@@ -60,13 +57,8 @@ def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool =
     asked = list(only)
     for name in asked:
         if name not in sections:
-            raise ParameterError(
-                "no such section",
-                field="only",
-                value=name,
-                allowed=", ".join(sections),
-                nearest=nearest_name(name, sections),
-            )
+            near, allowed = nearest_name(name, sections), ", ".join(sections)
+            raise ParameterError("no such section", field="only", value=name, allowed=allowed, nearest=near)
     found = [section for name, section in sections.items() if name in asked]
     for section in found:
         if paper and section.beyond:

@@ -44,46 +44,25 @@ class Size(Enum):
 
 @dataclass(frozen=True)
 class Context:
-    """Ground that sections are computed from.
+    """Ground that sections are computed from; the paper's numbers are those of ``aoi2022-planar`` and ``aoi2022``."""
 
-    Attributes
-    ----------
-    robot, whole
-        Robot of the planar model, and whole robot of the sections in three dimensions, with a twin; the paper's numbers
-        are those of ``aoi2022-planar`` and ``aoi2022``.
-    size, folder
-        Amount of every computation, and folder of the records of trials, with which a stopped computation is resumed;
-        without one nothing is kept.
-    """
-
-    robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))
-    whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))
-    size: Size = Size.FULL
-    folder: Path | None = None
+    robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))  # of the planar model
+    whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))  # of the sections in three dimensions
+    size: Size = Size.FULL  # amount of every computation
+    folder: Path | None = None  # of the records of trials, by which a stopped computation is resumed
 
 
 @dataclass(frozen=True)
 class Movie:
-    """A film of walks side by side.
+    """A film of walks side by side."""
 
-    Attributes
-    ----------
-    name, heading, titles
-        Name of its files, heading above all panels, and titles of these.
-    speed, stills
-        Seconds of the walks per second of the film, and moments of it that are pictured in three dimensions, s; none of
-        a film from above.
-    size
-        Width and height of a film from above, pixels; that of three panels in a row.
-    """
-
-    name: str
-    heading: str
-    titles: tuple[str, ...]
+    name: str  # of its files
+    heading: str  # above all panels
+    titles: tuple[str, ...]  # of the panels
     record: xr.Dataset
-    speed: float
-    stills: tuple[float, ...] = ()
-    size: tuple[int, int] = (1280, 320)
+    speed: float  # seconds of the walks per second of the film
+    stills: tuple[float, ...] = ()  # moments of it that are pictured in three dimensions, s; none of a film from above
+    size: tuple[int, int] = (1280, 320)  # of a film from above, pixels; that of three panels in a row
 
 
 def nothing(*found: object) -> Sequence[Any]:
@@ -93,39 +72,20 @@ def nothing(*found: object) -> Sequence[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Section(Generic[T]):
-    """A part of the report: something that is computed, its lines of the tables, its figures and films.
+    """A part of the report: something that is computed, its lines of the tables, its figures and films."""
 
-    Attributes
-    ----------
-    name, chapter, sentence
-        Name on the command line, chapter of the page, and description in a few words.
-    compute
-        Computation, given the context, where to say how far it is, and the results of what the section needs.
-    rows
-        Lines of the tables, given what was computed and the results of what the section needs.
-    panels, films
-        Figure or figures, given what was computed and the results of the sections beside it; films, given what was
-        computed.
-    needs, beside
-        Sections whose results it uses, which come before it, and sections whose results its figures show, which are
-        drawn once more when these are computed. A result that was not computed is None.
-    beyond, on_request, full
-        True if it goes beyond the paper's own experiments, if it is computed only if it is asked for by name, and if it
-        is left out of a quick report unless it is asked for by name.
-    """
-
-    name: str
-    chapter: str
-    sentence: str
-    compute: Callable[..., T]
-    rows: Callable[..., Sequence[Line]] = nothing
-    panels: Callable[..., Panel | Iterable[Panel]] = nothing
-    films: Callable[[T], Iterable[Movie]] = nothing
-    needs: tuple[Section[Any], ...] = ()
-    beside: tuple[Section[Any], ...] = ()
-    beyond: bool = False
-    on_request: bool = False
-    full: bool = False
+    name: str  # on the command line
+    chapter: str  # of the page
+    sentence: str  # description in a few words
+    compute: Callable[..., T]  # of the context, where to say how far it is, and the results of what it needs
+    rows: Callable[..., Sequence[Line]] = nothing  # of what was computed and the results of what it needs
+    panels: Callable[..., Panel | Iterable[Panel]] = nothing  # of what was computed, and of the sections beside it
+    films: Callable[[T], Iterable[Movie]] = nothing  # of what was computed
+    needs: tuple[Section[Any], ...] = ()  # come before it
+    beside: tuple[Section[Any], ...] = ()  # shown in its figures, which are drawn again when they are there
+    beyond: bool = False  # beyond the paper's own experiments
+    on_request: bool = False  # computed only if it is asked for by name
+    full: bool = False  # left out of a quick report unless it is asked for by name
 
     def figures(self, found: Found) -> list[Panel]:
         """Figures of what was found."""
@@ -135,21 +95,13 @@ class Section(Generic[T]):
 
 @dataclass
 class Found:
-    """Results by section: ``found[section]`` is its result, None if there is none.
+    """Results by section: ``found[section]`` is its result, None if there is none."""
 
-    Attributes
-    ----------
-    context
-        Ground of the computation.
-    values, rows, seconds, failures
-        Results, lines of the tables, durations (s) and errors of the sections that were computed, or could not be.
-    """
-
-    context: Context = field(default_factory=Context)
-    values: dict[Section[Any], Any] = field(default_factory=dict)
-    rows: dict[Section[Any], Sequence[Line]] = field(default_factory=dict)
-    seconds: dict[Section[Any], float] = field(default_factory=dict)
-    failures: dict[Section[Any], Exception] = field(default_factory=dict)
+    context: Context = field(default_factory=Context)  # of the computation
+    values: dict[Section[Any], Any] = field(default_factory=dict)  # results
+    rows: dict[Section[Any], Sequence[Line]] = field(default_factory=dict)  # lines of the tables
+    seconds: dict[Section[Any], float] = field(default_factory=dict)  # durations
+    failures: dict[Section[Any], Exception] = field(default_factory=dict)  # errors of those that could not be computed
 
     def __getitem__(self, section: Section[T]) -> T | None:
         return self.values.get(section)
@@ -193,17 +145,9 @@ def reproduce(
 ) -> Found:
     """Compute sections of the report; one that fails does not keep the others from being computed.
 
-    Parameters
-    ----------
-    sections, context
-        See :func:`chilopod.paper.registry.chosen`; by default of the paper's robots.
-    progress, told
-        Called as the work goes on, and after every section with all that is found by then, and the section.
-
-    Raises
-    ------
-    OutputError
-        If trials cannot be kept.
+    ``sections`` are those of :func:`chilopod.paper.registry.chosen`, the context by default that of the paper's robots.
+    ``progress`` is called as the work goes on, ``told`` after every section with all that is found by then, and the
+    section. An OutputError is raised if trials cannot be kept.
     """
     found = Found(context or Context())
     for section in sections:

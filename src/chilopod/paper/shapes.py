@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 import xarray as xr
@@ -29,7 +29,7 @@ JOINTS: Final = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 """Layouts of the paper's Fig. "absolute"."""
 
 
-def finish(axes: Axes, grid: str = "both", legend: Any = None, **look: Any) -> None:
+def finish(axes: Axes, grid: Literal["both", "x", "y"] = "both", legend: Any = None, **look: Any) -> None:
     """Labels, title and limits of axes, lines to read values by, and a legend if a place for it is given."""
     axes.set(**look)
     style.grid(axes, grid)

@@ -44,22 +44,13 @@ def within(answer: Answer) -> Verdict:
 
 @dataclass(frozen=True)
 class Result:
-    """Result of a computation.
+    """Result of a computation."""
 
-    Attributes
-    ----------
-    text
-        Words, for what is not one number, or with more than its number; by default the number with its error and unit.
-    value, error, unit, digits
-        Number that is compared, its standard error or the bound of its error (NaN where there is none), its unit, and
-        how many decimals are shown.
-    """
-
-    text: str = ""
-    value: float = np.nan
-    error: float = np.nan
+    text: str = ""  # for what is not one number, or with more than it; by default the number with error and unit
+    value: float = np.nan  # that is compared
+    error: float = np.nan  # its standard error or the bound of its error, NaN where there is none
     unit: str = ""
-    digits: int = 2
+    digits: int = 2  # decimals that are shown
 
     @property
     def words(self) -> str:
@@ -74,23 +65,14 @@ class Result:
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table paper | planar model.
+    """A line of the table paper | planar model."""
 
-    Attributes
-    ----------
-    quantity, paper, where
-        Subject of the line, statement of the paper in words (it says so where the paper prints none), and its place
-        there.
-    computed, verdict, remark
-        Result of the computation, verdict of the comparison, and reason for a difference, if there is one.
-    """
-
-    quantity: str
-    paper: str
+    quantity: str  # subject of the line
+    paper: str  # statement of the paper in words; it says so where the paper prints none
     computed: Result
-    where: str
+    where: str  # its place there
     verdict: Verdict
-    remark: str = ""
+    remark: str = ""  # reason for a difference, if there is one
 
     def data(self) -> dict[str, Any]:
         """The line as plain data, with the result in words and as a number."""
@@ -141,26 +123,16 @@ class OfPlanar:
 
 @dataclass(frozen=True)
 class RobotRow:
-    """A line of the table robot | twin | planar model.
-
-    Attributes
-    ----------
-    statement, quantity, robot
-        Statement of the paper's robot, its subject, with the reading of it if there are several, and its words.
-    twin, planar
-        Results of both; empty where nothing was computed.
-    kind, verdict, asked
-        One of :class:`Kind`, verdict on the twin, and condition for a verdict of *within*.
-    """
+    """A line of the table robot | twin | planar model; results are empty where nothing was computed."""
 
     statement: Statement[Said]
-    quantity: str
-    robot: str
+    quantity: str  # subject, with the reading of the statement if there are several
+    robot: str  # words of the statement
     twin: Result | None
     planar: tuple[Result, ...]
-    kind: str
-    verdict: Verdict
-    asked: str
+    kind: str  # one of :class:`Kind`
+    verdict: Verdict  # on the twin
+    asked: str  # condition for a verdict of *within*
 
     def data(self) -> dict[str, Any]:
         """The line as plain data, with results in words and as numbers."""

@@ -9,26 +9,14 @@ from chilopod.lazy import exports
 logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 if TYPE_CHECKING:
-    from chilopod.show.files import (
-        files_of,
-        identification_files,
-        write_branch,
-        write_identification,
-        write_undulation,
-    )
+    from chilopod.show.files import files_of, write_branch, write_undulation
     from chilopod.show.scene.played import Replay, replay
     from chilopod.show.walked import files_of_walks, write_walks
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "files": (
-                "files_of",
-                "identification_files",
-                "write_branch",
-                "write_identification",
-                "write_undulation",
-            ),
+            "files": ("files_of", "write_branch", "write_undulation"),
             "scene.played": ("Replay", "replay"),
             "walked": ("files_of_walks", "write_walks"),
         },
@@ -38,10 +26,8 @@ __all__ = [
     "Replay",
     "files_of",
     "files_of_walks",
-    "identification_files",
     "replay",
     "write_branch",
-    "write_identification",
     "write_undulation",
     "write_walks",
 ]

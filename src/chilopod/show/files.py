@@ -10,25 +10,13 @@ import xarray as xr
 from chilopod.netcdf import netcdf, sealed
 from chilopod.output import write_all
 from chilopod.show import style, tables
-from chilopod.show.figures import branch, identification, undulation
+from chilopod.show.figures import branch, undulation
 from chilopod.show.panel import Panel
-from chilopod.tasks.identify import Identification
 
 
 def files_of(name: str, folder: str | Path) -> list[Path]:
     """Files written of the figure of that name alone."""
     return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
-
-
-def write_identification(found: Identification, folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write the profile of an identification as ``identification``, with the same endings as :func:`write_branch`."""
-    write_all(identification_files(found, folder), replace=replace)
-    return files_of("identification", folder)
-
-
-def identification_files(found: Identification, folder: str | Path) -> Iterator[tuple[Path, bytes]]:
-    """The files of :func:`write_identification`, see :func:`panel_files`."""
-    return panel_files(identification.panel(found), Path(folder), Path(folder))
 
 
 def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:

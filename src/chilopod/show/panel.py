@@ -11,25 +11,12 @@ from matplotlib.figure import Figure
 
 @dataclass(frozen=True)
 class Panel:
-    """A figure with the words about it.
+    """A figure with the words about it."""
 
-    Attributes
-    ----------
-    name, title, letter
-        Name of its files, its heading, and the letter before that, if any.
-    draw
-        Function that draws it, in the narrow layout if told so; for use within
-        :func:`chilopod.show.style.house_style`.
-    alt, text
-        Description for readers who cannot see it, and the paragraphs beside it.
-    data
-        Data that are drawn.
-    """
-
-    name: str
+    name: str  # of its files
     title: str
-    draw: Callable[[bool], Figure]
-    alt: str
-    text: tuple[str, ...]
-    data: xr.Dataset
-    letter: str = ""
+    draw: Callable[[bool], Figure]  # narrow if told so; within :func:`chilopod.show.style.house_style`
+    alt: str  # description for readers who cannot see it
+    text: tuple[str, ...]  # paragraphs beside it
+    data: xr.Dataset  # that are drawn
+    letter: str = ""  # before the title, if any

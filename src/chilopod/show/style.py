@@ -6,7 +6,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -146,6 +146,6 @@ def joint_styles(count: int) -> list[tuple[Any, str]]:
     return [(color, "os^vD"[index % 5]) for index, color in enumerate(colors[:count])]
 
 
-def grid(axes: Axes, which: str = "both") -> None:
+def grid(axes: Axes, which: Literal["both", "x", "y"] = "both") -> None:
     """Thin lines to read values by."""
-    axes.grid(True, axis="both" if which == "both" else "x" if which == "x" else "y")
+    axes.grid(True, axis=which)

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from chilopod.paper import statements
-from chilopod.paper.curved import rows as curved_rows
+from chilopod.paper.curved import sections as curved_rows
 from chilopod.paper.table import OfPlanar, Row
 
 MODE = np.array([0.64, 0.36, 0.48, 0.46, 0.16])

@@ -8,7 +8,7 @@ from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.paper import statements
-from chilopod.paper.curved import rows as curved_rows
+from chilopod.paper.curved import sections as curved_rows
 from chilopod.paper.curved import study as curved_findings
 from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
 from chilopod.paper.printed import variant_robots

@@ -6,9 +6,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from chilopod import load_robot
+from chilopod.paper.straight import exponents, schematic
 from chilopod.paper.straight.sections import EXPONENTS
 from chilopod.show import style, words
-from chilopod.show.figures import exponents, schematic
 from chilopod.show.scene.outline import chain, turned_about_tail
 from helpers.texts import watched as WATCHED
 

@@ -11,16 +11,17 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.errors import OutputError
+from chilopod.output import write_all
 from chilopod.paper.page import write_report
 from chilopod.paper.page.story import summary
 from chilopod.paper.printed import Said
 from chilopod.paper.registry import load_sections
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found
+from chilopod.paper.straight import schematic
+from chilopod.paper.straight.identification import identification_files
 from chilopod.paper.straight.sections import IDENTIFICATION, MODE
 from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Row, Statement, Verdict, within
-from chilopod.show import write_identification
-from chilopod.show.figures import schematic
 from helpers.html_page import Page
 
 
@@ -168,7 +169,7 @@ def test_same_results_same_bytes(folder, full, tmp_path):
 
 
 def test_identification_on_its_own(fit, tmp_path):
-    files = write_identification(fit, tmp_path / "new")
+    files = write_all(identification_files(fit, tmp_path / "new"))
     assert sorted(path.suffix for path in files) == [".csv", ".nc", ".png", ".svg"]
     assert all(path.stat().st_size > 300 for path in files)
 

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from chilopod.paper import printed
-from chilopod.paper.straight.rows import mode_rows, module_rows, uniform_rows, variant_rows
+from chilopod.paper.straight.sections import mode_rows, module_rows, uniform_rows, variant_rows
 from chilopod.paper.table import OfPlanar, Row
 
 VARIANTS = {printed.AS_BUILT: 12.0, **dict.fromkeys(printed.VARIANTS, 10.0), "module phase 180 deg": 11.5}

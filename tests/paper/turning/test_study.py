@@ -16,7 +16,7 @@ from chilopod.paper import statements
 from chilopod.paper.section import Context, Size
 from chilopod.paper.table import OfPlanar, Row, Verdict
 from chilopod.paper.turning.criteria import minima
-from chilopod.paper.turning.rows import rows
+from chilopod.paper.turning.sections import rows
 from chilopod.paper.turning.study import turning
 from chilopod.paper.turning.trials import CRITERIA, springs_by_outcome, turning_task
 from chilopod.robot import load_robot

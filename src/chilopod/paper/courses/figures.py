@@ -4,6 +4,7 @@ spring law brings, and what the variable spring stands."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -124,18 +125,9 @@ def intervals(
 ) -> None:
     """Values with their intervals, a row each."""
     value, low, high = (scale * np.array([getattr(each, name) for each in found]) for name in ("value", "low", "high"))
-    axes.errorbar(
-        value,
-        rows,
-        xerr=np.maximum(0.0, np.array([value - low, high - value])),
-        fmt=marker,
-        color=color,
-        markersize=5,
-        elinewidth=1.4,
-        capsize=2.5,
-        label=label or None,
-        alpha=alpha,
-    )
+    bars = np.maximum(0.0, np.array([value - low, high - value]))
+    look: dict[str, Any] = {"color": color, "markersize": 5, "elinewidth": 1.4, "capsize": 2.5, "alpha": alpha}
+    axes.errorbar(value, rows, xerr=bars, fmt=marker, label=label or None, **look)
 
 
 def where(data: xr.Dataset) -> Panel:

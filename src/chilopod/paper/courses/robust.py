@@ -43,25 +43,14 @@ class Robust:
 
 @dataclass(frozen=True)
 class Condition:
-    """Something that is not as the law takes it to be.
+    """Something that is not as the law takes it to be."""
 
-    Attributes
-    ----------
-    name, changes
-        Name in a few words, and changes of the robot, as ``--set`` takes them; the law does not know.
-    disturbance, engine
-        Disturbance besides what the course's seed draws, and engine of the walks.
-    own_law, only_variable
-        True if the law is made for what ``changes`` say, and drives the robot as it is; true if the condition concerns
-        the actuator of the spring alone.
-    """
-
-    name: str
-    changes: tuple[str, ...] = ()
-    disturbance: Disturbance = field(default_factory=Disturbance)
+    name: str  # in a few words
+    changes: tuple[str, ...] = ()  # of the robot, as ``--set`` takes them; the law does not know
+    disturbance: Disturbance = field(default_factory=Disturbance)  # besides what the course's seed draws
     engine: str = "planar"
-    own_law: bool = False
-    only_variable: bool = False
+    own_law: bool = False  # True if the law is made for what ``changes`` say, and drives the robot as it is
+    only_variable: bool = False  # True if it concerns the actuator of the spring alone
 
 
 def planar_conditions(robot: Robot) -> list[Condition]:

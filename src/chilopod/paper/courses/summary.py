@@ -29,40 +29,21 @@ _WORK = ("does less work than",)
 
 @dataclass(frozen=True)
 class Summary:
-    """Summary of one strategy.
-
-    Attributes
-    ----------
-    name, spring
-        The strategy's, and the one it walks with, N*mm/deg; NaN for none.
-    targets, courses
-        Shares that are reached, of courses as a whole.
-    seconds, spent
-        Time for a target that is reached, s, and time on all targets for every one that is reached; one that is not
-        reached counts with its whole patience, also where the robot has failed before.
-    later
-        Mean difference to the variable spring's time, s, at targets that both reach.
-    spring_work, drive_work, more_work
-        Mean work of the actuators of springs and of joints, and how much more their sum is than the variable spring's,
-        J a course.
-    effort, detour, cost
-        Mean effort of the leg yaw, rad^2 s a course; path over the shortest with circles of the radius law, of all
-        targets that are reached together; steering cost of transport.
-    """
+    """Summary of one strategy; a target that is not reached counts with its whole patience."""
 
     name: str
-    spring: float
-    targets: Interval
-    courses: Interval
-    seconds: Interval
-    spent: Interval
-    later: Interval
-    spring_work: float
-    drive_work: float
-    more_work: Interval
-    effort: float
-    detour: float
-    cost: float
+    spring: float  # that it walks with, N*mm/deg; NaN for none
+    targets: Interval  # share that is reached
+    courses: Interval  # share that is reached as a whole
+    seconds: Interval  # for a target that is reached, s
+    spent: Interval  # on all targets for every one that is reached, s, also where the robot has failed before
+    later: Interval  # mean difference to the variable spring's time, s, at targets that both reach
+    spring_work: float  # mean work of the actuators of springs, J a course
+    drive_work: float  # and of joints
+    more_work: Interval  # sum of both, less the variable spring's
+    effort: float  # mean of the leg yaw, rad^2 s a course
+    detour: float  # path over the shortest with circles of the radius law, of all targets reached together
+    cost: float  # steering cost of transport
 
     @property
     def title(self) -> str:

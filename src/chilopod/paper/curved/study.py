@@ -35,30 +35,17 @@ _NARROWEST, _WIDEST = 1e-4, 0.4  # of the critical spring, ranges that the law i
 
 @dataclass(frozen=True)
 class CurvedStudy:
-    """Everything the trials of curved walks found.
+    """Everything the trials of curved walks found."""
 
-    Attributes
-    ----------
-    trials, examples, agreement
-        See :mod:`chilopod.paper.curved.trials`: of ``curved_trials``, and ``off_branch`` (rad) of trials without spread
-        of friction; and :func:`chilopod.paper.measures.example_walks`.
-    branch
-        The exact curved walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`.
-    fits, law, comparison
-        See :func:`onset_fits`, :func:`law_along_branch` and :func:`compared`.
-    variants, branches
-        Trials and branch by variant, "as built" first.
-    """
-
-    trials: xr.Dataset
-    examples: xr.Dataset
-    branch: xr.Dataset
-    fits: xr.Dataset
-    law: xr.Dataset
-    agreement: xr.DataArray
-    variants: Mapping[str, xr.Dataset]
-    branches: Mapping[str, xr.Dataset]
-    comparison: xr.Dataset
+    trials: xr.Dataset  # see :func:`chilopod.paper.curved.trials.curved_trials`
+    examples: xr.Dataset  # see :func:`chilopod.paper.measures.example_walks`
+    branch: xr.Dataset  # exact walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`
+    fits: xr.Dataset  # see :func:`onset_fits`
+    law: xr.Dataset  # see :func:`law_along_branch`
+    agreement: xr.DataArray  # rad, off the branch, of trials without spread of friction
+    variants: Mapping[str, xr.Dataset]  # trials by variant, "as built" first
+    branches: Mapping[str, xr.Dataset]  # likewise
+    comparison: xr.Dataset  # see :func:`compared`
 
     @property
     def fit(self) -> SquareRootFit:

@@ -11,6 +11,7 @@ that at 11.5: every trial walks for a number of e-folds of it, and says whether 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -75,17 +76,9 @@ def curved_trials(
     after the start.
     """
     durations = [_walking_time(robot.with_value(K1, stiffness(float(value))), e_folds) for value in springs]
-    records = spring_walks(
-        robot,
-        springs,
-        durations,
-        repeats=repeats,
-        seeds=range(0, SEEDS * len(springs), SEEDS),
-        folder=folder,
-        progress=progress,
-        disturbance=Disturbance() if disturbance is None else disturbance,
-        rate=_SAMPLES / robot.gait.period,
-    )
+    walk: dict[str, Any] = {"disturbance": disturbance or Disturbance(), "rate": _SAMPLES / robot.gait.period}
+    walk |= {"seeds": range(0, SEEDS * len(springs), SEEDS), "folder": folder, "progress": progress}
+    records = spring_walks(robot, springs, durations, repeats=repeats, **walk)
     data = by_spring([_outcome(record, robot) for record in records], springs)
     data["duration"] = ("spring", np.array(durations), {"units": "s"})
     data.attrs = {

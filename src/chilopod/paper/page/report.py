@@ -16,9 +16,9 @@ from chilopod.errors import OutputError
 from chilopod.output import check_files, check_folder, write_atomic
 from chilopod.paper.page.page import Drawn, Film, Shown, State, page
 from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size
+from chilopod.paper.straight import schematic
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
-from chilopod.show.figures import schematic
 from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
 from chilopod.show.scene.encoder import has_encoder
@@ -185,11 +185,8 @@ def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *
     """Make sure, before any work is done for it, that a report of some sections and size can be written into a folder;
     one that has no more is resumed.
 
-    Raises
-    ------
-    OutputError
-        If there is a page that is no report, a report that has more, or files beside which there is no page, unless
-        these may be replaced; or if the folder cannot be written.
+    An OutputError if the folder cannot be written, or if there is a page that is no report, a report that has more, or
+    files beside which there is no page, unless these may be replaced.
     """
     page = folder / "index.html"
     held = _held(page)

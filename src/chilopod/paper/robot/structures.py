@@ -208,7 +208,7 @@ def _strategies(robot: Robot, folder: Folder, engine: str, size: Size) -> Array:
     kept: Any = {"duration": duration, "engine": engine, "folder": folder}
     time, rows = None, []
     for strategy, springs in _SPRINGS.items():
-        task = turning_task(robot, target, springs, repeats, strategy, time=time, **kept)
+        task = turning_task(robot, target, springs, repeats, strategy=strategy, time=time, **kept)
         time = task.time
         rows.append(minima(task.criteria)["mean"].sel(criterion=list(CRITERION_NAMES)).values)
     return np.array(rows)

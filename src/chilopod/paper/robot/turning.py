@@ -52,7 +52,8 @@ def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning
         told = part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}")
         tasks[letter] = turning_task(robot, task.target, springs, repeats, shown=SHOWN, progress=told, **same)
     first, told = tasks["A"], part(progress, 0.7, 0.9, "uniform springs")
-    hopf = turning_task(robot, first.target, HOPF_SPRINGS, repeats, "hopf", time=first.time, progress=told, **same)
+    how = {"strategy": "hopf", "time": first.time, **same}
+    hopf = turning_task(robot, first.target, HOPF_SPRINGS, repeats, progress=told, **how)
     one, told = {"paper's spring": printed.TASKS["A"].k_hat.value}, part(progress, 0.9, 1.0, "without leg yaw")
     without = without_leg_yaw(robot, first.target, one, progress=told, **same)
     return RobotTurning(robot, tasks, hopf, without)

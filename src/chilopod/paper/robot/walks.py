@@ -51,27 +51,15 @@ _PER_CYCLE = 6  # samples
 
 @dataclass(frozen=True)
 class RobotWalks:
-    """Results of the walks.
+    """Results of the walks."""
 
-    Attributes
-    ----------
-    robot, base, durations
-        The robot as built, and its walks, see :func:`walk_ends` and :func:`by_duration`.
-    variants, lower_steps
-        As ``base``, of the paper's three variants, by name; and of those of them that change the stride, with another
-        reading of what the paper leaves open: that a shorter half ellipse of the leg tips is lower in proportion, see
-        :func:`lower_steps`.
-    examples, uniform
-        See :func:`chilopod.paper.measures.example_walks` and :func:`undulations`.
-    """
-
-    robot: Robot
-    base: xr.Dataset
-    durations: xr.Dataset
-    variants: Mapping[str, xr.Dataset]
-    lower_steps: Mapping[str, xr.Dataset]
-    examples: xr.Dataset
-    uniform: xr.Dataset
+    robot: Robot  # as built
+    base: xr.Dataset  # its walks, see :func:`walk_ends`
+    durations: xr.Dataset  # see :func:`by_duration`
+    variants: Mapping[str, xr.Dataset]  # as ``base``, of the paper's three, by name
+    lower_steps: Mapping[str, xr.Dataset]  # of those that change the stride, see :func:`lower_steps`
+    examples: xr.Dataset  # see :func:`chilopod.paper.measures.example_walks`
+    uniform: xr.Dataset  # see :func:`undulations`
 
     @property
     def fit(self) -> SquareRootFit | None:
@@ -185,19 +173,9 @@ def undulations(
     bootstrap; NaN if they determine no point.
     """
     wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(robot.body.modules - 1) * np.pi / 2.0))
-    records = measures.spring_walks(
-        robot,
-        springs,
-        duration,
-        repeats=repeats,
-        seeds=measures.spring_seeds(springs),
-        parameter=ALL,
-        folder=folder,
-        progress=progress,
-        joint_angles=wave,
-        engine=engine,
-        rate=_PER_CYCLE / robot.gait.period,
-    )
+    walk: dict[str, Any] = {"joint_angles": wave, "engine": engine, "rate": _PER_CYCLE / robot.gait.period}
+    walk |= {"seeds": measures.spring_seeds(springs), "folder": folder, "progress": progress}
+    records = measures.spring_walks(robot, springs, duration, repeats=repeats, parameter=ALL, **walk)
     shape, last, amplitudes = (len(springs), repeats), round(_WINDOW / robot.gait.period), []
     for record in records:
         angles = record.joint_angle.isel(robot=0).transpose("time", "joint").values[1:]

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -132,20 +133,8 @@ def with_factors(robot: Robot, planar: Robot, names: Sequence[str]) -> Robot:
 def growth(robot: Robot, springs: Sequence[float], folder: Folder = None, duration: float = _DURATION) -> Array:
     """Growth rates of a small bend of the twin, averaged over gait cycles, with each spring (N*mm/deg), 1/s; NaN where
     a walk failed."""
-    shape = _shape(robot)
-    records = [
-        spring_walks(
-            robot,
-            springs,
-            duration,
-            folder=folder,
-            joint_angles=tuple(sign * _BEND * shape),
-            disturbance=NONE,
-            rate=_SAMPLES / robot.gait.period,
-            engine="twin",
-        )
-        for sign in (1.0, -1.0)
-    ]
+    bend, rate = _BEND * _shape(robot), _SAMPLES / robot.gait.period
+    records = [_walks(robot, springs, duration, folder, sign * bend, rate) for sign in (1.0, -1.0)]
     rates = []
     for pair in zip(*records, strict=True):
         one, other = (each.joint_angle.isel(robot=0).transpose("time", "joint").values for each in pair)
@@ -187,18 +176,17 @@ def onset(robot: Robot, folder: Folder = None, size: Size = Size.FULL) -> float:
     return refined if refined <= max(springs) else point
 
 
+def _walks(
+    robot: Robot, springs: Sequence[float], duration: float, folder: Folder, bend: Array, rate: float
+) -> list[xr.Dataset]:
+    """Undisturbed walks of the twin that begin bent."""
+    how: dict[str, Any] = {"disturbance": NONE, "rate": rate, "engine": "twin", "folder": folder}
+    return spring_walks(robot, springs, duration, joint_angles=tuple(bend), **how)
+
+
 def _bends(robot: Robot, springs: Sequence[float], duration: float, folder: Folder) -> Array:
     """Mean angle of joint 1 at the end of walks, rad; 0 where the body is straight, or the walk failed."""
-    records = spring_walks(
-        robot,
-        springs,
-        duration,
-        folder=folder,
-        joint_angles=tuple(_BENT * _shape(robot)),
-        disturbance=NONE,
-        rate=_PER_SECOND,
-        engine="twin",
-    )
+    records = _walks(robot, springs, duration, folder, _BENT * _shape(robot), _PER_SECOND)
     kept = round(_AVERAGED * _PER_SECOND)
     last = np.abs([record.joint_angle.isel(robot=0).values[-kept:].mean(axis=0) for record in records])
     return np.where(last.sum(axis=1) > CURVED, last[:, 0], 0.0)

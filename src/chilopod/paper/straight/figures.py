@@ -78,14 +78,8 @@ def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
             (shown[1], 0.17, style.ORANGE, "D", "white", (0, (3, 2)), 2, "robot, paper"),
         ):
             axes[letter].hlines(rows + shift, 0.0, values, color=color, lw=1.6, linestyle=line)
-            axes[letter].plot(
-                *(values, rows + shift, marker),
-                color=color,
-                markersize=8,
-                markeredgewidth=1.8,
-                markerfacecolor=fill,
-                label=label,
-            )
+            look: dict[str, Any] = {"color": color, "markersize": 8, "markeredgewidth": 1.8, "markerfacecolor": fill}
+            axes[letter].plot(values, rows + shift, marker, label=label, **look)
             for value, row in list(zip(values, rows + shift, strict=True))[letter == "B" :]:
                 text = number(value, digits) if letter == "A" else f"{signed(value)} %"
                 style.note(axes[letter], text, (value, row), (away, 0), ha=side, va="center")
@@ -96,8 +90,7 @@ def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
     axes["B"].set_xlim(1.45 * min(changes.min(), -5.0), max(1.2 * changes.max(), 3.0))
     axes["B"].set(title="Change from as built", xlabel="change of critical k₁ (%)")
     axes["B"].axvline(0.0, color=style.BLACK, lw=0.8)
-    handles, labels = axes["A"].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=1 if narrow else 2)
+    figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside upper left", ncols=1 if narrow else 2)
     return figure
 
 
@@ -149,24 +142,13 @@ def _draw_modules(data: xr.Dataset, narrow: bool) -> Figure:
     for word, marker, fill in (("supercritical", "o", style.BLUE), ("subcritical", "s", "white")):
         those = says == word
         if those.any():
-            look: dict[str, Any] = {
-                "color": style.BLUE,
-                "markerfacecolor": fill,
-                "markersize": 8.0,
-                "markeredgewidth": 1.8,
-            }
-            axes.plot(counts[those], values[those], marker, label=word, **look)
+            look: dict[str, Any] = {"color": style.BLUE, "markersize": 8.0, "markeredgewidth": 1.8}
+            axes.plot(counts[those], values[those], marker, label=word, markerfacecolor=fill, **look)
     built = data.attrs["built"]
     for value in values[(counts == built) & ~np.isnan(values)]:
-        axes.annotate(
-            f"this robot: {number(float(value), 4)}",
-            (built, float(value)),
-            (0, -34),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            arrowprops={"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 6},
-        )
+        line = {"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 6}
+        words, at = f"this robot: {number(float(value), 4)}", (built, float(value))
+        style.note(axes, words, at, (0, -34), ha="center", va="top", arrowprops=line)
     missing = counts[np.isnan(values)]
     if missing.size:
         zero = np.zeros(missing.size)
@@ -269,9 +251,7 @@ def _bent_body(axes: Axes, components: np.ndarray) -> None:
         draw_joints(axes, joints, style.BLACK)
         draw_heading(axes, centres[0], headings[0], 1.0, color)
         tip = centres[0] + 1.25 * np.array([np.cos(headings[0]), np.sin(headings[0])])
-        axes.text(
-            tip[0], tip[1], f"turns\n{side}", ha="center", va="bottom" if tip[1] > 0.0 else "top", color=style.BLACK
-        )
+        axes.text(tip[0], tip[1], f"turns\n{side}", ha="center", va="bottom" if tip[1] > 0.0 else "top")
         top = max(top, abs(tip[1]))
     draw_heading(axes, straight[0][0], 0.0, 1.0, style.GREY)
     axes.text(straight[0][0, 0] + 0.6, -0.3, "straight,\nunstable", va="top", ha="left", fontsize=style.SMALL)
@@ -341,6 +321,4 @@ def _snapshots(axes: Axes, data: xr.Dataset, columns: int) -> None:
         draw_heading(axes, centres[0] + shift, headings[0], 1.0, style.BLACK)
         moment = f"{share * data.attrs['oscillation_period_s']:.1f} s"
         axes.text(shift[0] - half - 0.5, shift[1], moment, ha="right", va="center", fontsize=style.SMALL)
-    axes.set(
-        xlim=(-half - 2.2, (columns - 1) * across + half + 1.0), ylim=(-(rows - 1) * down - 0.7 * down, 0.7 * down)
-    )
+    axes.set(xlim=(-half - 2.2, (columns - 1) * across + half + 1.0), ylim=(-(rows - 0.3) * down, 0.7 * down))

@@ -1,34 +1,130 @@
-"""The straight walk and where it bends: the sections of this chapter."""
+"""The straight walk and where it bends: the sections of this chapter, and what the tables say of them."""
 
 from __future__ import annotations
 
+import numpy as np
 import xarray as xr
 
+from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.paper import printed, statements
+from chilopod.paper.printed import ANALYSIS
+from chilopod.paper.scatter import every
 from chilopod.paper.section import Section
-from chilopod.paper.straight import figures, rows, study
-from chilopod.show.figures import exponents, identification
+from chilopod.paper.straight import exponents, figures, identification, study
+from chilopod.paper.table import OfPlanar, Result, Row, agreement, unprinted
 from chilopod.tasks.identify import Identification
 
 CHAPTER = "The straight walk and where it bends"
 
+
+def mode_rows(data: xr.Dataset) -> list[Row]:
+    """The pitchfork and its mode."""
+    found, said = data.attrs, printed.CRITICAL_K1
+    kind = f"{found['kind']}, {found['criticality']} (coefficient {found['coefficient']:.4g} /rad² per cycle)"
+    rows = [
+        Row("critical k1", str(said), _located(data), ANALYSIS, agreement(said.answer(found["value"]))),
+        Row(
+            "kind and direction",
+            f"{printed.KIND} (from the exponent crossing on the real axis)",
+            Result(kind),
+            ANALYSIS,
+            agreement(found["kind"] == printed.KIND),
+            "the paper's linear analysis does not give a direction",
+        ),
+    ]
+    known = printed.MODE if len(data.computed) == len(printed.MODE) else ()
+    for joint, (computed, paper) in enumerate(zip(data.computed.values, known, strict=False), 1):
+        beyond = abs(computed - paper.value) - paper.tolerance
+        remark = f"beyond rounding by {beyond:.4f}" if beyond > 0.0 else ""
+        result, verdict = Result(value=computed, error=0.0, digits=4), agreement(paper.answer(computed))
+        rows.append(Row(f"critical mode, joint {joint}", f"{paper.value:.2f}", result, ANALYSIS, verdict, remark))
+    return rows
+
+
+def variant_rows(data: xr.Dataset) -> list[Row]:
+    """The paper's variants."""
+    base = float(data.critical_k1.sel(variant=printed.AS_BUILT))
+    rows = []
+    for name, variant in printed.VARIANTS.items():
+        value = float(data.critical_k1.sel(variant=name))
+        words = f"{value:.3f} {PAPER_UNIT} ({100 * (value / base - 1):+.0f} %)"
+        result, verdict = Result(words, value, unit=PAPER_UNIT), agreement(variant.model.answer(value / base))
+        rows.append(Row(f"critical k1, {name}", variant.model.words, result, "figure Floquet analysis, C", verdict))
+    return rows
+
+
+def module_rows(data: xr.Dataset) -> list[Row]:
+    """Longer robots."""
+    longer = data.sel(modules=data.modules > 6).critical_k1
+    base, said = float(data.sel(modules=6).critical_k1), printed.LITTLE_CHANGE
+    return [
+        Row(
+            f"critical k1 for 7 to {int(data.modules[-1])} modules of the same size",
+            said.words,
+            Result(f"{float(longer.min()):.2f} to {float(longer.max()):.2f} {PAPER_UNIT}"),
+            f"{ANALYSIS}, figure D",
+            agreement(every(said.answer(float(value) / base) for value in longer)),
+        )
+    ]
+
+
+def uniform_rows(data: xr.Dataset) -> list[Row | OfPlanar]:
+    """All springs alike."""
+    found = data.attrs
+    cycle = f"{found['frequency_rad_s']:.4f} rad/s: a cycle of {found['oscillation_period_s']:.1f} s"
+    return [
+        unprinted("uniform springs: critical k", _located(data), printed.COMPARISON),
+        Row(
+            "uniform springs: kind",
+            f'{printed.UNIFORM_KIND} ("Hopf")',
+            Result(f"{found['kind']}, {found['criticality']}, {cycle}"),
+            ANALYSIS,
+            agreement(found["kind"] == printed.UNIFORM_KIND),
+        ),
+        OfPlanar(statements.UNIFORM, Result(value=found["value"], unit=PAPER_UNIT)),
+    ]
+
+
+def identification_rows(found: Identification) -> list[Row]:
+    """The constants the paper does not print."""
+    legs, allowed = found.best.legs, found.allowed("legs.forward_offset")
+    span = "nowhere" if allowed is None else f"{1e3 * allowed[0]:.0f} to {1e3 * allowed[1]:.0f} mm"
+    return [
+        unprinted(
+            "foot friction, half-width, forward offset",
+            f"{found.best.ground.friction:.1f} N*s/m, {1e3 * legs.half_width:.1f} mm, "
+            f"{1e3 * legs.forward_offset:.1f} mm",
+            ANALYSIS,
+            f"best fit, largest residual {np.abs(found.residuals).max():.2f} of rounding "
+            f"(this robot: {np.abs(found.preset_residuals).max():.2f}); rounding allows forward offsets of {span}",
+        )
+    ]
+
+
+def _located(data: xr.Dataset) -> Result:
+    """Critical spring with the bound of its error."""
+    value, bound = float(data.attrs["value"]), float(data.attrs["error_bound"])
+    return Result(f"{value:.9f} ± {bound:.0e} {PAPER_UNIT}", value, bound, PAPER_UNIT)
+
+
 MODE: Section[xr.Dataset] = Section(
-    "mode", CHAPTER, "the pitchfork in k1 and its mode", study.critical_mode, rows.mode_rows, figures.mode
+    "mode", CHAPTER, "the pitchfork in k1 and its mode", study.critical_mode, mode_rows, figures.mode
 )
 EXPONENTS: Section[xr.Dataset] = Section(
     "exponents", CHAPTER, "Floquet exponents as k1 falls", study.exponent_sweep, panels=exponents.panel, beside=(MODE,)
 )
 VARIANTS: Section[xr.Dataset] = Section(
-    "variants", CHAPTER, "critical k1 for the paper's variants", study.variants, rows.variant_rows, figures.variants
+    "variants", CHAPTER, "critical k1 for the paper's variants", study.variants, variant_rows, figures.variants
 )
 MODULES: Section[xr.Dataset] = Section(
-    "modules", CHAPTER, "critical k1 over the number of modules", study.module_counts, rows.module_rows, figures.modules
+    "modules", CHAPTER, "critical k1 over the number of modules", study.module_counts, module_rows, figures.modules
 )
 UNIFORM: Section[xr.Dataset] = Section(
     "uniform",
     CHAPTER,
     "the Neimark-Sacker point of uniform springs",
     study.uniform_springs,
-    rows.uniform_rows,
+    uniform_rows,
     figures.uniform,
 )
 IDENTIFICATION: Section[Identification] = Section(
@@ -36,7 +132,7 @@ IDENTIFICATION: Section[Identification] = Section(
     CHAPTER,
     "the constants the paper does not print",
     study.identified,
-    rows.identification_rows,
+    identification_rows,
     identification.panel,
     beyond=True,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -46,30 +47,17 @@ ROUGH_SPRINGS = (6, 7, 8, 8.5, 9, 9.5, 10, 11, 12, 13, 15, 21)
 
 @dataclass(frozen=True)
 class Turning:
-    """Everything the turning studies found.
-
-    Attributes
-    ----------
-    robot, laws, tasks
-        The robot, its radius laws, and the paper's two tasks, by letter.
-    hopf, rough, hopf_point
-        Task A with uniform springs, and with a disturbance :data:`ROUGH` times as large; the Neimark-Sacker point of
-        uniform springs, N*mm/deg.
-    without
-        Task A with and without leg yaw, at the best spring and at the law's.
-    settled, farther
-        See :func:`settled_start` and :func:`farther_targets`.
-    """
+    """Everything the turning studies found."""
 
     robot: Robot
     laws: RadiusLaws
-    tasks: Mapping[str, TurningTask]
-    hopf: TurningTask
-    rough: TurningTask
-    hopf_point: float
-    without: xr.Dataset
-    settled: xr.Dataset
-    farther: xr.Dataset
+    tasks: Mapping[str, TurningTask]  # the paper's two, by letter
+    hopf: TurningTask  # task A with uniform springs
+    rough: TurningTask  # task A with a disturbance :data:`ROUGH` times as large
+    hopf_point: float  # Neimark-Sacker point of uniform springs, N*mm/deg
+    without: xr.Dataset  # task A with and without leg yaw, at the best spring and at the law's
+    settled: xr.Dataset  # see :func:`settled_start`
+    farther: xr.Dataset  # see :func:`farther_targets`
 
 
 def turning(context: Context, progress: Progress = silent) -> Turning:
@@ -82,23 +70,13 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
         told = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
         tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=told)
     task = tasks["A"]
-    hopf = turning_task(
-        robot,
-        task.target,
-        UNIFORM_SPRINGS[::3] if quick else UNIFORM_SPRINGS,
-        strategy="hopf",
-        time=task.time,
-        folder=folder,
-        progress=part(progress, 0.5, 0.65, "uniform springs"),
-    )
-    rough = turning_task(
-        robot,
-        task.target,
-        QUICK_SPRINGS if quick else ROUGH_SPRINGS,
-        folder=folder,
-        progress=part(progress, 0.65, 0.85, "larger disturbances"),
-        disturbance=Disturbance().scaled(ROUGH),
-    )
+    same: dict[str, Any] = {"folder": folder, "progress": part(progress, 0.5, 0.65, "uniform springs")}
+    uniform = UNIFORM_SPRINGS[::3] if quick else UNIFORM_SPRINGS
+    hopf = turning_task(robot, task.target, uniform, strategy="hopf", time=task.time, **same)
+    same["progress"] = part(progress, 0.65, 0.85, "larger disturbances")
+    rougher = Disturbance().scaled(ROUGH)
+    rough_springs = QUICK_SPRINGS if quick else ROUGH_SPRINGS
+    rough = turning_task(robot, task.target, rough_springs, disturbance=rougher, **same)
     springs_ = {"best spring": task.best, "spring of the law": laws.k_hat(task.target.radius)[0]}
     told = part(progress, 0.85, 0.9, "with and without leg yaw")
     without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=told)

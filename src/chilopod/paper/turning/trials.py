@@ -48,18 +48,15 @@ _PATH_STEP = 2
 class TurningTask:
     """Outcome of walks to a target with many springs.
 
-    Attributes
-    ----------
-    criteria
-        Over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1 to 3, at
-        the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); their means over repeats
-        and standard errors as ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so
-        long). Over (spring, repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if
-        never), ``nearest`` (m), ``outcome`` and ``status``.
-    paths
-        Over (shown, repeat, time): ``x`` and ``y`` (m) of module 1, ``distance`` (m) and ``bearing`` (rad, continuous)
-        of the target, of three springs: the best, and the grid's nearest to 15/21 and 41/21 of it as in the paper. The
-        best is that of the smallest mean ``nearest``, which needs no evaluation time.
+    ``criteria``, over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1
+    to 3, at the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); their means over
+    repeats and standard errors as ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so
+    long). Over (spring, repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if never),
+    ``nearest`` (m), ``outcome`` and ``status``.
+
+    ``paths``, over (shown, repeat, time): ``x`` and ``y`` (m) of module 1, ``distance`` (m) and ``bearing`` (rad,
+    continuous) of the target, of three springs: the best, and the grid's nearest to 15/21 and 41/21 of it as in the
+    paper.
     """
 
     target: Target
@@ -73,7 +70,7 @@ class TurningTask:
 
     @property
     def best(self) -> float:
-        """The spring that comes nearest to the target on average, N*mm/deg."""
+        """The spring that comes nearest to the target on average, N*mm/deg; it needs no evaluation time."""
         return _best(self.criteria)
 
 
@@ -97,10 +94,8 @@ def turning_task(
     target: Target,
     springs: Sequence[float] = SPRINGS,
     repeats: int = printed.REPEATS,
-    strategy: str = "pitchfork",
     *,
     time: float | None = None,
-    duration: float = DURATION,
     shown: Sequence[float] | None = None,
     folder: Folder = None,
     progress: Progress = silent,
@@ -108,28 +103,22 @@ def turning_task(
 ) -> TurningTask:
     """Walk towards a target with every spring (N*mm/deg), several times, with the seeds 0, 1, ...
 
-    Parameters
-    ----------
-    time
-        Time at which epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the
-        paper, and ``duration`` if none arrives.
-    duration, shown
-        Duration of every trial, s, at least the paper's, and springs of ``paths``, N*mm/deg.
-    walk
-        Other fields of the trials, such as their engine and disturbance.
+    Epsilon 1 to 3 are taken at ``time`` (s), by default the earliest arrival of any of these trials, as in the paper,
+    and their duration if none arrives. ``shown`` are the springs of ``paths`` (N*mm/deg). ``walk`` is the rest of
+    :func:`to_target`: strategy, duration (s, at least the paper's), engine, disturbance.
     """
     asked: list[Trial] = []
     for spring in springs:
-        one = to_target(robot, target, spring, strategy, duration=duration, **walk)
+        one = to_target(robot, target, spring, **walk)
         asked += [replace(one, seed=seed) for seed in range(repeats)]
     record = trials.together(trials.run(asked, folder, progress))
-    earliest = earliest_arrival(record)
+    earliest, duration = earliest_arrival(record), asked[0].duration
     when = time if time is not None else earliest if np.isfinite(earliest) else duration
     criteria = _criteria(record, (when, DURATION), springs, repeats)
     criteria.attrs = {
         "robot": robot.name,
         "target": str(target),
-        "strategy": strategy,
+        "strategy": walk.get("strategy", "pitchfork"),
         "duration_s": duration,
         "earliest_arrival_s": earliest,
         "radius_m": target.radius,

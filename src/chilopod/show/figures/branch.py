@@ -112,13 +112,6 @@ def _stretches(verdicts: list[str]) -> Iterator[tuple[int, int, str]]:
 
 def _mark(axes: Axes, data: xr.Dataset) -> None:
     for special in sorted(set(data.special.values) - {""}):
-        here = data.special.values == special
-        axes.plot(
-            data.parameter.values[here],
-            np.rad2deg(data.mean_angle.values[here, 0]),
-            linestyle="none",
-            marker={"pitchfork": "o", "fold": "s"}.get(special, "D"),
-            color=style.VERMILLION,
-            label=special,
-            zorder=5,
-        )
+        here, marker = data.special.values == special, {"pitchfork": "o", "fold": "s"}.get(special, "D")
+        points = data.parameter.values[here], np.rad2deg(data.mean_angle.values[here, 0])
+        axes.plot(*points, marker, color=style.VERMILLION, label=special, zorder=5)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -49,13 +51,8 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     first = data.attrs["frequency_rad_s"]
     at = np.append(data.attrs["value"], k)
     axes["B"].plot(at, np.append(first, data.predicted_frequency.values), color=style.ORANGE, label="normal form")
-    axes["B"].plot(
-        at,
-        np.append(first, data.linear_frequency.values),
-        color=style.GREY,
-        linestyle=(0, (4, 2)),
-        label="small undulation",
-    )
+    small = np.append(first, data.linear_frequency.values)
+    axes["B"].plot(at, small, color=style.GREY, linestyle=(0, (4, 2)), label="small undulation")
     _dots(axes["B"], k, data.frequency.values, "simulated")
     axes["B"].set(ylabel="frequency (rad/s)", title="How fast")
 
@@ -64,31 +61,15 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     frequency_off = np.abs((data.predicted_frequency.values - first) / shift - 1.0)
     axes["C"].loglog(100 * distance, 100 * amplitude_off, "o-", color=style.BLUE, label="amplitude")
     axes["C"].loglog(100 * distance, 100 * frequency_off, "s-", color=style.GREEN, label="change of frequency")
-    axes["C"].loglog(
-        100 * distance,
-        70 * amplitude_off[0] * distance / distance[0],
-        color=style.GREY,
-        linestyle=(0, (1, 2)),
-        label="in proportion",
-    )
-    axes["C"].set(
-        xlabel="distance below the point (%)", ylabel="normal form is off by (%)", title="How sure the normal form is"
-    )
-
-    for letter in "AB":
-        axes[letter].plot(
-            data.attrs["value"],
-            0.0 if letter == "A" else first,
-            linestyle="none",
-            marker="D",
-            color=style.VERMILLION,
-            label="Neimark-Sacker",
-            zorder=5,
-            clip_on=False,
-        )
-        axes[letter].set_xlabel(label)
-        style.grid(axes[letter])
-    style.grid(axes["C"])
+    proportion = 70 * amplitude_off[0] * distance / distance[0]
+    axes["C"].loglog(100 * distance, proportion, color=style.GREY, linestyle=(0, (1, 2)), label="in proportion")
+    axes["C"].set(ylabel="normal form is off by (%)", title="How sure the normal form is")
+    look: dict[str, Any] = {"color": style.VERMILLION, "label": "Neimark-Sacker", "zorder": 5, "clip_on": False}
+    for letter, value in (("A", 0.0), ("B", first)):
+        axes[letter].plot(data.attrs["value"], value, "D", **look)
+    for letter, each in axes.items():
+        each.set_xlabel("distance below the point (%)" if letter == "C" else label)
+        style.grid(each)
     axes["A"].legend(loc="lower left")
     axes["B"].legend(loc="best")
     axes["C"].legend(loc="upper left")

@@ -103,28 +103,14 @@ def motion(robot: Robot) -> dict[str, Any]:
 
 
 class Theory(NamedTuple):
-    """Curved walks of a robot, and its radius law.
+    """Curved walks of a robot, and its radius law."""
 
-    Attributes
-    ----------
-    walks
-        Branch of left turns, see :func:`chilopod.analysis.curved_walks`.
-    law
-        Radius of the body axis over the first spring, as far as a robot reaches it from straight.
-    """
-
-    walks: xr.Dataset
-    law: RadiusLaw
+    walks: xr.Dataset  # branch of left turns, see :func:`chilopod.analysis.curved_walks`
+    law: RadiusLaw  # radius of the body axis over the first spring, as far as a robot reaches it from straight
 
 
 def theory(robot: Robot, progress: Progress = silent) -> Theory:
-    """Branch and radius law of a robot.
-
-    Raises
-    ------
-    AnalysisError
-        If the straight walk has no pitchfork in the first spring, or the walks beside it are no law.
-    """
+    """Branch and radius law of a robot; errors as of :func:`play`."""
     laws = radius_laws(robot, progress)
     return Theory(laws.walks, that_holds(laws.axis, robot))
 

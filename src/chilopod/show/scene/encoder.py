@@ -27,13 +27,7 @@ def has_encoder() -> bool:
 
 
 def encoded(frames: Iterator[NDArray[np.uint8]], fps: int, size: tuple[int, int]) -> bytes:
-    """The bytes of an mp4 of frames of shape (height, width, 4).
-
-    Raises
-    ------
-    OutputError
-        If there is no room for it among temporary files.
-    """
+    """The bytes of an mp4 of frames of shape (height, width, 4); an OutputError if there is no room for it."""
     # Moving the index to the front takes a file: it is read again while it is written.
     try:
         with tempfile.TemporaryDirectory(prefix="chilopod-") as folder:

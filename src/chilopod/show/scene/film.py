@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -48,14 +47,9 @@ def filmed(
 ) -> bytes:
     """A record as a film, H.264 in mp4: browsers and presentations play it before it is loaded whole.
 
-    Parameters
-    ----------
-    record, titles
-        Record, and titles of its robots by label or in their order, see :mod:`chilopod.show.scene.frames`.
-    heading
-        Text above all panels.
-    fps, speed, size
-        Frames per second of the film, seconds of the walk per second of it, and its width and height, even pixels.
+    Titles of its robots are by label or in their order (:mod:`chilopod.show.scene.frames`), the heading is above all
+    panels. ``fps`` are frames per second of the film, ``speed`` seconds of the walk per second of it, and ``size`` its
+    width and height, even pixels.
 
     Raises
     ------
@@ -69,15 +63,7 @@ def filmed(
 
 
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
-    """Times of the frames of a film, s.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be encoded in this size, or at this rate or speed.
-    OutputError
-        If PyAV was built without its H.264 encoder.
-    """
+    """Times of the frames of a film, s; errors as of :func:`filmed` if it cannot be encoded like this."""
     if not 1 <= fps <= 120:
         raise ParameterError("is no frame rate", field="fps", value=fps, allowed="1 to 120 per second")
     if not _SLOWEST <= speed <= FASTEST:
@@ -100,15 +86,6 @@ def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> 
         stage = Stage(shown, heading, size, speed)
         for index in range(len(shown.frames.time)):
             yield stage.drawn(index)
-
-
-@dataclass(frozen=True)
-class _Captions:
-    """Titles and outcomes of all panels, and how wide the widest pair is in one line, pixels."""
-
-    titles: list[Text]
-    outcomes: list[Text]
-    longest: float
 
 
 class Stage:
@@ -197,39 +174,33 @@ class Stage:
             legend.remove()
         return float(legend.get_window_extent(self.canvas.get_renderer()).height)
 
-    def _captions(self) -> _Captions:
-        """Titles and outcomes, still to be placed."""
-        said = (self.shown.titles, map(says, self.shown.outcomes))
-        titles, outcomes = ([self._text(0.0, 0.0, each, weight="bold", va="top") for each in texts] for texts in said)
-        longest = max(self._extent(a) + self._extent(b) for a, b in zip(titles, outcomes, strict=True)) + self.font
-        return _Captions(titles, outcomes, longest)
-
     def _tall(self, lines: int) -> float:
         """Height of a caption."""
         return (0.35 + 1.35 * lines) * self.font
 
-    def _place(self, captions: _Captions, index: int, at: tuple[float, float], across: float, lines: int) -> None:
+    def _place(self, caption: Sequence[Text], at: tuple[float, float], across: float, lines: int) -> None:
         """Put a caption over its panel: title and outcome in one line, or in two."""
-        x, y = at
-        outcome = (x + across, y) if lines == 1 else (x, y - 1.35 * self.font)
-        captions.outcomes[index].set_horizontalalignment("right" if lines == 1 else "left")
-        for text, place in ((captions.titles[index], at), (captions.outcomes[index], outcome)):
+        below = (at[0] + across, at[1]) if lines == 1 else (at[0], at[1] - 1.35 * self.font)
+        caption[1].set_horizontalalignment("right" if lines == 1 else "left")
+        for text, place in zip(caption, (at, below), strict=True):
             text.set_position((place[0] / self.size[0], place[1] / self.size[1]))
             self._fit(text, across)
 
     def _panels(self, bottom: float, top: float) -> None:
         """Lay the panels out, all of one size, in the middle of the room there is."""
-        captions, width = self._captions(), self.size[0] - 2.0 * GAP
-        across, tall, columns, lines = self._layout(width, top - bottom, captions.longest)
+        said, width = zip(self.shown.titles, map(says, self.shown.outcomes), strict=True), self.size[0] - 2.0 * GAP
+        captions = [[self._text(0.0, 0.0, each, weight="bold", va="top") for each in both] for both in said]
+        longest = max(sum(map(self._extent, both)) for both in captions) + self.font
+        across, tall, columns, lines = self._layout(width, top - bottom, longest)
         caption, rows = self._tall(lines), math.ceil(len(self.shown.titles) / columns)
         left = GAP + 0.5 * (width - columns * across - (columns - 1) * APART)
         top -= max(0.0, 0.5 * (top - bottom + GAP - rows * (tall + caption + GAP)))
         self.panels = []
-        for index, outcome in enumerate(captions.outcomes):
+        for index, both in enumerate(captions):
             x = left + (index % columns) * (across + APART)
             y = top - (index // columns) * (tall + caption + GAP)
-            self._place(captions, index, (x, y), across, lines)
-            self.panels.append(self._panel(index, (x, y - caption), (across, tall), outcome))
+            self._place(both, (x, y), across, lines)
+            self.panels.append(self._panel(index, (x, y - caption), (across, tall), both[1]))
 
     def _layout(self, width: float, height: float, longest: float) -> tuple[float, float, int, int]:
         """Width and height of a panel, columns, and lines of a caption: one if there is room for title and outcome."""
@@ -265,10 +236,9 @@ class FilmPanel:
         floor, frames = shown.floor, shown.frames
         axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1), xticks=[], yticks=[])
         axes.spines[:].set(visible=True, color=COLORS["grid"])
-        for line in np.arange(math.ceil(floor.x0 / floor.grid), floor.x1 / floor.grid):
-            axes.axvline(line * floor.grid, color=COLORS["grid"], lw=1.0)
-        for line in np.arange(math.ceil(floor.y0 / floor.grid), floor.y1 / floor.grid):
-            axes.axhline(line * floor.grid, color=COLORS["grid"], lw=1.0)
+        for draw, low, high in ((axes.axvline, floor.x0, floor.x1), (axes.axhline, floor.y0, floor.y1)):
+            for line in np.arange(math.ceil(low / floor.grid), high / floor.grid):
+                draw(line * floor.grid, color=COLORS["grid"], lw=1.0)
         self._scale_bar(axes, zoom, font)
         for aim in shown.aims[robot]:
             ring = Circle(aim.place, shown.arrival_radius, ec=COLORS["target"], lw=1.5)

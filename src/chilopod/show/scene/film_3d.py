@@ -49,14 +49,8 @@ def film_3d(
 ) -> bytes:
     """Walks of the twin as a film, side by side, H.264 in mp4, as :func:`chilopod.show.scene.film.filmed`.
 
-    Every panel follows its robot, or all show the same piece of floor, with all of all walks.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is out of range, the record has no poses or does not go with its robot, or a robot has no title.
-    OutputError
-        If there is no OpenGL, or PyAV was built without its H.264 encoder.
+    Every panel follows its robot, or all show the same piece of floor, with all of all walks. Errors are those of
+    ``filmed``, a ParameterError if the record has no poses, and an OutputError if there is no OpenGL.
     """
     times = frame_times(record, size, fps, speed)
     walks = _Walks(record, titles, times)
@@ -82,8 +76,7 @@ def stills(
     Raises
     ------
     ParameterError
-        If a time is not in the record, there are too many, the record has no poses or does not go with its robot, or a
-        robot has no title.
+        If a time is not in the record, there are too many, or the record is refused by :func:`film_3d`.
     OutputError
         If there is no OpenGL.
     """
@@ -176,7 +169,9 @@ class _Stage3D(Stage):
         self.studio: Studio
         super().__init__(walks.shown, heading, size, speed)
         note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
-        note.set_visible(self._room_beside_key(note))
+        renderer = self.canvas.get_renderer()
+        key = self.figure.legends[0].get_window_extent(renderer)
+        note.set_visible(bool(note.get_window_extent(renderer).x0 > key.x1 + self.font))
 
     def _layout(self, width: float, height: float, longest: float) -> tuple[float, float, int, int]:
         count, robot = len(self.shown.titles), self.shown.frames.robot
@@ -191,11 +186,6 @@ class _Stage3D(Stage):
     def _panel(self, index: int, at: tuple[float, float], size: tuple[float, float], outcome: Text) -> FilmPanel:
         corner = (round(at[0]), round(self.size[1] - at[1]))
         return _Panel3D(self, index, (int(size[0]), int(size[1])), corner, outcome)
-
-    def _room_beside_key(self, note: Text) -> bool:
-        renderer = self.canvas.get_renderer()
-        key = self.figure.legends[0].get_window_extent(renderer)
-        return bool(note.get_window_extent(renderer).x0 > key.x1 + self.font)
 
 
 class _Panel3D(FilmPanel):

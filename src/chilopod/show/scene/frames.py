@@ -39,43 +39,25 @@ _FLATTEST, _TALLEST = 2.4, 0.8
 class BodyFrames:
     """Bodies seen from above at T times, of R robots with N modules.
 
-    Attributes
-    ----------
-    robot
-        Description of the robots, but for their springs.
-    time
-        Times, (T,), s.
-    spine
-        Front end of module 1, the yaw joints and the rear end of module N, (T, R, N+1, 2), m.
-    centres, headings
-        Centres (T, R, N, 2), m, and headings (T, R, N), rad, left positive, of the modules.
-    feet, stands
-        Places of the feet by module, side (left, right) and axis, (T, R, N, 2, 2), m, and True for each on the floor.
-    walks
-        True while the record has the robot, (T, R). After that all of the above stay as they were last; of a robot that
-        never started they are NaN, and no foot stands.
+    After a robot stopped all stays as it was last; of one that never started it is NaN, and no foot stands.
     """
 
-    robot: Robot
-    time: Array
-    spine: Array
-    centres: Array
-    headings: Array
-    feet: Array
-    stands: NDArray[np.bool_]
-    walks: NDArray[np.bool_]
+    robot: Robot  # but for its springs
+    time: Array  # s, (T,)
+    spine: Array  # front end of module 1, yaw joints and rear end of module N, m, (T, R, N+1, 2)
+    centres: Array  # of the modules, m, (T, R, N, 2)
+    headings: Array  # rad, left positive, (T, R, N)
+    feet: Array  # by module, side (left, right) and axis, m, (T, R, N, 2, 2)
+    stands: NDArray[np.bool_]  # True for each foot on the floor, (T, R, N, 2)
+    walks: NDArray[np.bool_]  # True while the record has the robot, (T, R)
 
 
 def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrames:
-    """Place modules and feet of a record at T times (s), by default those of the record.
+    """Place modules and feet of a record at T times (s), by default those of the record; a ParameterError if it does
+    not go with its robot.
 
     Between samples the body is interpolated, while the feet keep the gait's exact clock: standing ones move back along
     their module, swinging ones forward.
-
-    Raises
-    ------
-    ParameterError
-        If the record does not go with its robot.
     """
     robot = robot_of(record)
     recorded = record["time"].values.astype(np.float64)
@@ -112,22 +94,13 @@ def bodies(
 
 
 def robot_of(record: xr.Dataset) -> Robot:
-    """The robot that a record says it is of.
-
-    Raises
-    ------
-    ParameterError
-        If it says nothing, or has other joints.
-    """
+    """The robot that a record says it is of; a ParameterError if it says nothing, or has other joints."""
     if "robot" not in record.attrs:
         raise ParameterError("has no robot", field="record", allowed="the text of a robot file in attrs['robot']")
     robot = Robot.from_toml(record.attrs["robot"])
     if record.sizes["joint"] != robot.body.modules - 1:
-        raise ParameterError(
-            f"has {record.sizes['joint']} joints",
-            field="record",
-            allowed=f"{robot.body.modules - 1}, those of its robot",
-        )
+        allowed = f"{robot.body.modules - 1}, those of its robot"
+        raise ParameterError(f"has {record.sizes['joint']} joints", field="record", allowed=allowed)
     return robot
 
 
@@ -202,13 +175,7 @@ class Scene:
 
 def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: ArrayLike | None = None) -> Scene:
     """Everything that is drawn of a record at some times (s), by default those of the record; titles are by the labels
-    of the robots, or in their order.
-
-    Raises
-    ------
-    ParameterError
-        If the record does not go with its robot, or a robot has no title.
-    """
+    of the robots, or in their order. A ParameterError if it does not go with its robot, or a robot has no title."""
     frames = body_frames(record, times)
     aims = aims_of(record)
     radius = ARRIVAL_RADIUS if any(aims) else 0.0

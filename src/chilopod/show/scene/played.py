@@ -28,27 +28,13 @@ _RATE: Final = 25.0  # Hz; the eye needs no more, and every sample makes the pag
 
 @dataclass(frozen=True)
 class Replay:
-    """A page that plays walks, and needs nothing but itself.
+    """A page that plays walks, and needs nothing but itself."""
 
-    Attributes
-    ----------
-    heading
-        Heading of the page.
-    html
-        The page.
-    """
-
-    heading: str
-    html: str = field(repr=False)
+    heading: str  #: of the page
+    html: str = field(repr=False)  #: the page
 
     def write(self, path: str | Path, *, replace: bool = False) -> None:
-        """Write the page as a file, which opens from disk.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written, or is there and may not be replaced.
-        """
+        """Write the page as a file, which opens from disk; an OutputError if it is there and may not be replaced."""
         write_atomic(Path(path), self.html, replace=replace)
 
     def _repr_html_(self) -> str:

@@ -26,21 +26,16 @@ _WILDEST: Final = 10.0  # m and rad: what diverges is drawn no further than that
 
 def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
     """Data that the scripts of a page in three dimensions read: the joints' positions as whole numbers of 16 bits
-    (little-endian, in base64), from which they put the bodies where they are.
-
-    Raises
-    ------
-    ParameterError
-        If the poses of the record are not those of its robot.
-    """
+    (little-endian, in base64), from which they put the bodies where they are. A ParameterError if the poses of the
+    record are not those of its robot."""
     plan = compiled(shown.frames.robot)
     found = record["pose"].transpose("time", "robot", "coordinate")
     if found.sizes["coordinate"] != plan.model.nq:
-        raise ParameterError(
+        problem, allowed = (
             f"has poses of {found.sizes['coordinate']} coordinates",
-            field="record",
-            allowed=f"{plan.model.nq}, those of its robot",
+            f"{plan.model.nq}, those of its robot",
         )
+        raise ParameterError(problem, field="record", allowed=allowed)
     poses = _continued(found.sel(time=shown.frames.time).values, _quaternions(plan.model))
     origin, step = _scale(shown, poses)
     steps = packed(poses, origin, step)

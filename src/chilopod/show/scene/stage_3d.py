@@ -65,29 +65,15 @@ def framing(points: ArrayLike, aspect: float) -> View:
 
 @dataclass(frozen=True)
 class Look:
-    """Appearance of a robot in a picture.
+    """Appearance of a robot in a picture."""
 
-    Attributes
-    ----------
-    pose
-        MuJoCo's ``qpos``; None shows the floor alone.
-    stands
-        True for each foot on the floor, (N, 2).
-    walks
-        False of a robot that has failed: it is pale.
-    path, target
-        Path of module 1 so far, (P, 2), and place of the target, (2,), or None, m.
-    radius, arrived
-        Radius of arrival, m, and True if the target has been reached.
-    """
-
-    pose: Array | None
-    stands: NDArray[np.bool_]
-    walks: bool
-    path: Array
-    target: Array | None
-    radius: float
-    arrived: bool
+    pose: Array | None  # MuJoCo's ``qpos``; None shows the floor alone
+    stands: NDArray[np.bool_]  # True for each foot on the floor, (N, 2)
+    walks: bool  # False of a robot that has failed: it is pale
+    path: Array  # of module 1 so far, m, (P, 2)
+    target: Array | None  # its place, m, (2,)
+    radius: float  # of arrival, m
+    arrived: bool  # True if the target has been reached
 
 
 class Studio:
@@ -123,22 +109,12 @@ class Studio:
         self.context.free()
 
     def picture(self, look: Look, view: View) -> Pixels:
-        """Pixels of shape (height, width, 3); the next picture overwrites them.
-
-        Raises
-        ------
-        ParameterError
-            If the pose is not one of this robot.
-        """
+        """Pixels of shape (height, width, 3), overwritten by the next; a ParameterError for another robot's pose."""
         model, data, scene = self.model, self.data, self.scene
         if look.pose is not None:
             if look.pose.shape != data.qpos.shape:
-                raise ParameterError(
-                    "does not go with its robot",
-                    field="pose",
-                    value=look.pose.size,
-                    allowed=f"{data.qpos.size} numbers",
-                )
+                allowed = f"{data.qpos.size} numbers"
+                raise ParameterError("does not go with its robot", field="pose", value=look.pose.size, allowed=allowed)
             data.qpos[:] = look.pose
         strength = 1.0 if look.walks else _PALE
         stands, swings = to_rgb(COLORS["ink"]), to_rgb(COLORS["air"])

@@ -18,6 +18,8 @@ from chilopod.show.panel import Panel
 from chilopod.show.scene.outline import SLIMNESS, draw_modules
 from chilopod.show.words import SPRING_UNIT, k, minus, number, round_down
 
+Place = tuple[float, float]
+
 _SIDES = ("left", "right")
 _GUIDE: Any = {"color": style.GREY, "lw": 0.7, "linestyle": ":"}
 _COLORS = (style.BLUE, style.ORANGE)
@@ -28,13 +30,7 @@ _NARROW = style.Layout("A;B;C", 8.6, heights=(0.9, 1.5, 1.7))
 def panel(robot: Robot) -> Panel:
     """The schematic; it needs nothing computed."""
     data = legs(robot)
-    standing = [
-        f"{side} {module}"
-        for side in _SIDES
-        for module in data.module.values
-        if data.stands.sel(module=module, side=side)
-    ]
-    gait = robot.gait
+    standing = int(data.stands.sum())
     return Panel(
         name="schematic",
         letter="A",
@@ -50,8 +46,8 @@ def panel(robot: Robot) -> Panel:
             "stands, and forward through the air. Dots are feet that stand, dotted strokes those in the air.",
             "A standing foot that slips is held back in proportion to the speed of its slip; a foot in the air does "
             "nothing, so its way back is not part of the model. Where the body is drawn, its width is free. At the "
-            f"moment shown (t = 0) {len(standing)} of {2 * robot.body.modules} feet stand. On the straight walk, at "
-            f"{number(1e3 * gait.speed)}\u00a0mm/s, none of them slips and no spring is bent: whether that walk "
+            f"moment shown (t = 0) {standing} of {2 * robot.body.modules} feet stand. On the straight walk, at "
+            f"{number(1e3 * robot.gait.speed)}\u00a0mm/s, none of them slips and no spring is bent: whether that walk "
             "survives a small push is what everything below is about.",
         ),
         data=data,
@@ -99,7 +95,7 @@ def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:
     length, b, n = robot.module_length, robot.legs.half_width, robot.body.modules
     centres = data.centre_x.values
     draw_modules(axes, np.column_stack([centres, np.zeros(n)]), np.zeros(n), length, fc=style.PALE, ec=style.BLACK)
-    reach = max(b, 0.5 * SLIMNESS * length)
+    reach, body = max(b, 0.5 * SLIMNESS * length), robot.body.length
     for module in range(n):
         for side, sign in enumerate((1.0, -1.0)):
             _foot(axes, robot, centres[module], float(data.foot_x[module, side]), sign, _COLORS[side])
@@ -112,21 +108,16 @@ def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:
         _spring(axes, x, 0.0, size)
         if few or joint in (1, n - 1):
             line = {"arrowstyle": "-", "color": style.GREY, "lw": 0.7, "shrinkA": 0, "shrinkB": 2}
-            look: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 10, "arrowprops": line}
-            axes.annotate(k(joint), (x, 0.25 * reach), (x, 1.45 * reach), **look)
-    end = 0.05 * robot.body.length
-    style.arrow(axes, (0.25 * end, 0.0), (1.45 * end, 0.0), color=style.BLACK, lw=1.8)
-    y = -1.7 * reach
-    bar = round_down(0.15 * robot.body.length)
-    axes.plot([-robot.body.length, -robot.body.length + bar], [y, y], color=style.BLACK, lw=3, solid_capstyle="butt")
-    axes.text(-robot.body.length + 1.15 * bar, y, f"{number(100 * bar, 2)} cm", va="center", fontsize=style.SMALL)
-    axes.text(0.0, y, "walks this way →", ha="right", va="center", fontsize=style.SMALL)
+            axes.annotate(k(joint), (x, 0.25 * reach), (x, 1.45 * reach), ha="center", va="bottom", arrowprops=line)
+    style.arrow(axes, (0.0125 * body, 0.0), (0.0725 * body, 0.0), color=style.BLACK, lw=1.8)
+    y, bar = -1.7 * reach, round_down(0.15 * body)
+    axes.plot([-body, -body + bar], [y, y], color=style.BLACK, lw=3, solid_capstyle="butt")
+    look: dict[str, Any] = {"va": "center", "fontsize": style.SMALL}
+    axes.text(-body + 1.15 * bar, y, f"{number(100 * bar, 2)} cm", **look)
+    axes.text(0.0, y, "walks this way →", ha="right", **look)
     low = y - (1.3 * reach if narrow else 0.0)
-    axes.text(-0.5 * robot.body.length, low, _springs(robot), ha="center", va="center", fontsize=style.SMALL)
-    axes.set(
-        xlim=(-robot.body.length - 0.02 * robot.body.length, 0.08 * robot.body.length),
-        ylim=(low - 0.6 * reach, 2.3 * reach),
-    )
+    axes.text(-0.5 * body, low, _springs(robot), ha="center", **look)
+    axes.set(xlim=(-1.02 * body, 0.08 * body), ylim=(low - 0.6 * reach, 2.3 * reach))
 
 
 def _springs(robot: Robot) -> str:
@@ -142,15 +133,13 @@ def _springs(robot: Robot) -> str:
 def _foot(axes: Axes, robot: Robot, centre: float, foot: float, sign: float, color: str) -> None:
     """A leg with its stroke; the foot itself only while it stands."""
     middle, half, y = centre + robot.legs.forward_offset, 0.5 * robot.gait.stride, sign * robot.legs.half_width
-    standing = not np.isnan(foot)
-    look: dict[str, Any] = {"color": style.GREY, "lw": 1.2, "linestyle": (0, (1.5, 1.5))}
-    if standing:
-        look = {"color": color, "lw": 2.2}
-    axes.plot([middle - half, middle + half], [y, y], solid_capstyle="butt", **look)
-    if standing:
-        root = sign * 0.5 * SLIMNESS * robot.module_length
-        axes.plot([middle, foot], [root, y], color=color, lw=1.2)
-        axes.plot(foot, y, "o", color=color, markeredgecolor=style.BLACK, markersize=6, zorder=5)
+    stroke = [middle - half, middle + half], [y, y]
+    if np.isnan(foot):
+        axes.plot(*stroke, color=style.GREY, lw=1.2, linestyle=(0, (1.5, 1.5)))
+        return
+    axes.plot(*stroke, color=color, lw=2.2, solid_capstyle="butt")
+    axes.plot([middle, foot], [sign * 0.5 * SLIMNESS * robot.module_length, y], color=color, lw=1.2)
+    axes.plot(foot, y, "o", color=color, markeredgecolor=style.BLACK, markersize=6, zorder=5)
 
 
 def _spring(axes: Axes, x: float, y: float, size: float) -> None:
@@ -166,50 +155,40 @@ def _one_module(axes: Axes, robot: Robot) -> None:
     style.bare(axes)
     axes.set_title("One module, enlarged")
     length, b, x0, stride = robot.module_length, robot.legs.half_width, robot.legs.forward_offset, robot.gait.stride
+    side = 0.5 * SLIMNESS * length
     draw_modules(axes, np.zeros((1, 2)), np.zeros(1), length, fc=style.PALE, ec=style.BLACK)
     axes.plot(0.0, 0.0, "+", color=style.BLACK, markersize=9)
-    for x in (-0.5 * length, 0.5 * length):
-        axes.plot(x, 0.0, "o", color="white", markeredgecolor=style.BLACK, markersize=6)
-    reach = max(b, 0.5 * SLIMNESS * length)
-    step = 0.3 * max(reach, 0.3 * length)
+    axes.plot([-0.5 * length, 0.5 * length], [0.0, 0.0], "o", color="white", markeredgecolor=style.BLACK, markersize=6)
+    reach = max(b, side)
+    step, ends = 0.3 * max(reach, 0.3 * length), (x0 - 0.5 * stride, x0 + 0.5 * stride)
     for sign, color in ((1.0, _COLORS[0]), (-1.0, _COLORS[1])):
-        y = sign * b
-        axes.plot([x0, x0], [sign * 0.5 * SLIMNESS * length, y], color=color, lw=1.2)
-        axes.plot([x0 - 0.5 * stride, x0 + 0.5 * stride], [y, y], color=color, lw=3, solid_capstyle="butt")
-        axes.plot([x0 - 0.5 * stride, x0 + 0.5 * stride], [y, y], "|", color=color, markersize=10, markeredgewidth=2)
+        axes.plot([x0, x0], [sign * side, sign * b], color=color, lw=1.2)
+        axes.plot(ends, [sign * b] * 2, color=color, lw=3, solid_capstyle="butt")
+        axes.plot(ends, [sign * b] * 2, "|", color=color, markersize=10, markeredgewidth=2)
     look: dict[str, Any] = {"va": "center", "fontsize": style.SMALL}
     behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
     axes.text(x0 - 0.7 * stride, b, "PEP", ha="right", bbox=behind, **look)
     axes.text(x0 + 0.7 * stride, b, "AEP", ha="left", **look)
-    top = reach + step
-    _measure(axes, (x0 - 0.5 * stride, top), (x0 + 0.5 * stride, top), f"stride {_mm(stride)}", (x0, top + 0.3 * step))
-    low = -reach - step
+    above, below = {"ha": "center", "va": "bottom"}, {"ha": "center", "va": "top"}
+    top, low = reach + step, -reach - step
+    _measure(axes, (ends[0], top), (ends[1], top), f"stride {_mm(stride)}", (x0, top + 0.3 * step), above)
     if x0 != 0.0:
-        _measure(axes, (0.0, low), (x0, low), f"forward offset {_mm(x0)}", (0.5 * x0, low - 0.35 * step), below=True)
+        words = f"forward offset {_mm(x0)}"
+        _measure(axes, (0.0, low), (x0, low), words, (0.5 * x0, low - 0.35 * step), below)
     axes.plot([0.0, 0.0], [0.0, low], **_GUIDE)
     axes.plot([x0, x0], [-b, low], **_GUIDE)
     low -= 2.0 * step
     words = f"module length {_mm(length)}"
-    _measure(axes, (-0.5 * length, low), (0.5 * length, low), words, (0.0, low - 0.2 * step), below=True)
-    side = -0.28 * length
-    at = (side - 0.03 * length, 0.5 * (b + 0.5 * SLIMNESS * length))
-    _measure(axes, (side, 0.0), (side, b), f"half-width\n{_mm(b)}", at, left=True)
-    axes.plot([side, x0 - 0.5 * stride], [b, b], zorder=0, **_GUIDE)
+    _measure(axes, (-0.5 * length, low), (0.5 * length, low), words, (0.0, low - 0.2 * step), below)
+    x, at = -0.28 * length, (-0.31 * length, 0.5 * (b + side))
+    _measure(axes, (x, 0.0), (x, b), f"half-width\n{_mm(b)}", at, {"ha": "right", "va": "center"})
+    axes.plot([x, ends[0]], [b, b], zorder=0, **_GUIDE)
     axes.set(xlim=(-0.66 * length, 0.66 * length), ylim=(low - 1.6 * step, top + 1.6 * step))
 
 
-def _measure(
-    axes: Axes,
-    start: tuple[float, float],
-    end: tuple[float, float],
-    label: str,
-    at: tuple[float, float],
-    below: bool = False,
-    left: bool = False,
-) -> None:
+def _measure(axes: Axes, start: Place, end: Place, label: str, at: Place, side: dict[str, Any]) -> None:
     style.arrow(axes, start, end, arrowstyle="|-|, widthA=0.25, widthB=0.25", color=style.BLACK, lw=1.0)
-    ha, va = ("right", "center") if left else ("center", "top" if below else "bottom")
-    axes.text(*at, label, ha=ha, va=va, fontsize=style.SMALL)
+    axes.text(*at, label, fontsize=style.SMALL, **side)
 
 
 def _gait(axes: Axes, robot: Robot, data: xr.Dataset) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
+from chilopod.paper.shapes import finish
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, minus, number, spring
@@ -27,15 +27,14 @@ _STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "marke
 
 def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
     """The exponents over k1; the crossing is the located pitchfork where it is there."""
-    crossing = None if mode is None else mode.attrs["value"]
     critical = _critical(data)
+    value = None if critical is None else _crossing(data, critical) if mode is None else mode.attrs["value"]
     count = data.sizes["exponent"]
     first, last = float(data.k1[0]), float(data.k1[-1])
     fastest = float(data["real"].min())
-    if critical is None:
+    if critical is None or value is None:
         seen = "None of them crosses the imaginary axis in this range, so the straight walk keeps its stability."
     else:
-        value = crossing if crossing is not None else _crossing(data, critical)
         born = np.flatnonzero(data["imaginary"].values[:, critical] == 0.0)
         paired = bool(born.size) and born[0] > 0
         rest = np.delete(data["real"].values, critical, axis=1)
@@ -55,7 +54,7 @@ def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
         name="exponents",
         letter="B",
         title="Floquet exponents as k₁ falls",
-        draw=lambda narrow: _draw(data, crossing, narrow),
+        draw=lambda narrow: _draw(data, value, narrow),
         alt=f"{count} Floquet exponents in the complex plane as the front spring falls from {first:g} to {last:g} "
         + f"{SPRING_UNIT}: "
         + ("one crosses into the right half-plane along the real axis." if critical is not None else "none crosses."),
@@ -82,82 +81,69 @@ def _crossing(data: xr.Dataset, critical: int) -> float:
     """Where the curve passes zero, read off between the values of the sweep."""
     real = data["real"].values[:, critical]
     after = int(np.flatnonzero(real > 0.0)[0])
-    share = real[after - 1] / (real[after - 1] - real[after])
-    ks = np.log(data.k1.values[after - 1 : after + 1])
-    return float(np.exp(ks[0] + share * (ks[1] - ks[0])))
+    beside = slice(after - 1, after + 1)
+    return float(np.exp(np.interp(0.0, real[beside], np.log(data.k1.values[beside]))))
 
 
 def _joined(data: xr.Dataset) -> tuple[Array, Array, Array]:
-    """The curves with the points where two of them meet and part filled in.
-
-    Where a complex pair becomes two real exponents or the other way round, the mean of the two and the square of half
-    their difference still change smoothly with k1; between two values of the sweep these are drawn as straight lines.
-    Without that the curves would cut the corner. Returns k1, real and imaginary parts, with more values where needed.
-    """
-    values = data["real"].values + 1j * data["imaginary"].values
-    logs = np.log(data.k1.values)
+    """k1, real and imaginary parts of the curves, with the points where two of them meet and part filled in: straight
+    lines between two values of the sweep would cut the corner there."""
+    values, logs = data["real"].values + 1j * data["imaginary"].values, np.log(data.k1.values)
     rows, at = [values[:1]], [logs[:1]]
-    for index in range(len(logs) - 1):
-        start, end = values[index], values[index + 1]
-        changed = (start.imag == 0.0) != (end.imag == 0.0)
-        if not changed.any():
-            rows.append(values[index + 1 : index + 2])
-            at.append(logs[index + 1 : index + 2])
-            continue
-        pairs = []
-        for one in np.flatnonzero(changed):
-            paired = start if start[one].imag != 0.0 else end
-            other = int(np.abs(paired - paired[one].conjugate()).argmin())
-            ends = np.array([[start[one], end[one]], [start[other], end[other]]])
-            pairs.append((one, ends.mean(axis=0).real, 0.5 * (ends[0] - ends[1])))
-        meetings = [(half[0] ** 2 / (half[0] ** 2 - half[1] ** 2)).real for _, _, half in pairs]
-        share = np.unique(np.concatenate([np.linspace(0.0, 1.0, 33)[1:], meetings]))
-        between = start + share[:, None] * (end - start)
-        for one, mean, half in pairs:
-            square = (half**2).real
-            squares = square[0] + share * (square[1] - square[0])
-            squares[np.abs(squares) < 1e-12 * np.abs(square).max()] = 0.0
-            swinging, growing = half[square.argmin()].imag, half[square.argmax()].real
-            roots = np.where(
-                squares < 0.0,
-                1j * np.sign(swinging) * np.sqrt(np.abs(squares)),
-                np.sign(growing) * np.sqrt(np.abs(squares)),
-            )
-            between[:, one] = mean[0] + share * (mean[1] - mean[0]) + roots
+    for index, (start, end) in enumerate(zip(values[:-1], values[1:], strict=True)):
+        share, between = _between(start, end)
         rows.append(between)
         at.append(logs[index] + share * (logs[index + 1] - logs[index]))
     table = np.concatenate(rows)
     return np.exp(np.concatenate(at)), table.real, table.imag
 
 
+def _between(start: NDArray[np.complex128], end: NDArray[np.complex128]) -> tuple[Array, NDArray[np.complex128]]:
+    """Parts of the way from one value of the sweep to the next, and the exponents there.
+
+    Where a complex pair becomes two real exponents or the other way round, the mean of the two and the square of half
+    their difference still change smoothly with k1.
+    """
+    pairs = []
+    for one in np.flatnonzero((start.imag == 0.0) != (end.imag == 0.0)):
+        paired = start if start[one].imag != 0.0 else end
+        other = int(np.abs(paired - paired[one].conjugate()).argmin())
+        half = 0.5 * np.array([start[one] - start[other], end[one] - end[other]])
+        pairs.append((one, 0.5 * np.array([start[one] + start[other], end[one] + end[other]]).real, half))
+    meetings = [(half[0] ** 2 / (half[0] ** 2 - half[1] ** 2)).real for *_, half in pairs]
+    share = np.unique([*np.linspace(0.0, 1.0, 33)[1:], *meetings]) if pairs else np.ones(1)
+    between = start + share[:, None] * (end - start)
+    for one, mean, half in pairs:
+        square = (half**2).real
+        squares = square[0] + share * (square[1] - square[0])
+        squares[np.abs(squares) < 1e-12 * np.abs(square).max()] = 0.0
+        roots = np.sqrt(squares.astype(np.complex128))
+        growing, swinging = np.sign(half[square.argmax()].real), np.sign(half[square.argmin()].imag)
+        between[:, one] = mean[0] + share * (mean[1] - mean[0]) + growing * roots.real + 1j * swinging * roots.imag
+    return share, between
+
+
 def _draw(data: xr.Dataset, crossing: float | None, narrow: bool) -> Figure:
     figure, axes = style.figure(_WIDE, _NARROW, narrow)
-    ks, real, imaginary = _joined(data)
     critical = _critical(data)
     lead = critical if critical is not None else 0
-    colors = _colors(data)
+    curves = ks, real, imaginary = _joined(data)
+    colors = [style.CURVES[place % len(style.CURVES)] for place in range(data.sizes["exponent"])]
+    if critical is not None:
+        colors = [*colors[:critical], style.VERMILLION, *colors[critical:-1]]
     _near(axes["A"], real, imaginary, lead, colors)
     _labels(axes["A"], ks, real[:, lead], imaginary[:, lead], _MARKED[::2] if narrow else _MARKED)
-    _all(axes["B"], real, imaginary, colors, ks)
-    over_k1(axes["C"], data, crossing)
-    if critical is not None:
-        value = crossing if crossing is not None else _crossing(data, critical)
-        axes["A"].plot(0.0, 0.0, zorder=8, **_STAR)
-        axes["A"].annotate(
-            f"crosses at\nk₁ = {number(value, 4)}\n{SPRING_UNIT}",
-            (0.0, 0.0),
-            (14, 42),
-            textcoords="offset points",
-            weight="bold",
-            arrowprops={"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 7},
-        )
+    _all(axes["B"], curves, lead, colors)
+    _over_k1(axes["C"], ks, real, lead, colors)
+    if crossing is not None:
+        look: dict[str, Any] = {"textcoords": "offset points", "weight": "bold"}
+        line = {"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 7}
+        for letter, place in (("A", 0.0), ("C", crossing)):
+            axes[letter].plot(place, 0.0, zorder=8, **_STAR)
+        words = f"crosses at\nk₁ = {number(crossing, 4)}\n{SPRING_UNIT}"
+        axes["A"].annotate(words, (0.0, 0.0), (14, 42), arrowprops=line, **look)
+        axes["C"].annotate(number(crossing), (crossing, 0.0), (-6, 9), ha="right", **look)
     return figure
-
-
-def _colors(data: xr.Dataset) -> list[str]:
-    count, critical = data.sizes["exponent"], _critical(data)
-    colors = [style.CURVES[place % len(style.CURVES)] for place in range(count)]
-    return colors if critical is None else [*colors[:critical], style.VERMILLION, *colors[critical:-1]]
 
 
 def _near(axes: Axes, real: Array, imaginary: Array, lead: int, colors: list[str]) -> None:
@@ -181,75 +167,57 @@ def _labels(axes: Axes, ks: Array, real: Array, imaginary: Array, marked: tuple[
             continue
         x, y = (float(np.interp(np.log(k1), np.log(ks[::-1]), part[::-1])) for part in (real, imaginary))
         axes.plot(x, y, "o", color="white", markeredgecolor=style.VERMILLION, markersize=5.5, zorder=6)
-        swings = abs(y) > 1e-3
-        stiffest = k1 == max(marked)
-        style.note(
-            axes,
-            f"k₁ =\n{k1:g}" if stiffest else f"{k1:g}",
-            (x, y),
-            (-8, 0) if stiffest else (4, 7) if swings else (0, -8),
-            ha="right" if stiffest else "left" if swings else "center",
-            va="center" if stiffest else "bottom" if swings else "top",
-        )
+        words, away, ha, va = f"{k1:g}", (0, -8), "center", "top"
+        if k1 == max(marked):
+            words, away, ha, va = f"k₁ =\n{k1:g}", (-8, 0), "right", "center"
+        elif abs(y) > 1e-3:
+            away, ha, va = (4, 7), "left", "bottom"
+        style.note(axes, words, (x, y), away, ha=ha, va=va)
 
 
-def _all(axes: Axes, real: Array, imaginary: Array, colors: list[str], ks: Array) -> None:
+def _all(axes: Axes, curves: tuple[Array, Array, Array], lead: int, colors: list[str]) -> None:
+    ks, real, imaginary = curves
     axes.set_title(f"All {real.shape[1]}, scale stretched around zero")
     axes.set_xscale("asinh", linear_width=0.05)
     ticks = [-1000.0, -100.0, -10.0, -1.0, -0.1, 0.0, 0.1, 1.0, 10.0]
     low, high = 1.6 * real.min(), max(1.6 * real.max(), 0.1)
     axes.set_xlim(low, high)
-    axes.xaxis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: minus(f"{value:g}")))
+    _ticks(axes, [tick for tick in ticks if low <= tick <= high])
     reach = 1.5 * max(np.abs(imaginary).max(), 0.05)
     axes.set_ylim(-reach, reach)
     _half_planes(axes)
-    for index in _back_to_front(real.shape[1], colors.index(style.VERMILLION) if style.VERMILLION in colors else 0):
+    for index in _back_to_front(real.shape[1], lead):
         axes.plot(real[:, index], imaginary[:, index], color=colors[index], lw=2.2)
         axes.plot(real[0, index], imaginary[0, index], "o", color="white", markeredgecolor=colors[index], markersize=6)
         axes.plot(real[-1, index], imaginary[-1, index], "o", color=colors[index], markersize=3.5)
     axes.set(xlabel="real part (1/s)", ylabel="imaginary part (rad/s)")
-    axes.legend(
-        handles=[
-            Line2D(
-                [], [], marker="o", linestyle="", color="white", markeredgecolor=style.BLACK, label=f"k₁ = {ks[0]:g}"
-            ),
-            Line2D([], [], marker="o", linestyle="", color=style.BLACK, markersize=4, label=f"k₁ = {ks[-1]:g}"),
-        ],
-        loc="upper left",
-        handletextpad=0.2,
-        borderaxespad=0.1,
-    )
+    ends = ((ks[0], "white", 6), (ks[-1], style.BLACK, 4))
+    for k1, fill, size in ends:
+        look: dict[str, Any] = {"markeredgecolor": style.BLACK, "markersize": size, "label": f"k₁ = {k1:g}"}
+        axes.plot([], [], "o", color=fill, **look)
+    axes.legend(loc="upper left", handletextpad=0.2, borderaxespad=0.1)
 
 
-def over_k1(axes: Axes, data: xr.Dataset, crossing: float | None) -> None:
-    """Draw the real parts of the slow exponents over k1; the crossing, if it was not located, is read off the curve."""
-    ks, real, _ = _joined(data)
-    critical, colors = _critical(data), _colors(data)
-    lead = critical if critical is not None else 0
+def _over_k1(axes: Axes, ks: Array, real: Array, lead: int, colors: list[str]) -> None:
+    """Draw the real parts of the slow exponents over k1."""
     axes.set_title("Growth rate of the slow ones")
     axes.set_xscale("log")
     axes.set_xlim(ks.max(), ks.min())
     high = max(real[:, lead].max(), 0.05)
     axes.set_ylim(-3.2 * max(high, np.abs(real[:, lead]).max()), 1.25 * high)
-    axes.axhspan(0.0, axes.get_ylim()[1], color=style.VERMILLION, alpha=0.1, lw=0)
+    axes.axhspan(0.0, 1.25 * high, color=style.VERMILLION, alpha=0.1, lw=0)
     axes.axhline(0.0, color=style.BLACK, lw=0.8)
     for index in _back_to_front(real.shape[1], lead):
         axes.plot(ks, real[:, index], color=colors[index], lw=2.6 if index == lead else 1.8)
-    if critical is not None:
-        value = crossing if crossing is not None else _crossing(data, critical)
-        axes.plot(value, 0.0, zorder=8, **_STAR)
-        axes.annotate(number(value), (value, 0.0), (-6, 9), textcoords="offset points", ha="right", weight="bold")
-    axes.text(
-        0.03, axes.get_ylim()[1] * 0.9, "unstable", transform=axes.get_yaxis_transform(), va="top", fontsize=style.SMALL
-    )
-    shown = [tick for tick in (100.0, 50.0, 20.0, 10.0, 5.0, 2.0, 1.0) if ks.min() <= tick <= ks.max()]
-    axes.xaxis.set_major_locator(FixedLocator(shown))
+    look: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "top", "fontsize": style.SMALL}
+    axes.text(0.03, 1.125 * high, "unstable", **look)
+    _ticks(axes, [tick for tick in (100.0, 50.0, 20.0, 10.0, 5.0, 2.0, 1.0) if ks.min() <= tick <= ks.max()])
+    finish(axes, xlabel=f"k₁ ({SPRING_UNIT}), softer →", ylabel="real part (1/s)")
+
+
+def _ticks(axes: Axes, places: list[float]) -> None:
+    axes.set_xticks(places, [minus(f"{place:g}") for place in places])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set(xlabel=f"k₁ ({SPRING_UNIT}), softer →", ylabel="real part (1/s)")
-    style.grid(axes)
 
 
 def _half_planes(axes: Axes) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from chilopod.paper import printed
 from chilopod.robot import Robot
 from chilopod.show import style
+from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
 from chilopod.tasks.identify import Identification
@@ -20,24 +24,18 @@ Array = NDArray[np.float64]
 
 _WIDE = style.Layout("ABC;DEF", 6.2)
 _NARROW = style.Layout("A;B;C;D;E;F", 17.0)
-_OWN = {
-    "friction",
-    "half_width",
-    "largest_residual",
-    "critical_k1",
-    "uniform",
-    "uniform_frequency",
-    "coefficient",
-    "verdict",
-}
+
+
+def identification_files(found: Identification, folder: Path) -> Iterator[tuple[Path, bytes]]:
+    """Files of the profile, its figure and the data, see :func:`chilopod.show.files.panel_files`."""
+    return panel_files(panel(found), folder, folder)
 
 
 def panel(fit: Identification) -> Panel:
     """The profile of a fit, with the robot it was given beside."""
     data, best = fit.profile, fit.best
-    inside = _inside(data)
-    ours = np.abs(fit.preset_residuals).max()
-    met = np.abs(fit.residuals).max() <= 1.0
+    inside = data.largest_residual.values <= 1.0
+    largest, ours = (float(np.abs(each).max()) for each in (fit.residuals, fit.preset_residuals))
     return Panel(
         name="identification",
         letter="G",
@@ -52,19 +50,14 @@ def panel(fit: Identification) -> Panel:
             "printed digit: below 1, a computed number rounds to the printed one.",
             f"The best fit has {best.ground.friction:.1f} N·s/m, {1e3 * best.legs.half_width:.1f} mm and "
             f"{1e3 * best.legs.forward_offset:.1f} mm, with a largest residual of "
-            f"{number(float(np.abs(fit.residuals).max()), 2)}: {'all six are met' if met else 'not all six are met'}. "
-            + f"This robot, with {1e3 * fit.given.legs.forward_offset:.1f} mm, has {number(float(ours), 3)}. "
+            f"{number(largest, 2)}: {'all six are met' if largest <= 1.0 else 'not all six are met'}. "
+            + f"This robot, with {1e3 * fit.given.legs.forward_offset:.1f} mm, has {number(ours, 3)}. "
             + _valley(fit),
             _predicted(data, inside),
             _verdict(data, inside),
         ),
         data=data,
     )
-
-
-def _inside(data: xr.Dataset) -> NDArray[np.bool_]:
-    allowed: NDArray[np.bool_] = data.largest_residual.values <= 1.0
-    return allowed
 
 
 def _valley(fit: Identification) -> str:
@@ -77,8 +70,8 @@ def _valley(fit: Identification) -> str:
     )
 
 
-def _others(data: xr.Dataset) -> list[str]:
-    return [str(name) for name in data.data_vars if name not in _OWN]
+def _variants_of(data: xr.Dataset) -> list[str]:
+    return [name for name in printed.VARIANTS if name in data]
 
 
 def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
@@ -91,7 +84,7 @@ def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
 
     return (
         "What does that leave open? Along the shaded valley the variants, which were not fitted, move little: "
-        + listing(f"{span(name)} for {typeset(name)}" for name in _others(data))
+        + listing(f"{span(name)} for {typeset(name)}" for name in _variants_of(data))
         + f" (all in {SPRING_UNIT}). The critical spring of a uniform body moves much more: "
         f"{span('uniform')} {SPRING_UNIT}. That one number, had it been printed for the planar "
         "model, would narrow the forward offset."
@@ -134,13 +127,12 @@ def _draw(fit: Identification, narrow: bool) -> Figure:
     axes["A"].set_ylim(0.0, 1.15 * max(data.largest_residual.values.max(), 1.0))
     _fitted(axes["B"], x, data.friction.values, "Friction fitted", "friction (N·s/m)")
     _fitted(axes["C"], x, 1e3 * data.half_width.values, "Half-width fitted", "half-width (mm)")
-    _mark(axes, fit.best, fit.residuals, marker="D", color=style.VERMILLION, markerfacecolor="white", label="best fit")
-    _mark(axes, fit.given, fit.preset_residuals, marker="o", color=style.BLUE, label="this robot")
+    _mark(axes, fit.best, fit.residuals, "D", color=style.VERMILLION, markerfacecolor="white", label="best fit")
+    _mark(axes, fit.given, fit.preset_residuals, "o", color=style.BLUE, label="this robot")
     _variants(axes["D"], x, data)
     _fitted(axes["E"], x, data.uniform.values, "Not fitted: uniform springs", f"critical k ({SPRING_UNIT})")
     _coefficient(axes["F"], x, data)
-    handles, labels = axes["A"].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=1 if narrow else 4)
+    figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside upper left", ncols=1 if narrow else 4)
     return figure
 
 
@@ -149,32 +141,24 @@ def _fitted(axes: Axes, x: Array, values: Array, title: str, label: str) -> None
     axes.set(title=title, ylabel=label)
 
 
-def _mark(axes: dict[str, Axes], robot: Robot, residuals: Array, **look: Any) -> None:
+def _mark(axes: dict[str, Axes], robot: Robot, residuals: Array, marker: str, **look: Any) -> None:
     """Where a robot lies in the three panels of what is fitted."""
-    shown = {"A": np.abs(residuals).max(), "B": robot.ground.friction, "C": 1e3 * robot.legs.half_width}
-    for letter, value in shown.items():
-        axes[letter].plot(
-            1e3 * robot.legs.forward_offset, value, linestyle="", markeredgewidth=1.6, markersize=6.5, zorder=5, **look
-        )
+    offset, values = 1e3 * robot.legs.forward_offset, (robot.ground.friction, 1e3 * robot.legs.half_width)
+    for letter, value in zip("ABC", (np.abs(residuals).max(), *values), strict=True):
+        axes[letter].plot(offset, value, marker, markeredgewidth=1.6, markersize=6.5, zorder=5, **look)
 
 
 def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
     axes.set_title("Not fitted: variants")
-    for index, name in enumerate(_others(data)):
+    for index, name in enumerate(_variants_of(data)):
         values = data[name].values
         axes.plot(x, values, color=style.CURVES[index], linestyle=("-", "--", "-.")[index % 3])
         # Curves rise: there is room above the left of the highest and below the right of the others.
-        top = name == max(_others(data), key=lambda each: float(data[each].mean()))
-        place = int(0.75 * len(x)) if top else len(x) // 3
-        style.note(
-            axes,
-            typeset(name),
-            (x[place], values[place]),
-            (0, 5 if top else -5),
-            ha="right" if top else "left",
-            va="bottom" if top else "top",
-        )
-    values = np.array([data[name].values for name in _others(data)])
+        place, away, ha, va = len(x) // 3, -5, "left", "top"
+        if name == max(_variants_of(data), key=lambda each: float(data[each].mean())):
+            place, away, ha, va = int(0.75 * len(x)), 5, "right", "bottom"
+        style.note(axes, typeset(name), (x[place], values[place]), (0, away), ha=ha, va=va)
+    values = np.array([data[name].values for name in _variants_of(data)])
     axes.set(ylim=(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5), ylabel=f"critical k₁ ({SPRING_UNIT})")
 
 
@@ -190,5 +174,5 @@ def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:
         style.note(axes, f"changes at\n{place:.1f} mm", (place, 0.0), (6, 10))
     high = np.nanmax(np.abs(values))
     axes.set_ylim(-1.5 * high, 1.5 * high)
-    axes.text(0.97, 0.97, "subcritical", transform=axes.transAxes, ha="right", va="top", fontsize=style.SMALL)
-    axes.text(0.97, 0.03, "supercritical", transform=axes.transAxes, ha="right", fontsize=style.SMALL)
+    for at, words, va in ((0.97, "subcritical", "top"), (0.03, "supercritical", "baseline")):
+        axes.text(0.97, at, words, transform=axes.transAxes, ha="right", va=va, fontsize=style.SMALL)
