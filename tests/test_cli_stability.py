@@ -93,7 +93,7 @@ def test_no_crossing_is_an_empty_list_and_it_says_so(capsys):
     stiff = ("20 N*mm/deg", "75 N*mm/deg")
     code, out, _ = bifurcation(capsys, "--json", between=stiff)
     assert code == 0
-    assert json.loads(out) == {"robot": PRESET, "points": []}
+    assert json.loads(out) == {"robot": PRESET, "points": [], "complete": True}
     code, out, _ = bifurcation(capsys, between=stiff)
     assert code == 0
     assert "no bifurcation" in out
@@ -102,7 +102,7 @@ def test_no_crossing_is_an_empty_list_and_it_says_so(capsys):
 def test_the_symmetry_of_the_gait_itself_may_vary(capsys):
     code, out, _ = bifurcation(capsys, "--json", parameter="gait.side_phase", between=("170 deg", "190 deg"))
     assert code == 0
-    assert json.loads(out) == {"robot": PRESET, "points": []}
+    assert json.loads(out) == {"robot": PRESET, "points": [], "complete": True}
 
 
 def test_out_holds_what_json_prints(capsys, tmp_path):

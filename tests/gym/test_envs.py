@@ -414,3 +414,25 @@ def test_rewards_are_numbers(worth):
 def test_how_long_a_walk_is_likely_to_be_is_a_time(expected):
     with pytest.raises(ParameterError, match="expected"):
         planar.start(load_robot("aoi2022-planar"), expected=expected)
+
+
+@dataclasses.dataclass(frozen=True)
+class Wrong(Straight):
+    """A task whose reward has the wrong shape, or is no number."""
+
+    shape: int = 7
+
+    def reward(self, look):
+        return np.full(self.shape, np.nan)
+
+
+@pytest.mark.parametrize(("shape", "problem"), [(7, "must give one reward for each robot"), (1, "must give finite")])
+def test_a_reward_that_is_none_is_refused(shape, problem):
+    env = RobotEnv(task=Wrong(target=Target(0.0, 1.0), shape=shape))
+
+    def begin_and_step():
+        env.reset(seed=0)
+        env.step(np.zeros(3))
+
+    with pytest.raises(ParameterError, match=problem):
+        begin_and_step()

@@ -72,7 +72,7 @@ def test_a_stretch_of_nothing_is_refused(monkeypatch):
         (rows, pieces, robots._replace(yaw=robots.yaw[:, :1]), tolerance, *rest),
         (rows, pieces, robots, tolerance, rest[0][:, :-1], *rest[1:]),
     ):
-        with pytest.raises(ParameterError, match="fit together"):
+        with pytest.raises(ParameterError, match="must fit the number"):
             stretch.carry(*spoilt)
         assert not stretch.walk_abreast(*spoilt)
         assert not stretch.walk(1, *spoilt)

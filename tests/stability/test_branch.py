@@ -182,3 +182,12 @@ def test_a_real_double_multiplier_is_no_pair():
     assert point.value == pytest.approx(1.1976250148166, abs=1e-9)
     assert point.bifurcation.multiplicity == 2
     assert not branch.remarks
+
+
+@pytest.mark.parametrize("periods", [0, -1, 1.5, True])
+def test_a_number_of_periods_is_a_whole_number(periods):
+    def family(a):
+        return from_rhs(lambda t, x: [-x[0] + a], 1, 1.0)
+
+    with pytest.raises(ParameterError, match="periods"):
+        begin(family, 1.0, [1.0], periods=periods)

@@ -537,3 +537,12 @@ def test_the_oregonator_over_a_wide_interval():
     assert all(
         abs(point.value - value) <= point.error_bound + 1e-11 for point, value in zip(found, expected, strict=True)
     )
+
+
+def test_hopf_points_are_found_where_growth_soon_exceeds_all_numbers():
+    def family(a):
+        return from_rhs(lambda t, x: [a * x[0] - x[1] - x[0] ** 3, x[0] + a * x[1]], 2, None, guess_period=6.0)
+
+    found = locate_hopf(family, (-1.0, 1000.0), [0.0, 0.0])
+    assert not found.complete
+    assert any("cannot be followed beyond" in remark for remark in found.remarks)

@@ -1,5 +1,6 @@
 """Every crossing in the interval is found, none is invented, and each lies within its error bound."""
 
+import contextlib
 from math import pi
 
 import numpy as np
@@ -236,3 +237,31 @@ def test_two_orbits_that_pass_each_other_at_a_distance(gap, side):
 
     found = locate(passing, (-1.0, 1.3), orbit=[0.5 * (-1.0 + side * np.hypot(1.0, gap))])
     assert (len(found), found.status.name) == (0, "COMPLETE")
+
+
+@pytest.mark.parametrize("high", [1.8, 2.2, 2.6, 3.0, 5.0, 8.0])
+def test_a_pitchfork_of_a_symmetry_that_is_not_declared_is_found_or_left_open(high):
+    """Beyond it a long step comes down on an orbit that leaves there, whose multiplier lies within the circle again."""
+
+    def family(a):
+        return from_rhs(lambda t, x: [a * x[0] - x[0] ** 3 + np.cos(t)], 1, 2.0 * np.pi)
+
+    found = locate(family, (0.3, high), orbit=[0.25], normal_form=False)
+    assert not found.complete or [round(point.value, 6) for point in found] == [1.100428]
+
+
+def test_a_search_that_is_out_of_time_after_the_first_orbit_is_a_result():
+    cells = 12
+
+    def ring(mu):
+        def rhs(t, x):
+            u, v = x[:cells], x[cells:]
+            return np.concatenate([v, mu * (1.0 - u * u) * v - u + 0.1 * (np.roll(u, 1) - 2.0 * u + np.roll(u, -1))])
+
+        return from_rhs(rhs, 2 * cells, None, guess_period=6.3)
+
+    guess = np.concatenate([2.0 * np.ones(cells), np.zeros(cells)])
+    find_orbit(ring(0.5), guess)  # compiles
+    for seconds in (0.2, 0.4, 0.8):
+        with contextlib.suppress(AnalysisError):  # there is no first orbit yet
+            assert not locate(ring, (0.5, 2.0), orbit=guess, seconds=seconds).complete

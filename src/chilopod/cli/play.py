@@ -37,7 +37,7 @@ def play(
     free([out], force)
     with progress_bar("play") as show:
         html = page(described, lambda done, words: show("branch of curved walks", done, words))
-    write_atomic(out, html, replace=force, folders=False)
+    write_atomic(out, html, replace=force)
     if as_json:
         print_json({"robot": described.name, "file": str(out)})
     else:

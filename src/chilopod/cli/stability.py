@@ -48,15 +48,13 @@ def bifurcation(
     from chilopod import units
     from chilopod.analysis import bifurcations
 
+    remarks: list[str] = []
     with progress_bar("bifurcation"):
-        points = bifurcations(
-            described,
-            parameter,
-            limits,
-            remark=lambda text: typer.echo(f"note: {text}", err=True),
-            seconds=seconds,
-        )
-    result = {"robot": described.name, "points": [point.as_json() for point in points]}
+        points = bifurcations(described, parameter, limits, remark=remarks.append, seconds=seconds)
+    for text in remarks:
+        typer.echo(f"note: {text}", err=True)
+    result = {"robot": described.name, "points": [point.as_json() for point in points], "complete": not remarks}
     ends = " and ".join(units.format(each, described.unit_of(parameter), digits=6) for each in limits)
-    none = f"{described.name}: no bifurcation of the straight walk for {parameter} between {ends}"
+    found = "no bifurcation" if not remarks else "the search is incomplete, and found no bifurcation"
+    none = f"{described.name}: {found} of the straight walk for {parameter} between {ends}"
     options.deliver_json(files, result, [line for point in points for line in point.lines()] or [none])

@@ -223,7 +223,7 @@ class Episodes:
                 distance=np.where(others, again.distance, seen.distance),
             )
         look = Look(judged, busy, self._away - away, left, self.period, self.robot.gait.speed)
-        reward = np.where(fresh, 0.0, self.task.reward(look))
+        reward = self._rewarded(look, fresh)
         self._away = np.where(others, _distance(aims, pose), away)
         terminated, truncated = self.task.ending(look)
         if (self._cycle + 1) * self.period > LONGEST:
@@ -242,6 +242,16 @@ class Episodes:
             "arrived": self._arrived.copy(),
         }
         return Step(self.sight.row(self._through(seen)), reward, terminated, truncated, info)
+
+    def _rewarded(self, look: Look, fresh: Marks) -> Array:
+        """Reward of the task, checked: one finite number for each robot, 0 where an episode has just begun."""
+        reward = np.asarray(self.task.reward(look), dtype=np.float64)
+        if reward.shape != look.left.shape:
+            raise ParameterError("must give one reward for each robot", field="reward", value=f"shape {reward.shape}")
+        reward = np.where(fresh, 0.0, reward)
+        if not np.isfinite(reward).all():
+            raise ParameterError("must give finite rewards", field="reward", value=reward)
+        return reward
 
     def _through(self, seen: Observation) -> Observation:
         """Observation with the noise and the view of the scanners."""

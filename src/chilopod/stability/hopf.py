@@ -36,6 +36,7 @@ from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 
+_LARGEST = 1e150  # growth within a guessed period: its square is a number still
 _EPSILON = float(np.finfo(float).eps)
 _POINTS = 2000  # return maps for what is looked at beside a point: of the map they cost next to nothing
 _BESIDE = 1e-5  # of the interval: where the rate of an eigenvalue is taken, by central differences
@@ -216,6 +217,8 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
         both[:n, :n], both[:n, n] = scaled, (t1 - t0) * velocity / units
         with np.errstate(all="ignore"):
             power = scipy.linalg.expm(both)
+        if not np.abs(power).max() < _LARGEST:  # NaN too
+            raise AnalysisError("a disturbance grows too much within the guessed period", field="equilibrium")
         # A relative error of the exponent is one of its norm times as much (Higham, Functions of Matrices, ch. 10).
         error = 16.0 * _EPSILON * (1.0 + float(np.abs(scaled).sum(axis=1).max())) * float(np.abs(power[:n, :n]).max())
         ratios = units[:, None] / units

@@ -7,7 +7,7 @@ import pytest
 
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import bifurcations
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
 from chilopod.tasks.identify import CriticalMode, planar
@@ -17,7 +17,7 @@ DATA = critical_mode_data()
 
 
 def test_residuals_need_the_number_of_modules_of_the_data():
-    with pytest.raises(AnalysisError, match="6 modules"):
+    with pytest.raises(AnalysisError, match="must be 6"):
         planar.residuals(ROBOT.with_value("body.modules", 7), DATA)
 
 
@@ -65,3 +65,22 @@ def test_data_that_contradict_each_other_allow_nothing():
     data = dataclasses.replace(DATA, components=DATA.components[::-1])
     ranges, _ = planar._ranges(ROBOT, data, np.array([ROBOT.get(path) for path in planar.FREE]))
     assert np.isnan(ranges).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("k1_tolerance", -1.0),
+        ("k1", np.nan),
+        ("component_tolerance", 0.0),
+        ("between", (40.0, 4.0)),
+        ("components", (6.0,) * 5),
+    ],
+)
+def test_data_that_are_none_are_refused(field, value):
+    with pytest.raises(ParameterError, match=field):
+        dataclasses.replace(DATA, **{field: value})
+
+
+def test_a_mode_is_a_direction():
+    assert dataclasses.replace(DATA, components=tuple(-each for each in DATA.components)) == DATA

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.arguments import checked_count, finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 IN_FOLD = 1e-6
 """Part of a unit tangent along the parameter below which a curve starts in a fold, as closely as its start is known."""
 
+_MOST_PERIODS = 1000
 _RESTS = 0.01  # of each state: a guess that near an equilibrium, from which no orbit is found, is meant to be it
 _BESIDE = 1e-3  # in units: where second differences are taken
 _SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
@@ -113,6 +115,8 @@ def begin(
     AnalysisError
         If there is no orbit near the guess, or ``family`` raises an exception.
     """
+    periods = checked_count("periods", periods, _MOST_PERIODS)
+    (value,) = finite_array([value], (1,), "value").tolist()
     with Deadline(seconds), UserCode("family", value):
         system = family(value)
         guess = known_state(system) if orbit is None else orbit
@@ -167,7 +171,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     ParameterError
         If nothing that can be followed leaves the point, or it is no special point.
     """
-    old = None
+    old, periods = None, checked_count("periods", periods, _MOST_PERIODS)
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
             raise ParameterError("is no special point", field="point", value=point.value)

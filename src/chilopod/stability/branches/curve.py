@@ -60,7 +60,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
         sizes = self.units(len(jacobian))[:-1]
-        scaled = jacobian * sizes / sizes[:, None] - np.eye(len(jacobian))
+        with np.errstate(over="ignore"):
+            scaled = jacobian * sizes / sizes[:, None] - np.eye(len(jacobian))
         return np.block([[scaled, (derivative / sizes)[:, None]], [tangent[None]]])
 
     def moved(self, start: BranchPoint, x: Array, value: float) -> Array:

@@ -148,6 +148,7 @@ class FamilyReturns:
     def _parameter_step(self, value: float, steepness: float) -> float:
         """A small change of the parameter that stays within the interval, as the numbers are that differ by it."""
         step = _PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP)
+        step = max(step, 8.0 * float(np.spacing(abs(value))))
         return (value + step) - value if value + step <= self.between[1] else (value - step) - value
 
     def difference(self, x: Array, value: float, section: Section | None, mapped: Array, beside: Array | None) -> Array:

@@ -17,6 +17,7 @@ from chilopod.stability.normal_forms.normal_form import normal_form as normal_fo
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap, returned_states
 from chilopod.stability.problem.scales import sizes
@@ -25,7 +26,7 @@ from chilopod.stability.search.samples import Samples
 from chilopod.stability.shown import bounded as bounded_text
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, find_crossings
+from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
 
 Array = NDArray[np.float64]
@@ -105,9 +106,12 @@ def checked_interval(between: tuple[float, float]) -> tuple[float, float]:
 
 def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[tuple[Block | None, Crossings]]:
     """The crossings in every block of the return map."""
-    blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
-    # Of the first orbit hardly a trace may be left after a return; of those that are followed from it there is more.
-    uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
+    try:
+        blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
+        # Of the first orbit hardly a trace may be left after a return; of those that are followed from it is more.
+        uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
+    except SpentError as error:
+        return [(None, Crossings((), SearchStatus.BUDGET, (error.problem,), 0))]
 
     def whole(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)

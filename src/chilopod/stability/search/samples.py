@@ -42,6 +42,7 @@ _APART = 0.1  # of the distance of two samples: how far from these another one t
 _BEHIND = 4  # samples by which the next one is foreseen
 _BENT = 0.3  # of the distance of two orbits: how far from the straight line the one between them may be
 _TOUCHING = 0.25  # of a multiplier's distance from +1: straight lines that meet nearer to it may touch it
+_TELLING = 1.0 / 128.0  # of the interval: a step in which a multiplier that turns back at +1 is seen to do so
 _MERGED = 1e-5  # of the interval: a gap in which they still do
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
@@ -330,6 +331,7 @@ class Samples:
                 found = self._sampled(target, guess, last)
                 # A large jump means that Newton's method has found another orbit.
                 other = self.jumped(found.orbit, guess) or not self._connected(last, guess, found)
+                other = other or self._turns_back(path[-2:], found)
             except SpentError:
                 break
             except AnalysisError:
@@ -343,6 +345,23 @@ class Samples:
             longer = target + 2.0 * (target - last.value)
             target = longer if abs(value - longer) > smallest and longer < value else value
         return path[len(behind) :]
+
+    def _turns_back(self, behind: list[Sample], found: Sample) -> bool:
+        """True if a multiplier heads for +1 and is farther from it, on the same side, at the end of a step.
+
+        The step may have gone over to an orbit that leaves at a pitchfork; shorter steps tell. Multipliers grow about
+        exponentially.
+        """
+        if len(behind) < 2 or found.value - behind[-1].value <= _TELLING * self.width:
+            return False
+        first, left = behind
+        off = np.array([first.beside_plus_one, left.beside_plus_one, found.beside_plus_one])
+        if not (np.isfinite(off).all() and (off > -1.0).all() and (np.sign(off) == np.sign(off[1])).all()):
+            return False
+        rates = np.log1p(off)
+        ahead = rates[1] + (rates[1] - rates[0]) * (found.value - left.value) / (left.value - first.value)
+        heads = np.sign(ahead) != np.sign(rates[1]) or abs(ahead) < abs(rates[1])
+        return bool(heads and abs(rates[2]) > abs(rates[1]))
 
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
         """True if an orbit that was not foreseen is on the branch of the last one: then there is one about halfway

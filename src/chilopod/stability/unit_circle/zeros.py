@@ -170,7 +170,7 @@ class _Search:
 
     def _parts(self, a: float, b: float, signs: Array, logs: Array) -> list[_Part]:
         """Parts of a piece; none if it has to be cut."""
-        absent = np.isnan(signs) | np.isnan(logs)
+        absent = np.isnan(signs) | np.isnan(logs) | (logs == np.inf)
         if absent.any():
             return [_Part(a, b, _Kind.MISSING)] if absent.all() or self._fine(a, b, _HOLE) else []
         reference = float(logs.max())

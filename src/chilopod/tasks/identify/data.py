@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.engine.arguments import as_number
+from chilopod.errors import ParameterError
+
 Array = NDArray[np.float64]
+
+_UNIT = 0.1  # that rounding may leave of the norm of a mode
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,24 @@ class CriticalMode:
     k1_tolerance: float
     component_tolerance: float
     between: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        for name in ("k1", "k1_tolerance", "component_tolerance"):
+            value = as_number(name, getattr(self, name))
+            if not 0.0 < value < math.inf:
+                raise ParameterError("must be positive and finite", field=name, value=value)
+        low, high = (as_number("between", each) for each in self.between)
+        if not 0.0 < low < self.k1 < high < math.inf:
+            raise ParameterError(
+                "must hold k1", field="between", value=self.between, allowed="two rising springs, N*mm/deg"
+            )
+        mode = np.array([as_number("components", each) for each in self.components])
+        if not (mode.size and abs(np.linalg.norm(mode) - 1.0) < _UNIT):
+            raise ParameterError(
+                "must have the norm 1", field="components", value=self.components, allowed="cosines, one for each joint"
+            )
+        # A mode is a direction: both signs are the same mode.
+        object.__setattr__(self, "components", tuple((mode * np.sign(mode.sum() or 1.0)).tolist()))
 
 
 @dataclass(frozen=True)

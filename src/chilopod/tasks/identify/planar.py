@@ -120,7 +120,9 @@ class Identification(Summary):
     def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         constants = self.as_json()["constants"].items()
         rows = [(path, each["text"], each["allowed_text"]) for path, each in constants]
-        return [], [("constant", "best", "allowed by the data"), *rows], []
+        cut = [path for path, each in constants if any(each["cut_by_the_search"])]
+        said = [f"a bound of the search ends the range of {path}: the data allow more" for path in cut]
+        return [], [("constant", "best", "allowed by the data"), *rows], said
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the largest residual over the forward offset, where the other constants are fitted again."""
