@@ -84,8 +84,8 @@ def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
         array = None
     wanted = f"an array of shape {shape}" if shape else "one number"
     if array is None:
-        what = "array of numbers" if shape else "number"
-        raise ParameterError(f"returns no {what} but {_kind_of(result)}", field=field, allowed=wanted)
+        what = "an array of numbers" if shape else "a number"
+        raise ParameterError(f"must return {what}, not {_kind_of(result)}", field=field, allowed=wanted)
     if array.shape != shape:
         raise ParameterError(f"returns an array of shape {array.shape}", field=field, allowed=wanted)
     return array
@@ -111,7 +111,7 @@ def check_shape(
     except (ArithmeticError, ValueError) as error:
         if "shape" not in str(error) and "sequence" not in str(error):
             return  # a singularity just here: no fault of the function
-        raise ParameterError(f"returns no array of numbers ({error})", field=field) from error
+        raise ParameterError(f"must return an array of numbers ({error})", field=field) from error
     except Exception as error:
         raise ParameterError(
             f"cannot be evaluated at a state of shape {x.shape} ({type(error).__name__}: {error})", field=field
@@ -149,7 +149,7 @@ def check_symmetry(
     wrong = (off.reshape(alike) > _SAME * largest).reshape(off.shape).any(axis=0)
     if wrong.any():
         raise ParameterError(
-            f"is no symmetry of the right-hand side, as at t = {t[wrong][0]:g}",
+            f"must be a symmetry of the right-hand side, but fails at t = {t[wrong][0]:g}",
             field=field,
             allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
         )

@@ -192,9 +192,9 @@ class CalledFlow:
             calls += 1
             if calls > _MOST_CALLS:
                 raise AnalysisError(
-                    f"takes too many steps, and came to t = {t:g} only",
+                    f"takes too many steps: the integration stopped at t = {t:g}",
                     field="rhs",
-                    allowed="a right-hand side that is less stiff, or one without branches, which is traced",
+                    allowed="a less stiff right-hand side, or one without branches, which can be traced",
                 )
             if ended[0] != 0.0:
                 raise deadline.over()

@@ -23,13 +23,13 @@ DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8
 _REASONS = {
     NOT_FINITE: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
     BUDGET: (
-        "takes too many steps, and came to t = {t:g} only",
+        "takes too many steps: the integration stopped at t = {t:g}",
         "method='implicit' if it is stiff, or a shorter interval",
     ),
     STALLED: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
     SLIDES: (
         "slides along a switching surface from t = {t:g} on: the motion is pushed back from both sides",
-        "a right-hand side that says how it slides",
+        "a right-hand side that defines the sliding motion",
     ),
     CHATTERS: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
     GRAZES: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),

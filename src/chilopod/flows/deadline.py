@@ -103,7 +103,7 @@ def stop() -> Array:
 
 def over() -> SpentError:
     """The error of a flow that has no more time."""
-    return SpentError("the time is over", field="seconds")
+    return SpentError("the time limit is reached", field="seconds")
 
 
 def _now() -> float:

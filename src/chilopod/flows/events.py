@@ -47,7 +47,7 @@ def checked_events(events: object) -> tuple[Event, ...]:
     if isinstance(events, Event):
         return (events,)
     if not isinstance(events, Sequence) or not all(isinstance(event, Event) for event in events):
-        raise ParameterError("must be events", field="events", value=events, allowed="[Event(guard, reset), ...]")
+        raise ParameterError("must be a list", field="events", value=events, allowed="[Event(guard, reset), ...]")
     return tuple(events)
 
 
@@ -80,13 +80,13 @@ def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array,
         if orbit is not None and not np.isfinite(values[0]):
             raise ParameterError("is not finite on the orbit", field=name, value=float(values[0]))
         if not np.isfinite(values).any():
-            raise ParameterError("is finite at none of the states it was tried at", field=name)
+            raise ParameterError("must be finite, but was not at any state that was tried", field=name)
         if not np.nan_to_num(values).any():
             raise ParameterError("is zero at all states", field=name, allowed="a function that passes zero")
         for j, other in known.items():
             if np.array_equal(values, other, equal_nan=True) and event.direction * events[j].direction != -1:
                 raise ParameterError(
-                    f"is that of events[{j}]: of events at the same instant only the first happens",
+                    f"must differ from that of events[{j}]: of events at one instant only the first happens",
                     field=name,
                     allowed="one event with a reset that does both",
                 )
@@ -104,7 +104,7 @@ def _value(
         return None
     if not shape:
         if isinstance(result, bool | np.bool_):
-            raise ParameterError("is true or false", field=name, allowed="a number that passes zero at the event")
+            raise ParameterError("must return a number, not true or false", field=name, allowed="zero at the event")
         if isinstance(result, list | tuple | np.ndarray) and np.size(result) == 1:
             result = np.ravel(result)[0]
     return numbers(result, shape, name)

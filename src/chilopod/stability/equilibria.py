@@ -143,7 +143,7 @@ def autonomous(system: SystemLike) -> Autonomous:
     """A system that is seen not to depend on time."""
     if not is_autonomous(system):
         raise ParameterError(
-            "depends on time: it has no equilibria", field="system", allowed="period=None, and no t in the function"
+            "must not depend on time", field="system", allowed="period=None, and no t in the function"
         )
     return system
 
@@ -305,7 +305,7 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
     rate = point.rate
     if rate is None or point.criticality in (None, Criticality.UNDECIDED):
         raise ParameterError(
-            "is a Hopf point of which the coefficients do not tell on which side its cycles are",
+            "is a Hopf point whose coefficients leave the side of its cycles undecided",
             field="point",
             value=point.value,
         )
@@ -340,5 +340,5 @@ def _cycle(
         found = find_orbit(system, rest + moved, with_error=False, section=section, settle=False)
     missed = float(np.linalg.norm((found.state - rest - moved) / units))
     if not missed <= _MISSED * float(np.linalg.norm(moved / units)):
-        raise AnalysisError("the orbit that is found is another one", field="orbit")
+        raise AnalysisError("the corrector found another orbit", field="orbit")
     return value, found, (found.state - rest) / np.sqrt(abs(shift))

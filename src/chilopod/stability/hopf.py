@@ -244,7 +244,7 @@ def _hopf_point(
             value = min(max(value - off / rate.real, low), high)
     bound = (abs(off) + float(here.error_bounds[index])) / abs(rate.real) + 4.0 * _EPSILON * abs(value)
     if not bound <= _KNOWN * (high - low):
-        raise AnalysisError("its eigenvalues are not known well enough", field="family", value=value)
+        raise AnalysisError("the eigenvalues are not accurate enough", field="family", value=value)
     form = hopf_form(system, here.state, here.error, frequency)
     with UserCode("family", value):
         cubics = [hopf_form(there, each.state, each.error, frequency).cubic.real for there, each in beside]

@@ -288,7 +288,7 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
         if left <= accuracy:
             break
     if left > _UNSOLVED:
-        raise AnalysisError("no move closes the motion: one return later all states near the guess are off alike")
+        raise AnalysisError("no correction closes the motion: a return moves all states near the guess alike")
     values, vectors = np.linalg.eig(subspace.matrix)
     largest = vectors[:, np.argsort(-np.abs(values))[: _LANES - 1]]
     return move, subspace.basis @ np.where(largest.imag.any(axis=0), largest.imag + largest.real, largest.real)

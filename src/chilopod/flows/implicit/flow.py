@@ -82,7 +82,7 @@ class ImplicitFlow(ReadOnlyArrays):
     def __post_init__(self) -> None:
         if not can_be_implicit(self.tape):
             raise ParameterError(
-                "does not take events or switches in the state",
+                "does not support events or switches in the state",
                 field="method",
                 value="implicit",
                 allowed="'taylor', or a right-hand side that is smooth in the state",

@@ -48,7 +48,7 @@ def _clip(value: Any, low: Any = None, high: Any = None, **_: Any) -> Any:
 
 def _where_arrays(condition: Any, *choices: Any) -> Any:
     if len(choices) != 2:
-        raise Untraceable("it asks where an array is not zero")
+        raise Untraceable("it needs the places where an array is not zero")
     return wrapped(np.frompyfunc(_where, 3, 1)(*(plain(as_traced(value)) for value in (condition, *choices))))
 
 

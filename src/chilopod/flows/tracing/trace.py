@@ -144,7 +144,7 @@ def _record(
         if count is not None and array.shape != (count,):
             raise Untraceable(f"returns the shape {array.shape}")
         if count is None and array.size != 1:
-            raise Untraceable("a guard is no number")
+            raise Untraceable("a guard must return one number")
         if len(graph.nodes) > _MOST_NODES:
             raise Untraceable("it takes too many operations")
         return [node_of(graph, value) for value in array.ravel()]
@@ -177,7 +177,7 @@ def _verify(
         near = evaluate(tape, tape.slopes, t * (1 + _NEAR), x, params * (1 - _NEAR))
         pairs.append((real, own, np.abs(near - own)))
     if not pairs:
-        raise Untraceable("it could not be evaluated at any state it was tried at")
+        raise Untraceable("it could not be evaluated at any state that was tried")
     real, own, rounding = (np.array(part) for part in zip(*pairs, strict=True))
     if real.shape != own.shape:
         raise Untraceable(f"returns the shape {real.shape[1:]}")
@@ -188,4 +188,4 @@ def _verify(
     if (np.abs(np.where(both, real - own, 0.0)) > allowed).any() or (
         np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
     ).any():
-        raise Untraceable("it gives other values when called again: it has a memory, or chance in it")
+        raise Untraceable("it gives other values when called again: it has memory or random numbers")

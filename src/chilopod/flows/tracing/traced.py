@@ -65,7 +65,7 @@ class Traced(_Recording, np.lib.mixins.NDArrayOperatorsMixin):
     def _value(self, *_: Any) -> Any:
         if self.graph.depends[self.node] == CONSTANT:
             raise Concrete(self.graph.parameters_below(self.node))
-        raise Untraceable("it asks for the value of a number: a branch, an index, or a function of another library")
+        raise Untraceable("it needs the value of a number: a branch, an index, or a function of another library")
 
     __bool__ = __float__ = __int__ = __index__ = __complex__ = __hash__ = __round__ = _value
     # Equal to nothing but itself: a test that spares the one state where a formula has a gap.

@@ -158,7 +158,7 @@ class Branch(Result):
         """
         values, orbits = map(np.array, columns(self.points, "value", "orbit").values())
         if state not in range(orbits.shape[1]):
-            raise ParameterError("is no state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
+            raise ParameterError("must be a state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
         axes, color, state = axes_for(axes), None, int(state)
         for verdict, first, last in self._stretches():
             part = slice(first, last + 1)
@@ -280,12 +280,12 @@ def proceed(
     """
     low, high = _checked(between, points, longest)
     if not isinstance(branch, Branch):
-        raise ParameterError("is no branch", field="branch", value=branch, allowed="what `follow` gives")
+        raise ParameterError("must be a branch", field="branch", value=branch, allowed="a Branch from `follow`")
     end = branch.points[-1]
     if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
         raise ParameterError(
-            "does not go on beyond the branch's last point", field="between", value=between,
-            allowed=f"{end.value!r} well within",
+            "must extend beyond the branch's last point", field="between", value=between,
+            allowed=f"an interval around {end.value!r}",
         )  # fmt: skip
     orbits: dict[str, Any] = {"periods": branch.periods, "symmetric": branch.symmetric, "precision": precision}
     allowed = Budget(budget, seconds)
@@ -304,7 +304,7 @@ def _checked(between: tuple[float, float], points: int | None, longest: float) -
     if not (np.isfinite(low) and np.isfinite(high) and low < high and np.isfinite(high - low)):
         raise ParameterError("must rise from a lower to a higher finite value", field="between", value=between)
     if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
-        raise ParameterError("is too narrow for the numbers in it", field="between", value=between)
+        raise ParameterError("is too narrow for double precision", field="between", value=between)
     if points is not None:
         checked_count("points", points, sys.maxsize)
     if not longest > 0:
@@ -318,13 +318,13 @@ def _anchored(
     """Where the first step starts; the curve gets the sizes of its states."""
     if isinstance(start, BifurcationPoint):
         raise ParameterError(
-            "is a bifurcation point", field="start", value=start.kind.label, allowed="what switch(family, point) gives"
+            "is a bifurcation point", field="start", value=start.kind.label, allowed="a start from `switch`"
         )
     if not isinstance(start, Start | BranchPoint):
         guess = start.state if isinstance(start, Orbit) else start
         start = begin(family, low, guess, symmetric=curve.symmetric)
     if not curve.between[0] <= start.value <= curve.between[1]:
-        raise ParameterError("does not hold the start", field="between", value=curve.between, allowed=f"{start.value}")
+        raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
     if isinstance(start, Start):
         curve.periods = start.periods
         curve.sizes = branch_sizes(curve, start)

@@ -35,8 +35,8 @@ _PARTS = 2.0**-8, 2.0**-4  # of a return
 _DECADES, _HALVINGS = 12, 12  # of the size, on its logarithm
 
 _LEFT_BY_NONE = {
-    Kind.FOLD: "is a fold: the branch itself goes round it, with follow",
-    Kind.NEIMARK_SACKER: "is a Neimark-Sacker point: what leaves it is a torus, which is announced but not followed",
+    Kind.FOLD: "is a fold: `follow` passes it along the same branch",
+    Kind.NEIMARK_SACKER: "is a Neimark-Sacker point: a torus leaves it, which cannot be followed",
     Kind.KREIN_COLLISION: "is a Krein collision: no periodic orbits leave it",
 }
 """Kinds of points that no branch is switched to from, and why."""
@@ -139,7 +139,7 @@ def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
         raise AnalysisError(
             "is an equilibrium, not an orbit",
             field="orbit",
-            allowed="a state on an orbit; of equilibria locate_hopf, then switch, find the cycles",
+            allowed="a state on an orbit; locate_hopf, then switch, find the cycles of an equilibrium",
         )
 
 
@@ -170,11 +170,11 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     old = None
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
-            raise ParameterError("is no special point", field="point", value=point.value)
+            raise ParameterError("must be a special point", field="point", value=point.value)
         old = None if point.units is None else point.tangent * point.units
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
-        raise ParameterError("is no located point", field="point", value=point, allowed="one that `locate` gives")
+        raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
     kind = point.kind
     if kind in _LEFT_BY_NONE:
         raise ParameterError(_LEFT_BY_NONE[kind], field="point", value=point.value)
@@ -283,7 +283,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     matrix = curve.matrix(image.jacobian, derivative, np.zeros(n + 1))[:-1]
     if not np.isfinite(matrix).all():
         raise AnalysisError(
-            "the flow is not finite at values of the parameter beside it", field="start", allowed="another value"
+            "the flow is not finite at neighbouring values of the parameter", field="start", allowed="another value"
         )
     if start.mode is None:
         tangent = _along(matrix, start.rising)
@@ -313,7 +313,7 @@ def _along(matrix: Array, rising: bool) -> Array:
     _, values, rows = np.linalg.svd(matrix)
     if values[-1] <= _SINGULAR * max(1.0, float(values[0])):
         raise AnalysisError(
-            "branches meet here: the orbit alone does not tell which one to follow",
+            "branches meet here: the orbit alone does not determine one",
             field="start",
             allowed="another value, or switch from the located point",
         )

@@ -294,7 +294,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         raise AnalysisError(
             "the orbit shrinks into an equilibrium: a Hopf point"
             if extent <= motion
-            else "the orbit nearly rests in its section, and the next step has no direction",
+            else "the motion nearly stops in the section, and the next step has no direction",
             field="orbit",
         )
 

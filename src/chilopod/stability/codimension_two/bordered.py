@@ -176,7 +176,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         except AnalysisError as error:
             if error.field != "step":
                 raise
-            allowed = "a point that was located in this family at `second`"
+            allowed = "a point located in this family at `second`"
             raise AnalysisError("the curve was not found", field="start", allowed=allowed) from error
         return self.spot(found.place, anchor.frame, None)
 

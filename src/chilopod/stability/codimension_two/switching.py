@@ -38,7 +38,7 @@ _CURVES = {
 }
 _OTHERS = {
     CodimensionTwo.CUSP: "is a cusp: the curve of folds itself goes through it",
-    CodimensionTwo.CHENCINER: "is a Chenciner point: what leaves it are folds of tori, which are not followed",
+    CodimensionTwo.CHENCINER: "is a Chenciner point: folds of tori leave it, which cannot be followed",
 }
 
 
@@ -76,11 +76,11 @@ def switch2(
     box = checked_box(between)
     if not isinstance(point, SpecialPoint2):
         raise ParameterError(
-            "is no point of codimension two", field="point", value=point, allowed="one of `curve.special`"
+            "must be a point of codimension two", field="point", value=point, allowed="one of `curve.special`"
         )
     kind = _CURVES.get(point.kind)
     if kind is None:
-        why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, which no curve is known to leave here")
+        why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, from which no curve can be followed")
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     allowed = Budget(budget, seconds)
     periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
@@ -130,7 +130,7 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
     beside = [critical(target, equations.along(spot, size), spot.frame) for size in (-_BESIDE, _BESIDE)]
     low, high = forms = [detector.form(each) for each in beside]
     if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
-        raise AnalysisError("the cubic coefficient is not seen to change along the curve", field="point")
+        raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
     fifth = detector.fifth(here, detector.form(here), *forms)
     if fifth is None:
         raise AnalysisError("no coefficient of fifth order was found", field="point")

@@ -99,12 +99,12 @@ def follow2(
         outward, periods, second = start.outward, start.periods, start.second
         family2, start = over_periods(family2, periods), start.point
     if not isinstance(start, BifurcationPoint):
-        raise ParameterError("is no located point", field="start", value=start, allowed="one that `locate` gives")
+        raise ParameterError("must be a located point", field="start", value=start, allowed="a point from `locate`")
     if second is None:
         raise ParameterError("must be given", field="second", allowed="the value of q at the start")
     values = np.array([start.value, second], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
-        raise ParameterError("does not hold the start", field="between", value=between, allowed=f"{values} within")
+        raise ParameterError("must hold the start", field="between", value=between, allowed=f"around {values}")
     target, known = _what(family2, start, second)
     curve = CriticalCurve(family2, target, known, box, Budget(budget, seconds))
     nu = complex(start.multiplier)
@@ -153,7 +153,7 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     """The critical multiplier, 0 for a pair, and whether the orbit is no unknown."""
     system = family2(start.value, second)
     if start.orbit.shape != (system.dimension,):
-        raise ParameterError("is of another system", field="start", value=start.orbit.shape)
+        raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
     if start.kind is Kind.KREIN_COLLISION:
         raise ParameterError("is a Krein collision, which is not followed", field="start", value=start.value)
     known = knows_orbit(system) and start.kind is not Kind.FOLD
@@ -164,9 +164,9 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
         return target, known
     if not reverses(system, start.mode, sizes(system, start.orbit, return_duration(system))):
         raise ParameterError(
-            f"is a {start.kind.label} that two parameters would unfold",
+            f"is a {start.kind.label} that the second parameter unfolds",
             field="start",
-            allowed="one that the systems' spatial_symmetry keeps, or systems that know their orbit",
+            allowed="a point that spatial_symmetry preserves, or systems with a known orbit",
         )
     return target, known
 

@@ -47,10 +47,10 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     if len(states) < _FEWEST_ROWS:
         raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
     if not (np.diff(times) > 0.0).all():
-        raise ParameterError("has times that do not rise", field="orbit")
+        raise ParameterError("must have rising times", field="orbit")
     lasts = float(times[-1] - times[0])
     if not is_autonomous(system) and not abs(lasts - whole) <= _SAME_PERIOD * whole:
-        raise ParameterError("is not of one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
+        raise ParameterError("must cover one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
     duration = lasts / returns_per_period(system)
     return Nodes(CubicSpline(times - times[0], states)(np.arange(_OF_GUESS) * duration / _OF_GUESS), duration)
 

@@ -100,7 +100,7 @@ def known_state(system: SystemLike) -> Array:
     orbit = known_orbit(system)
     if orbit is None:
         raise AnalysisError(
-            "this system does not know its periodic orbit", field="orbit", allowed="a first guess of it"
+            "this system has no known periodic orbit", field="orbit", allowed="a first guess of the orbit"
         )
     return np.asarray(orbit, dtype=np.float64)
 
@@ -150,7 +150,7 @@ def find_orbit(
         If neither helps.
     """
     if not hasattr(system, "flow"):
-        raise ParameterError("is no system", field="system", value=system, allowed="what `from_rhs` gives")
+        raise ParameterError("must be a system", field="system", value=system, allowed="a system from `from_rhs`")
     if guess is None:
         return from_known(system, known_state(system), with_error, budget=budget)
     whole = whole_orbit(guess, system)
@@ -250,9 +250,9 @@ def from_known(
     if off <= _KNOWN:
         return _solved(system, Nodes(x[None], return_duration(system)), with_error, budget)
     raise AnalysisError(
-        f"is no periodic orbit: one return later the state is {float(moved.max()):.1e} away",
+        f"must be a periodic orbit: one return moves the state by {float(moved.max()):.1e}",
         field="orbit",
-        allowed="a state on the orbit at time 0, or as a first guess, which is then improved",
+        allowed="a state on the orbit at time 0, or a first guess, which is then improved",
     )
 
 
@@ -294,7 +294,7 @@ def _found(system: SystemLike, x: Array, duration: float, size: Array, with_erro
     """The orbit through a state that is on it, with the section across its own motion; ``size`` is of the states."""
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
         raise AnalysisError(
-            "the motion rests in an equilibrium near the guess",
+            "the corrector found an equilibrium near the guess",
             field="orbit",
             allowed="a guess closer to an orbit",
         )

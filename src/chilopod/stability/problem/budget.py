@@ -63,7 +63,7 @@ class Budget(Deadline):
             If there is none left.
         """
         if self.left <= 0:
-            raise SpentError("as many flows as were allowed are spent", field="budget")
+            raise SpentError("the budget of flows is spent", field="budget")
         if self.late:
             raise over()
         self.left = max(self.left - count, 0)

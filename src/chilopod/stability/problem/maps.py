@@ -55,7 +55,7 @@ def from_map(
             pair: Any = image(x)
             if not (isinstance(pair, tuple | list) and len(pair) == 2):
                 raise ParameterError(
-                    "returns no pair", field="image", value=type(pair).__name__, allowed="(state, derivative)"
+                    "must return a pair", field="image", value=type(pair).__name__, allowed="(state, derivative)"
                 )
             x, factor = numbers(pair[0], (n,), "image"), numbers(pair[1], (n, n), "image")
             derivative, reach = factor @ derivative, np.abs(factor) @ reach

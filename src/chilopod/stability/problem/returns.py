@@ -132,7 +132,7 @@ def section_at(
     if duration is None:
         duration = return_duration(system)
     if not velocity.any():
-        raise AnalysisError("is an equilibrium: the motion rests in it", field="orbit", allowed="a state on an orbit")
+        raise AnalysisError("is an equilibrium", field="orbit", allowed="a state on an orbit")
     if scale is None:
         scale = sizes(system, x, duration)
     normal = velocity / scale**2
@@ -274,7 +274,7 @@ def crossing(
     raise AnalysisError(
         f"the motion does not come back to where it started after about {section.duration:.6g}",
         field="orbit",
-        allowed="a guess closer to an orbit, and of its period",
+        allowed="a guess closer to an orbit and its period",
     )
 
 

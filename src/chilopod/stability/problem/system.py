@@ -133,9 +133,9 @@ class PeriodicSystem(ReadOnlyArrays):
         for matrix in matrices:
             if _order(matrix) == 0:
                 raise ParameterError(
-                    "is of no finite order: applied again and again it never gives every state back",
+                    "must have a finite order: a power that is the identity",
                     field=name,
-                    allowed=f"up to {_HIGHEST_ORDER} times",
+                    allowed=f"an order up to {_HIGHEST_ORDER}",
                 )
         return matrices
 

@@ -162,7 +162,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         with_normal_form=with_normal_form and not touch,
     )
     if not point.error_bound < samples.width:
-        raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")
+        raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
     if touch:
         value_text = bounded_text(point.value, point.error_bound)
         return f"at {value_text} a multiplier only touches the unit circle and goes back: nothing changes"

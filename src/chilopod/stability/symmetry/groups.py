@@ -229,7 +229,7 @@ def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
     found = _factors(_scaled(group.elements[chosen], group.scales), len(chosen))
     if found is None:
         raise AnalysisError(
-            "is kept by elements that form no group: its error is at the edge of what tells them apart", field=field
+            "is invariant under elements that do not form a group: its error is too large", field=field
         )
     return _with_metric(group.elements[chosen[_needed(found[0])]], group.elements[chosen], group.scales)
 
@@ -254,7 +254,7 @@ def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
     q = group.orthogonal
     if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < _SAME:
         raise AnalysisError(
-            "are no exact symmetries, or too oblique", field="generators", allowed="matrices exact to 1e-9 or better"
+            "must be exact symmetries, less oblique", field="generators", allowed="matrices exact to 1e-9 or better"
         )
     return group
 

@@ -116,7 +116,7 @@ def isotypic(group: Group) -> tuple[Block, ...]:
         if blocks is not None:
             return tuple(sorted(blocks, key=_rank))
     raise AnalysisError(
-        "no symmetry-adapted basis found: the matrices are no exact symmetries",
+        "no symmetry-adapted basis found: the matrices are not exact symmetries",
         field="group",
         allowed="matrices exact to 1e-9 or better",
     )
@@ -193,7 +193,7 @@ def _is_real(rho: Array, character: Array) -> bool | None:
         raise AnalysisError(
             "the group has a representation of quaternionic type",
             field="group",
-            allowed="those of real or complex type",
+            allowed="representations of real or complex type",
         )
     return {(1, 1): True, (2, 0): False}.get(whole)
 

@@ -151,7 +151,7 @@ def _to_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[
         if not 0.0 < step.size <= tolerances.OVER * size:
             break
         return step
-    raise AnalysisError("the curve does not reach the end of the interval so soon", field="step")
+    raise AnalysisError("the curve does not reach the end of the interval within the step", field="step")
 
 
 def _on_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[int, float]) -> Step[A, S]:
