@@ -176,10 +176,10 @@ def halfway(value):
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        ("no", "no array of numbers but 'no'"),
-        (None, "no array of numbers but None"),
-        ([1.0, [2.0]], r"no array of numbers but \[1.0, \[2.0\]\]"),
-        ({"x": 1.0}, "no array of numbers but {'x': 1.0}"),
+        ("no", "an array of numbers, not 'no'"),
+        (None, "an array of numbers, not None"),
+        ([1.0, [2.0]], r"an array of numbers, not \[1.0, \[2.0\]\]"),
+        ({"x": 1.0}, "an array of numbers, not {'x': 1.0}"),
         ([1.0], r"returns an array of shape \(1,\); allowed: an array of shape \(2,\)"),
         (3.0, r"returns an array of shape \(\); allowed: an array of shape \(2,\)"),
     ],

@@ -93,7 +93,7 @@ class RightHandSide:
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
-            raise ParameterError("must be a method", field="method", value=self.method, allowed=", ".join(get_args(Method)))
+            raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
         self.dimension, self.args, self.tolerance = checked_arguments(
             self.rhs, self.dimension, self.args, self.tolerance
         )

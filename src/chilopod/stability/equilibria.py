@@ -142,9 +142,7 @@ def equilibrium_at(family: Family, value: float, guess: ArrayLike) -> tuple[Auto
 def autonomous(system: SystemLike) -> Autonomous:
     """A system that is seen not to depend on time."""
     if not is_autonomous(system):
-        raise ParameterError(
-            "must not depend on time", field="system", allowed="period=None, and no t in the function"
-        )
+        raise ParameterError("must not depend on time", field="system", allowed="period=None, and no t in the function")
     return system
 
 

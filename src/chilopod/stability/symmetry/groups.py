@@ -228,9 +228,7 @@ def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
     chosen = np.flatnonzero(members)
     found = _factors(_scaled(group.elements[chosen], group.scales), len(chosen))
     if found is None:
-        raise AnalysisError(
-            "is invariant under elements that do not form a group: its error is too large", field=field
-        )
+        raise AnalysisError("is invariant under elements that do not form a group: its error is too large", field=field)
     return _with_metric(group.elements[chosen[_needed(found[0])]], group.elements[chosen], group.scales)
 
 
