@@ -72,7 +72,7 @@ def _operands(graph: Graph, node: int, flat: Terms) -> list[int]:
 
 
 def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
-    """All nodes that some nodes need, in the order in which they came: every one after its operands."""
+    """All nodes that some nodes need, in order of creation: each after its operands."""
     seen: set[int] = set()
     ahead = list(roots)
     while ahead:
@@ -87,7 +87,7 @@ def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
 
 
 def _flattened(graph: Graph, roots: Sequence[int]) -> Terms:
-    """The terms of the sums, those of a sum that only one other uses taken into that one."""
+    """The terms of the sums; a sum that only one other sum uses is merged into it."""
     reached = _reached(graph, roots, {})
     uses = dict.fromkeys(reached, 0)
     for node in roots:

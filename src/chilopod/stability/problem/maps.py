@@ -16,7 +16,7 @@ from chilopod.stability.problem.system import PeriodicSystem
 Array = NDArray[np.float64]
 
 _SHAKE = 2.0**-52
-_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
+_OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _ROUNDING = 8.0 * float(np.finfo(float).eps)
 _LARGEST = 100_000
 
