@@ -1,9 +1,8 @@
-"""Branches of periodic orbits: pseudo-arclength continuation in one parameter, with what happens along the way.
+"""Branches of periodic orbits: pseudo-arclength continuation in one parameter, with their special points.
 
-A branch is a curve of pairs (orbit, parameter) with H(x, p) = x. It is followed by its arclength, so that folds are
-ordinary points of it (see :mod:`.curve`). Every step is looked into for what happens in it (see
-:mod:`.inspection`). A branch can be followed in pieces: what it ends with is all that the next step
-depends on.
+A branch is a curve of pairs (orbit, parameter) with H(x, p) = x. Its coordinate is the arclength, so folds are regular
+points (see :mod:`.curve`). Every step is searched for events (see :mod:`.inspection`). A branch can be followed in
+pieces: the next step depends only on its end.
 """
 
 from __future__ import annotations
@@ -44,13 +43,13 @@ __all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proce
 Array = NDArray[np.float64]
 
 LONGEST = 0.15
-"""Largest step along a curve by default, in units of the states' sizes and of the branch's scale."""
+"""Default largest step along a curve, in units of the states' sizes and of the branch's scale."""
 
 BUDGET = 200_000
-"""Flows that a branch may ask for by default."""
+"""Default budget of flows of a branch."""
 
-_STYLES = {True: "-", False: "--", None: ":"}  # of lines, by stability
-_NARROWEST = 1e-9  # width of an interval, relative to the values in it
+_STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
+_NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]
 
@@ -66,19 +65,19 @@ class Branch(Result):
     Attributes
     ----------
     points
-        Along the curve, special points among them.
+        Points along the curve, special points included.
     ending
-        Reason for which it ends.
+        Reason for its end.
     step
-        Along the curve, with which it goes on.
+        Next step along the curve.
     periods
-        Number of periods of the systems that its orbits take.
+        Number of the systems' periods in one period of its orbits.
     symmetric
-        True if it stays among the orbits with the systems' symmetry in time.
+        True if its orbits have the systems' symmetry in time.
     reason
         Reason for the loss of the curve; empty if it was not lost.
     remarks
-        Sentences on what could not be made out on the way.
+        Sentences on events that remained undecided.
     """
 
     points: tuple[BranchPoint, ...]
@@ -97,12 +96,12 @@ class Branch(Result):
 
     @property
     def sizes(self) -> Array:
-        """Sizes of the states along the curve, shape (n,): tangents have them in these units."""
+        """Sizes of the states along the curve, shape (n,), the units of tangents."""
         return self.units[:-1]
 
     @property
     def scale(self) -> float:
-        """Scale of the parameter along the curve: tangents have it in this unit."""
+        """Scale of the parameter along the curve, the unit of tangents."""
         return float(self.units[-1])
 
     @property
@@ -111,10 +110,9 @@ class Branch(Result):
         return tuple(point for point in self.points if point.special is not None)
 
     def _stretches(self) -> list[tuple[bool | None, int, int]]:
-        """Stretches that are stable, unstable or undecided, each with its first and last point; none goes round a
-        fold."""
+        """Stable, unstable and undecided stretches, each with its first and last point; a fold ends a stretch."""
         folds = itertools.accumulate(point.special is Kind.FOLD for point in self.points)
-        # At a special point a multiplier is critical: the points beside it decide.
+        # At a special point a multiplier is critical, so the points beside it decide.
         beside = [{each.stable for each in pair if each.special is None} for pair in itertools.pairwise(self.points)]
         verdicts = [told.pop() if len(told) == 1 else None for told in beside]
         found, first = [], 0
@@ -141,7 +139,7 @@ class Branch(Result):
         ]
 
     def _picture(self) -> str:
-        # The state that moves most, in its size along the curve, tells the branch from others.
+        # The state that changes most, relative to its size, distinguishes the branch from others.
         moved = np.ptp([point.orbit for point in self.points], axis=0) / self.sizes
         return picture(lambda axes: self.plot(axes, int(moved.argmax())), "branch of periodic orbits")
 
@@ -152,7 +150,7 @@ class Branch(Result):
         Parameters
         ----------
         axes
-            Axes of matplotlib; those of a new figure by default.
+            Axes of matplotlib; by default of a new figure.
         state
             Number of the state, from 0.
         """
@@ -169,8 +167,8 @@ class Branch(Result):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """The points as a dataset over ``point``, in their order along the curve; ``special`` is empty at ordinary
-        ones. Multipliers are those of the full period."""
+        """Dataset of the points over ``point``, in order along the curve; ``special`` is empty at ordinary points.
+        Multipliers belong to the full period."""
         verdicts = [VERDICTS[None if point.special else point.stable] for point in self.points]
         values = columns(self.points, "value", "special", "period", "orbit", "multipliers")
         about = columns((each.bifurcation for each in self.points), "error_bound", "criticality", "coefficient")
@@ -200,24 +198,24 @@ def follow(
     family
         ``family(value)`` is the system.
     start
-        From :func:`begin` or :func:`switch`; or a point of another branch; or an orbit, or a guess of one, at the lower
-        end of the interval.
+        Start from :func:`begin` or :func:`switch`, a point of another branch, or an orbit (or a guess) at the lower end
+        of the interval.
     between
-        Interval of the parameter; the branch ends where it reaches an end of it, and the family is asked for no value
-        outside. Its width becomes the branch's scale.
+        Interval of the parameter; the branch ends at an end of it, and the family is called for values inside only.
+        Its width becomes the branch's scale.
     points
-        Number of ordinary points after which the branch ends; by default it goes on to an end of the interval, or until
-        it is closed, lost, or has spent its budget.
+        Number of ordinary points after which the branch ends; by default it continues to an end of the interval, or
+        until it is closed, lost, or out of budget.
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
     closely
-        True to look at the multipliers at nine places within every step, a flow each; otherwise only where the ends
-        of a step tell that something happens.
+        True to compute the multipliers at nine places within every step, a flow each; otherwise only if the ends of
+        a step show an event.
     precision
-        Precision to which orbits are solved for, relative to the sizes of the states: as good as the flow is at best.
+        Precision of orbits relative to the sizes of the states, limited by the accuracy of the flow.
     symmetric
-        True to stay among the orbits that have the systems' symmetry in time. By default the full period is used
-        even where there is such a symmetry, for the orbits of interest have lost it.
+        True to follow orbits with the systems' symmetry in time. By default the full period is used, since the orbits
+        of interest have usually lost that symmetry.
     budget, seconds
         Number of flows, and time in s, after which the branch ends.
     progress
