@@ -152,5 +152,5 @@ def test_what_cannot_be_is_one_line():
 
 def test_switching_needs_a_special_point():
     branch = follow(linear, [0.1], (0.0, 1.0))
-    with pytest.raises(ParameterError, match="no special point"):
+    with pytest.raises(ParameterError, match="must be a special point"):
         switch(linear, branch.points[1])

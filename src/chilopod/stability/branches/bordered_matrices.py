@@ -28,7 +28,7 @@ def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array 
 
 
 def within_space(space: Array | None, matrix: Array) -> Array:
-    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), restricted to a space of states and replaced
+    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), restricted to a space of states, replaced
     by a contraction across it."""
     if space is None:
         return matrix

@@ -224,10 +224,10 @@ def follow(
     Raises
     ------
     ParameterError
-        If the interval is no interval, ``points`` is no positive whole number, or a step is not positive; or if
-        ``start`` is a bifurcation point, which :func:`switch` is for.
+        If the interval, ``points`` or a step is invalid, or ``start`` is a bifurcation point, which needs
+        :func:`switch`.
     AnalysisError
-        If there is no orbit to start with.
+        If no orbit is found at the start.
     """
     low, high = _checked(between, points, longest)
     if not step > 0:
@@ -255,26 +255,26 @@ def proceed(
     seconds: float = math.inf,
     progress: Progress = _silent,
 ) -> Branch:
-    """Follow a branch on from where it ends. In pieces it has the same points as in one; where the system has no period
-    of its own, points of the same curve, for the last section is taken anew.
+    """Continue a branch from its end. The points equal those of a single run; for a system without a period of its own
+    they are other points of the same curve, as the last section is rebuilt.
 
     Parameters
     ----------
     family, points, longest, closely, precision, budget, seconds, progress
-        As for :func:`follow`; ``points`` are those that are added.
+        Arguments of :func:`follow`; ``points`` counts the added ones.
     branch
-        From :func:`follow` or from here.
+        Branch from :func:`follow` or :func:`proceed`.
     between
-        Interval of the parameter, which may have become another one; the branch keeps its units.
+        Interval of the parameter, which may differ from the first; the branch keeps its units.
 
     Returns
     -------
-    The branch as it was with the new points behind.
+    The branch with the new points at its end.
 
     Raises
     ------
     ParameterError
-        As :func:`follow`, and if the branch leaves the interval where it ends.
+        As :func:`follow`, and if the branch ends at an end of the interval.
     """
     low, high = _checked(between, points, longest)
     if not isinstance(branch, Branch):
@@ -291,7 +291,7 @@ def proceed(
     first = branch.points[0]
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None
-    # At a point where branches meet the matrix is singular, so it is taken a step ahead.
+    # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = branch.step if leaving else 0.0
     anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
     return _followed(curve, branch, anchor, points, longest, closely, progress)
@@ -313,7 +313,7 @@ def _checked(between: tuple[float, float], points: int | None, longest: float) -
 def _anchored(
     family: Family, curve: Curve, start: Start | BranchPoint | Orbit | ArrayLike, low: float, step: float
 ) -> Anchor:
-    """Where the first step starts; the curve gets the sizes of its states."""
+    """Anchor of the first step; the curve gets the sizes of its states."""
     if isinstance(start, BifurcationPoint):
         raise ParameterError(
             "is a bifurcation point", field="start", value=start.kind.label, allowed="a start from `switch`"

@@ -69,7 +69,7 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def parameters(self, anchor: A) -> tuple[slice, Array]:
-        """Where the parameters stand among the coordinates, and their units."""
+        """Indices of the parameters among the coordinates, and their units."""
 
     @abstractmethod
     def residual(self, anchor: A, moved: Array, values: Array) -> tuple[R, Array]:
