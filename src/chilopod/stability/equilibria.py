@@ -65,7 +65,7 @@ class Equilibrium(ReadOnlyArrays):
     eigenvalues
         Eigenvalues of the derivative, by falling real part, shape (n,), in 1/s.
     error_bounds
-        On the error of each eigenvalue, shape (n,).
+        Bound on the error of each eigenvalue, shape (n,).
     """
 
     state: Array
@@ -76,8 +76,8 @@ class Equilibrium(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """True if all eigenvalues lie left of the imaginary axis: True or False by more than their errors, None where
-        these leave it undecided."""
+        """True if all eigenvalues lie left of the imaginary axis by more than their errors, False if one lies right of
+        it by more, else None."""
         if (self.eigenvalues.real < -self.error_bounds).all():
             return True
         return False if (self.eigenvalues.real > self.error_bounds).any() else None
@@ -196,7 +196,7 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 
 def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
-    """dx/dt at a state, shape (n,), its derivative, shape (n, n), and bounds on the derivative's errors by differences."""
+    """dx/dt at a state, shape (n,), its derivative, shape (n, n), and bounds on the latter's errors by differences."""
     size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
     size = size if given_scale(system) is None else np.asarray(given_scale(system))
     curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
@@ -297,8 +297,8 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
 
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
-    """A small cycle beside a Hopf point, with its parameter, and the displacement of its state from the equilibrium over
-    the root of that of the parameter, shape (n,)."""
+    """A small cycle beside a Hopf point, with its parameter, and the displacement of its state from the equilibrium
+    over the root of that of the parameter, shape (n,)."""
     rate = point.rate
     if rate is None or point.criticality in (None, Criticality.UNDECIDED):
         raise ParameterError(

@@ -30,7 +30,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event
 ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
-_FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; the mean of a smooth periodic function converges geometrically
+_FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
 _SETTLED = 1e-9  # change of the mean from half as many parts; its error is about the square of that
 
 Formed = Callable[[CriticalOrbit, float], NormalForm | None]
@@ -49,8 +49,8 @@ def described(
     with_normal_form: bool = True,
 ) -> BifurcationPoint:
     """The bifurcation point at a ``place``: a value of the parameter with its error bound, to which round-off is added.
-    The critical multipliers belong to the whole return map; their block is given if spatial symmetries split it, and the
-    kind of the point if known. ``formed`` computes the normal form for one critical multiplier or pair.
+    The critical multipliers belong to the whole return map; their block is given if spatial symmetries split it, and
+    the kind of the point if known. ``formed`` computes the normal form for one critical multiplier or pair.
     """
     value, error_bound = place
     spec = spectrum(orbit.image)
@@ -99,8 +99,8 @@ def described(
 
 
 def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
-    """Root mean square of a mode over a return, across the motion, which does not depend on the choice of time 0; 1 for a
-    given period, which fixes time 0."""
+    """Root mean square of a mode over a return, across the motion, which does not depend on the choice of time 0; 1 for
+    a given period, which fixes time 0."""
     if not is_autonomous(system):
         return 1.0
     before, parts, duration = 0.0, _FEWEST_PARTS, orbit.period / orbit.image.returns
