@@ -40,7 +40,7 @@ _EPSILON = float(np.finfo(float).eps)
 _POINTS = 2000  # budget of return maps beside a point: those of the map cost almost nothing
 _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
-_KEPT = 64  # systems
+_KEPT = 64  # cached systems
 _WORDS = (
     ("a multiplier is +1", "an eigenvalue is 0"),
     ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
@@ -229,13 +229,13 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
 def _hopf_point(
     family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
 ) -> BifurcationPoint:
-    """A Hopf point from that of the map: its value by f itself, its error, its rate and coefficient."""
+    """A Hopf point from that of the map, with value, error, rate and coefficient from f."""
     low, high = between
     value, state = point.value, point.orbit
     values = np.clip(value + _BESIDE * (high - low) * np.array([-1.0, 1.0]), low, high)
     beside = [equilibrium_at(family, each, state) for each in values.tolist()]
     rate, frequency = _rate(values, [here for _, here in beside], between, point, duration)
-    for correcting in (True, True, False):  # the search has found it almost to the last digit
+    for correcting in (True, True, False):  # the search gives almost the last digit
         system, here = equilibrium_at(family, value, state)
         index = int(np.abs(here.eigenvalues - 1j * frequency).argmin())
         state, frequency = here.state, float(here.eigenvalues[index].imag)

@@ -60,7 +60,7 @@ _COARSE, _FINE = 1e-2, 1e-6  # accuracy of linear systems, relative to the resid
 _FEWEST, _SPARE = 8, 2  # columns of a block, and those beyond the requested multipliers
 _CONVERGED = 1e-13  # residual, relative to the size of the matrix
 _SAFETY = 4.0  # factor on a norm estimated from eight or more random components
-_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Arr
 
 @dataclass(frozen=True)
 class TangentMap(ReadOnlyArrays):
-    """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`) with its derivative H' as a product."""
+    """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`), its derivative H' as a product."""
 
     system: FlowsTangents
     point: Array  # state at time 0, shape (n,)
@@ -237,8 +237,8 @@ def closed_orbit(
     budget: Budget | None = None,
 ) -> tuple[TangentMap, Array]:
     """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
-    The return may displace the guess by ``farthest``, relative to the sizes. If the system does not depend on time, a
-    return ends on the section, by default across the motion at the guess. Each round takes a return map from the budget.
+    A return may displace the guess by ``farthest``, relative to the sizes. If the system does not depend on time, it
+    ends on the section, by default across the motion at the guess. Each round takes a return map from the budget.
     Raises AnalysisError if Newton's method does not converge.
     """
     size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)

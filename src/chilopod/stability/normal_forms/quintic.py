@@ -1,4 +1,4 @@
-"""The coefficient of fifth order: what decides where the cubic one vanishes."""
+"""The coefficient of fifth order, which decides where the cubic one vanishes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates
 
-_BENDS = 4  # one for every order of the manifold, and one to make sure
-_STEP = 1.5  # ratio of amplitudes that are tried one after another
-_TRIES = 8  # of them each way
-_WORSE = 2  # that are tried beyond the best one
+_BENDS = 4  # one for every order of the manifold, and one more
+_STEP = 1.5  # ratio of successive amplitudes
+_TRIES = 8  # largest number of amplitudes each way
+_WORSE = 2  # amplitudes tried beyond the best one
 
 Term = tuple[complex, float]
 """A coefficient and its error."""
@@ -21,8 +21,8 @@ Term = tuple[complex, float]
 class Quintic:
     """The map over the full period on the centre manifold, where its cubic coefficient vanishes."""
 
-    # Coefficient e of a -> a + e a^5 (a pair: |a| -> |a| + e |a|^5), of the map that the cubic coefficient of a
-    # :class:`~chilopod.stability.normal_forms.normal_form.NormalForm` is of, and a bound on its error.
+    # Coefficient e of a -> a + e a^5 (a pair: |a| -> |a| + e |a|^5), of the map of the cubic coefficient of a
+    # :class:`~chilopod.stability.normal_forms.normal_form.NormalForm`, and a bound on its error.
     coefficient: float
     error: float
     curve: Curve  # the centre manifold, up to fourth order
@@ -77,7 +77,7 @@ def _of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[float,
         error = 2.0 * error + 3.0 * (2.0 * abs(cubic) + cubic_error) * cubic_error
         cubic, cubic_error = -2.0 * cubic, 2.0 * cubic_error
         times = times // 2 if times % 2 == 0 else times
-    # a -> a + c a^3 + e a^5 so many times.
+    # a -> a + c a^3 + e a^5, iterated.
     pairs = 1.5 * times * (times - 1)
     error = times * error + pairs * (2.0 * abs(cubic) + cubic_error) * cubic_error
     return times * value + pairs * cubic * cubic, error

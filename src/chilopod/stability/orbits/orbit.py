@@ -54,7 +54,7 @@ _CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that c
 _COARSE = 1e-11  # of the sizes of the states: such an error is estimated by two computations too
 _CHANCE = 1e-13  # of the sizes of the states: two computations may agree by chance
 _SYMMETRIC = 1e-12  # of the sizes of the states: a symmetry that holds so closely is one of the orbit's
-_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
 @dataclass(frozen=True)

@@ -27,13 +27,13 @@ FIRST_STEPS = 8
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
 
-_KEPT = 64  # systems: around a point the same one is asked for again and again
+_KEPT = 64  # cached systems: around a point the same one is asked for again and again
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # return maps for an orbit
 _ATTEMPTS = 24  # steps to a value from the sample beside it: ten halvings, and on from there
 _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
-_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
 _SAME = 1e-7  # of the sizes: orbits that are nearer to what was foreseen are solved for no better
 _HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and what each leaves of its orbits' distance
