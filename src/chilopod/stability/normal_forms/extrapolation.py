@@ -42,8 +42,8 @@ class Series(ReadOnlyArrays):
 
     @property
     def roughness(self) -> Array:
-        """Size of the last coefficients, shape (entries,): the noise of the samples, or the truncation error of a series
-        that has not converged."""
+        """Size of the last coefficients, shape (entries,): the noise of the samples, or the truncation error of a
+        series that has not converged."""
         tail: Array = np.abs(self.coefficients[-_TAIL:]).max(axis=0)
         return tail
 

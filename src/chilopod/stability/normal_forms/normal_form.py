@@ -161,8 +161,8 @@ def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
 def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
     """Error along the mode of an orbit with this residual, where H - 1 is singular.
 
-    Off by d from the symmetric orbit of a pitchfork it misses itself by at least cubic d^3, and looks as if there were
-    a quadratic term 3 cubic d; beside a transcritical point it misses by quadratic d^2.
+    At a distance d from the symmetric orbit of a pitchfork the residual is at least cubic d^3, with an apparent
+    quadratic term 3 cubic d; beside a transcritical point it is quadratic d^2.
     """
     image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
     if image is None:
@@ -172,14 +172,14 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic
     if missed == 0.0:
         return 0.0
     by_cubic = float(1.5 * np.cbrt(missed / cubic)) if cubic > 0.0 else np.inf
-    # A quadratic term that no pitchfork beside this orbit explains holds the orbit closer.
+    # A quadratic term that no near pitchfork explains bounds the error more closely.
     return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
 
 
 def _of_full_period(
     fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float, orbit_error: float | None
 ) -> NormalForm:
-    """From one return at a real multiplier to the map whose multiplier is +1."""
+    """Coefficients of the map with multiplier +1 from those of one return at a real multiplier."""
     quadratic, quadratic_error = fit.sampled.term((2, 0))
     cubic, cubic_error = fit.cubic.real, fit.cubic_error
     fourth, fourth_error = fit.sampled.term((4, 0))

@@ -30,9 +30,9 @@ class Quintic:
 
 
 def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float, noise: float = 0.0) -> Quintic | None:
-    """The coefficient of fifth order at a critical orbit, from the amplitude at which its error is smallest, which is
-    sought from that of the normal form of third order on; None if the map exists at none. A multiplier +1 is that of a
-    pitchfork: a symmetry keeps terms of even order away."""
+    """The coefficient of fifth order at a critical orbit, from the amplitude with the smallest error; the search starts
+    at that of the normal form of third order. None if the map is undefined at all amplitudes. A multiplier +1 belongs
+    to a pitchfork, whose symmetry excludes terms of even order."""
     best: Quintic | None = None
     manifold = Manifold(mapped, at, noise, 5)
     curve: Curve = manifold.curve
@@ -63,7 +63,7 @@ def _measured(manifold: Manifold, at: CriticalOrbit, radius: float) -> Quintic |
 
 
 def _of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[float, float]:
-    """From the terms of one return to the coefficient of fifth order over a full period, or over two."""
+    """Coefficient of fifth order over a full period, or over two, from the terms of one return."""
     (c, c_error), (e, e_error) = third, fifth
     cubic, cubic_error, value, error, times = c.real, c_error, e.real, e_error, at.returns
     if not at.real:
