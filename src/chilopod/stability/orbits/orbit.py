@@ -77,7 +77,7 @@ class Orbit(Shown, ReadOnlyArrays):
 
     @property
     def period(self) -> float:
-        """The full period."""
+        """Full period."""
         return self.image.period
 
     @property
@@ -127,8 +127,8 @@ def find_orbit(
     system
         System; one that knows its orbit needs no guess.
     guess
-        State at time 0 near the orbit, shape (n,); or a whole orbit near it, for multiple shooting: states at even times
-        over one period, shape (times, n), or times and states, shapes (times,) and (times, n), as a tuple or an
+        State at time 0 near the orbit, shape (n,); or a whole orbit near it, for multiple shooting: states at even
+        times over one period, shape (times, n), or times and states, shapes (times,) and (times, n), as a tuple or an
         ``xarray.DataArray`` over ``time``. The result then has the period of the guess.
     with_error
         True to bound errors.
@@ -175,8 +175,8 @@ def find_orbit(
 
 
 def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
-    """As :func:`find_orbit`, for a large system: the return map on the orbit without its derivative as a matrix, and the
-    sizes of the states, shape (n,). If that method fails, :func:`find_orbit` takes over."""
+    """As :func:`find_orbit`, for a large system: the return map on the orbit without its derivative as a matrix, and
+    the sizes of the states, shape (n,). If that method fails, :func:`find_orbit` takes over."""
     x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
     exact = guess is None and not is_autonomous(system)
     try:
@@ -266,7 +266,7 @@ def _solved(
     section: Section | None = None,
     careful: bool = False,
 ) -> Orbit:
-    """The orbit near some nodes, of which the first one stays on the section: by default across the motion there."""
+    """The orbit near some nodes, the first on the section: by default across the motion there."""
     x, duration = start.states[0], start.duration
     size = sizes(system, x, duration)
     section = section or section_at(system, x, size, duration)
@@ -274,7 +274,7 @@ def _solved(
         with contextlib.suppress(AnalysisError):
             closed, _ = closed_orbit(system, x, section, budget=budget)
             return _found(system, closed.point, closed.duration, size, with_error)
-    if len(start.states) > 1:  # which tell the sizes better than the first one
+    if len(start.states) > 1:  # all nodes give better sizes than the first one
         largest = np.abs(start.states).max(axis=0)
         size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
     found = shot(
@@ -327,10 +327,10 @@ def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None 
     image = return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
     if error is None:
-        # The state is as uncertain as the flow, of which the derivative's error tells, or where that is coarse two
-        # computations, times what H - 1 makes of it.
+        # The state's error is that of the flow, from the derivative's error or, where that is coarse, from two
+        # computations, multiplied by the inverse of H - 1.
         flow = _matrix(image.error, size) @ size
-        stiff = is_stiff(system, x, duration)  # the derivative may be nothing, and err by nothing
+        stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():
             twice = REPEATED * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
             flow = flow + twice if stiff else np.minimum(flow, twice)

@@ -66,8 +66,8 @@ class Closed(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Free:
-    """The parameter as an unknown, in units of ``scale``, with its equation ``row . moved = target`` for the displacement
-    of first state and parameter from ``start``, shape (n+1,), in units."""
+    """The parameter as an unknown, in units of ``scale``, with its equation ``row . moved = target`` for the
+    displacement of first state and parameter from ``start``, shape (n+1,), in units."""
 
     row: Array
     target: float
@@ -167,13 +167,13 @@ class _Problem:
     careful: bool
 
     def beside(self, value: float) -> tuple[SystemLike, float] | None:
-        """The system at a value of the parameter beside another one, and how far; None where the parameter is given."""
+        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
         if self.free is None:
             return None
         step = _DIFFERENCE * self.free.scale
         try:
             return self.system_at(value + step), step
-        except AnalysisError:  # the end of what there is
+        except AnalysisError:  # the family ends here
             return self.system_at(value - step), -step
 
 

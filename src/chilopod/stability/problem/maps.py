@@ -29,12 +29,12 @@ def from_map(
     spatial_symmetry: ArrayLike | None = None,
     scale: ArrayLike | None = None,
 ) -> PeriodicSystem:
-    """Build a :class:`PeriodicSystem` of period 1 from a map, whose image is taken at every whole time.
+    """Build a :class:`PeriodicSystem` of period 1 from a map, which is applied at every whole time.
 
     Parameters
     ----------
     image
-        ``image(x)`` -> state after one iteration, shape (n,), and its derivative with respect to x, shape (n, n).
+        Function ``image(x)`` -> state after one iteration, shape (n,), and its derivative by x, shape (n, n).
     dimension
         Number of states n.
     orbit, spatial_symmetry, scale
@@ -43,7 +43,7 @@ def from_map(
     Raises
     ------
     ParameterError
-        If ``image`` is no function, or returns arrays of another shape.
+        If ``image`` is not a function, or returns arrays of another shape.
     """
     if not callable(image):
         raise ParameterError("must be a function", field="image", value=image, allowed="image(x)")

@@ -1,4 +1,4 @@
-"""A periodic system of one's own."""
+"""User-defined periodic systems."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ROUND_OFF = (
 
 @dataclass(frozen=True)
 class PeriodicSystem(ReadOnlyArrays):
-    """A periodic system of one's own, from anything that has a flow.
+    """A periodic system defined by its flow.
 
     To start from a right-hand side, see :func:`chilopod.stability.from_rhs`.
 
@@ -38,10 +38,10 @@ class PeriodicSystem(ReadOnlyArrays):
     dimension
         Number of states n.
     period
-        T, positive; None where the system does not depend on time and the period belongs to the orbit: ``velocity``
-        and ``guess_period`` are then needed.
-    flow
-        ``flow(x, t0, t1) -> (x1, dx1/dx)``.
+        Positive period T; None if the system does not depend on time and the period belongs to the orbit:
+        ``velocity`` and ``guess_period`` are then needed.
+        flow
+        Function ``flow(x, t0, t1) -> (x1, dx1/dx)``.
     symmetry
         Optional S, shape (n, n), of finite order k (S applied k times is 1), with S f(t, x) = f(t + T/k, S x): then the
         orbits with S x(T/k) = x(0) are fixed points of the return map H = S flow(T/k), whose multipliers nu give those
@@ -50,14 +50,14 @@ class PeriodicSystem(ReadOnlyArrays):
         Optional P, shape (n, n), of finite order, with P f(t, x) = f(t, P x), such as a reflection; or several, which
         generate a finite group.
     orbit
-        A state at time 0 on the periodic orbit, if it is known. It is improved where it does not return exactly.
+        State at time 0 on the periodic orbit, if known. It is corrected if it does not return exactly.
     scale
-        Sizes of a large change of every state, shape (n,), where the orbit should not tell it.
+        Size of a large change of every state, shape (n,), instead of the orbit's.
     velocity
-        ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
+        Function ``velocity(x)`` -> dx/dt, shape (n,), for a system that does not depend on time.
     guess_period
-        About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
-        nearer to a multiple of it.
+        Approximate period of such a system's orbits; an orbit gets its shortest period even if the guess is nearer to
+        a multiple of it.
     flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff, velocity_series
         See :mod:`chilopod.stability.problem.capabilities`.
     concurrent
@@ -151,8 +151,8 @@ def _order_of(entries: bytes, n: int) -> int:
     if not np.isfinite(matrix).all():
         return 0
     one = np.eye(len(matrix))
-    # Entries between states of different units are large and small in pairs, so the bound is entry by entry; those that
-    # are nothing but round-off of the others (the cosine of a right angle) count as zero.
+    # Entries between states of different units are large and small in pairs, so the bound is entry by entry; those
+    # that are round-off of the others (the cosine of a right angle) count as zero.
     sizes = np.abs(matrix)
     units = numerical_balance(matrix)
     balanced = float((sizes * units / units[:, None]).max())
