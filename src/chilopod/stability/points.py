@@ -58,7 +58,7 @@ WITHOUT_CRITICALITY = (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT, Kind.CO
 
 _CLEAR = 3.0  # least quadratic coefficient, relative to its error, of a transcritical point
 _REAL = 1e-9  # largest imaginary part of a mode that is shown as real
-_NEGLIGIBLE = 0.3  # largest negligible quadratic term, with its error, relative to the cubic one at the sampled amplitude
+_NEGLIGIBLE = 0.3  # largest negligible error of the quadratic term, relative to the cubic one as sampled
 
 
 def kind_at_plus_one(form: NormalForm) -> Kind:
@@ -126,8 +126,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     rate
         Rate of change of the eigenvalue at a Hopf point, in 1/s per unit of the parameter.
     normal_form
-        All that is known of the normal form, with a status that says why where it has no numbers; None where it was
-        not asked for, and at folds.
+        Normal form, with a status that explains missing numbers; None if not computed, and at folds.
     """
 
     kind: Kind
@@ -151,7 +150,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
 
     @property
     def sentences(self) -> str:
-        """Sentences on what happens here and which way the new orbits go."""
+        """Sentences on the kind of the point and the direction of the new orbits."""
         said = [f"{self.kind.sentence}."]
         if self.criticality.known:
             said.append(f"{self.criticality.label}: {self.criticality.sentence}.")

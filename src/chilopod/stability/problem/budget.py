@@ -35,7 +35,7 @@ class Budget(Deadline):
     Attributes
     ----------
     left
-        Number of flows; never below zero.
+        Remaining number of flows; never below zero.
 
     Parameters
     ----------

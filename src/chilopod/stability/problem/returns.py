@@ -50,11 +50,11 @@ class Section(ReadOnlyArrays):
     Attributes
     ----------
     point
-        A state on it, shape (n,).
+        State on the section, shape (n,).
     normal
-        normal . (x - point) = 0 on the section, shape (n,).
+        Normal vector, with normal . (x - point) = 0 on the section, shape (n,).
     duration
-        About how long a return to it takes.
+        Approximate duration of a return.
     """
 
     point: Array
@@ -152,7 +152,7 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 
 def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float | Array]:
-    """The flow with an error bound, either the system's own or an estimate from a computation in parts: a step-controlled
+    """The flow with an error bound, the system's own or an estimate from a computation in parts: a step-controlled
     integrator makes independent errors in the two computations, and one with fixed steps should provide its own
     bound."""
     if flows_with_error(system):

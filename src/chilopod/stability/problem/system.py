@@ -21,9 +21,9 @@ Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
 
 _HIGHEST_ORDER = 1000
-_SAME = 1e-8  # of the size of a matrix
+_SAME = 1e-8  # difference of equal matrices, relative to their size
 _ROUND_OFF = (
-    1e-7  # of the largest entry, in units that balance the matrix: with the above, a few units in the last place
+    1e-7  # relative to the largest entry, in units that balance the matrix: with the above, a few units in the last place
 )
 
 
@@ -141,12 +141,12 @@ class PeriodicSystem(ReadOnlyArrays):
 
 
 def _order(matrix: Array) -> int:
-    return _order_of(matrix.tobytes(), len(matrix))  # families ask for the same one at every value
+    return _order_of(matrix.tobytes(), len(matrix))  # families use the same matrix at every value
 
 
 @functools.lru_cache(maxsize=256)
 def _order_of(entries: bytes, n: int) -> int:
-    """The smallest k > 0 with matrix^k = 1; 0 if there is none."""
+    """The smallest k > 0 with matrix^k = 1; 0 for infinite order."""
     matrix = np.frombuffer(entries).reshape(n, n)
     if not np.isfinite(matrix).all():
         return 0

@@ -1,4 +1,4 @@
-"""A family of systems sampled along its parameter: orbits that are known, or followed from a first guess."""
+"""A family of systems sampled along its parameter: known orbits, or orbits followed from a first guess."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 FIRST_STEPS = 8
-"""Steps in which an orbit is followed through the interval, if it takes no shorter ones."""
+"""Number of steps of a followed orbit through the interval, without shortened ones."""
 
 NEAR_FOLD = 0.02
-"""Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
+"""Distance of a multiplier from +1 within which the search may not resolve a fold."""
 
 _KEPT = 64  # cached systems: around a point the same one is asked for again and again
-_SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
+_SHORTEST = 2.0**-10  # shortest step of a followed orbit, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
-_DEAREST = 8.0  # return maps for an orbit
-_ATTEMPTS = 24  # steps to a value from the sample beside it: ten halvings, and on from there
-_SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
+_DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
+_ATTEMPTS = 24  # largest number of steps to a value from the sample beside it: ten halvings, then more
+_SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as accurate as the flow
 _BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
-_FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
-_SAME = 1e-7  # of the sizes: orbits that are nearer to what was foreseen are solved for no better
-_HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and what each leaves of its orbits' distance
-_HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
-_APART = 0.1  # of the distance of two samples: how far from these another one tells of the curve through them
-_BEHIND = 4  # samples by which the next one is foreseen
-_BENT = 0.3  # of the distance of two orbits: how far from the straight line the one between them may be
-_TOUCHING = 0.25  # of a multiplier's distance from +1: straight lines that meet nearer to it may touch it
-_MERGED = 1e-5  # of the interval: a gap in which they still do
-_JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
+_FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
+_SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
+_HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
+_HALFWAY = 0.25  # largest distance of an orbit halfway from the mean of its neighbours, relative to their distance
+_APART = 0.1  # least distance of a third sample on the curve through two, relative to theirs
+_BEHIND = 4  # number of samples of a prediction
+_BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
+_TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
+_MERGED = 1e-5  # gap, relative to the interval, in which they still do
+_JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 
 
 class AskedFamily:
-    """The systems of a family, which have to be of one kind."""
+    """The systems of a family, which must be of one kind."""
 
     def __init__(self, family: Family) -> None:
-        self.dimension = 0  # as long as no system is known
+        self.dimension = 0  # 0 until a system is known
         self.timed = True  # they depend on time
         self._family = family
         self._systems: dict[float, SystemLike] = {}
@@ -76,7 +76,7 @@ class AskedFamily:
 
     @contextlib.contextmanager
     def asking(self, value: float) -> Iterator[None]:
-        """Context of calls of the user's functions: exceptions of theirs mean that there is no system."""
+        """Context of calls of the user's functions: an exception means that the system does not exist."""
         try:
             with UserCode("family", value):
                 yield
@@ -90,7 +90,7 @@ class AskedFamily:
 
     @property
     def remarks(self) -> list[str]:
-        """Values at which there was no system, and why, a sentence each."""
+        """Remarks on values without a system, with the reason, a sentence each."""
         return [
             said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
             for said, values in self._refused.values()
@@ -103,9 +103,9 @@ class AskedFamily:
 class Samples:
     """Samples of a family between two values of its parameter, each computed once.
 
-    From a guess at the lower end, None if the systems know their orbits, the orbit is followed to the upper end. That
-    may take ``budget`` orbits and twice as many return maps, as many return maps again for what lies in between, and
-    ``seconds``.
+    From a guess at the lower end (None if the systems know their orbits) the orbit is followed to the upper end, within
+    ``budget`` orbits, twice as many return maps, and ``seconds``; as many return maps again serve the samples in
+    between.
     """
 
     def __init__(
@@ -161,21 +161,21 @@ class Samples:
         return [self._by_value[value] for value in wanted]
 
     def allow(self, returns: int) -> None:
-        """From now on, at most so many return maps."""
+        """Set the limit of further return maps."""
         self._allowed, self._counted = returns, self.count
         self.budget.left = returns
 
     def affordable(self) -> int:
-        """Number of orbits that there may still be, at the price of those since :meth:`allow`."""
+        """Number of further orbits, at the mean cost of those since :meth:`allow`."""
         if self.budget.late:
             return 0
         price = (self._allowed - self.budget.left) / max(self.count - self._counted, 1)
-        # Those that were not found say nothing of the next ones.
+        # Failed orbits do not predict the cost of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
     def error(self, sample: Sample, of_flow: float) -> float:
-        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow and of its
-        derivative, ``of_flow``, and what comes of the orbit's own, which is the flow's times what H - 1 makes of it."""
+        """Relative error of the derivative at a sample of a followed orbit: that of the flow and its derivative,
+        ``of_flow``, and that due to the orbit's error, the flow's times the inverse of H - 1."""
         scaled = sample.image.jacobian * self.size / self.size[:, None]
         _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
         if values[-1] > _SURE:
@@ -186,7 +186,7 @@ class Samples:
             beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[-1], False, section)
             change = (beside.jacobian - sample.image.jacobian) * self.size / self.size[:, None]
             self._bends[sample.value] = float(np.linalg.norm(change)) / _BESIDE
-        # Where H - 1 vanishes along a direction, what is left there is of third order at most in all but odd cases.
+        # Where H - 1 vanishes along a direction, the rest is of third order, except in special cases.
         off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
         return min(1.0, of_flow + self._bends[sample.value] * off)
 
