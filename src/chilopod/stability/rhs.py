@@ -41,8 +41,8 @@ def from_rhs(
     arithmetic, the elementary functions of numpy and math, numpy arrays, loops, and functions compiled with
     ``numba.njit``; a family over parameters (arguments, closures or globals that are floats) is traced once. Jumps and
     kinks (``sign``, ``abs``, ``where``, ``%``, comparisons, ...) are found and crossed exactly, in time and in state.
-    Functions of time alone are sampled on a grid of 4096 points over the period, so a pulse between the points (narrower
-    than about T / 50 000) is missed.
+    Functions of time alone are sampled on a grid of 4096 points over the period, so a pulse between the points
+    (narrower than about T / 50 000) is missed.
 
     Taylor series take steps as short as the fastest decay. Where that is much faster than the motion, the system is
     stiff, and an implicit method, Radau IIA collocation with the exact derivative of its steps, takes over: after the

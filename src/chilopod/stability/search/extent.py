@@ -103,14 +103,14 @@ def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool
 
 
 def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
-    """True if the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch only
-    passes it comes evenly."""
+    """True if the multiplier approaches +1 as the root of the distance, as in a fold; a crossing branch makes it
+    linear."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
     try:
         beside = samples.at(fold.value + (-away if rising else away))
     except AnalysisError:
-        return True  # nothing speaks against it
+        return True  # no evidence against it
     off = [each.off_plus_one for each in beside]
     return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
 

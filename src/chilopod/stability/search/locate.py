@@ -105,7 +105,7 @@ def checked_interval(between: tuple[float, float]) -> tuple[float, float]:
 def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[tuple[Block | None, Crossings]]:
     """The crossings in every block of the return map."""
     blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
-    # Of the first orbit hardly a trace may be left after a return; of those that are followed from it there is more.
+    # The first orbit may contract strongly within a return, and followed ones less.
     uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
 
     def whole(values: Array) -> tuple[Array, Array]:
@@ -115,7 +115,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
             errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
         elif blocks == (None,):
             errors = np.array([samples.error(each, uncertain) for each in found])
-        else:  # a mode that breaks a symmetry leaves the orbit as sure as it is
+        else:  # a symmetry-breaking mode does not affect the orbit's accuracy
             errors = np.full(len(found), uncertain)
         return np.stack([each.image.jacobian for each in found]), errors
 

@@ -137,12 +137,12 @@ class Samples:
         self.allow(self._allowed)
 
     def at(self, values: Array) -> list[Sample]:
-        """Samples at some values within the interval, together where the systems allow it; AnalysisError if there is
-        none at one of them, when those at the others are kept."""
+        """Samples at some values within the interval, together if the systems allow it; AnalysisError if one is
+        missing, while the others are kept."""
         wanted = [float(value) for value in values]
         missing = sorted(set(wanted) - self._by_value.keys())
         if len(missing) > 1 and self._exact:
-            _found(lambda: self._keep_known(missing))  # where one fails, each is asked for alone
+            _found(lambda: self._keep_known(missing))  # after a failure each is computed alone
         for value in missing:
             if value in self._by_value or value in self._missing:
                 continue
@@ -193,11 +193,11 @@ class Samples:
     def of_flow(self) -> ReturnMap:
         """The return map at the first orbit, with the error of the flow alone."""
         if _sample(self.low, self.first).off_plus_one > NEAR_FOLD:
-            return self.first.image  # the orbit is as good as the flow
+            return self.first.image  # the orbit is as accurate as the flow
         return return_map(self.family(self.low), self.first.state, True, self.first.section)
 
     def jumped(self, orbit: Array, guess: Array) -> bool:
-        """True if an orbit is so far from what was foreseen that it must be another one."""
+        """True if an orbit is so far from its prediction that it must be another one."""
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
 
     def _keep(self, sample: Sample) -> None:
@@ -217,7 +217,7 @@ class Samples:
             self._keep(_sample(value, from_known(system, state, image=image, budget=self.budget)))
 
     def _of_itself(self, value: float) -> Sample:
-        """A sample of a system that tells a state on its orbit, or near it, or from the orbit beside."""
+        """A sample of a system, from its own state on the orbit or near it, or from the neighbouring orbit."""
         system = self.family(value)
 
         def own(settle: bool) -> Sample:
@@ -231,7 +231,7 @@ class Samples:
         return found or own(True)
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
-        """A sample near a state, of about the period of a sample beside."""
+        """A sample near a state, with about the period of a neighbouring sample."""
         system = self.family(value)
         with self.family.asking(value):
             section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
@@ -239,7 +239,7 @@ class Samples:
             return _sample(value, orbit)
 
     def _between(self, value: float) -> Sample:
-        """A sample between two that are there, from their orbits."""
+        """A sample between two others, from their orbits."""
         around = self._around(min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1))
         try:
             found = self._sampled(value, self._foreseen(around, value), around[0])
@@ -257,17 +257,17 @@ class Samples:
             raise
 
     def _around(self, right: int) -> list[Sample]:
-        """Two samples that follow each other, the second of which is number ``right``, and one beyond either."""
+        """Two neighbouring samples, the second with the number ``right``, and one beyond either."""
         a, b = self._values[right - 1 : right + 1]
-        # Not so close to the two that a polynomial through them would be told by round-off.
+        # Far enough from the two that round-off does not spoil a polynomial through them.
         before = bisect.bisect_right(self._values, a - _APART * (b - a))
         after = bisect.bisect_left(self._values, b + _APART * (b - a))
         beyond = self._values[max(before - 1, 0) : before] + self._values[after : after + 1]
         return [self._by_value[v] for v in (a, b, *beyond)]
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
-        """The orbit at a value by the polynomial through samples; by the straight line through the first two where
-        that is very different, or the states are anywhere on their orbits."""
+        """The orbit at a value by the polynomial through samples; by the straight line through the first two if that
+        differs much, or time 0 is arbitrary on the orbits."""
         if not self.family.timed:
             samples = samples[:2]
         if len(samples) == 1:
@@ -283,7 +283,7 @@ class Samples:
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
     def _followed(self) -> list[Sample]:
-        """Samples by which the orbit is followed from the lower end."""
+        """Samples of the followed orbit from the lower end."""
         path = [self._by_value[self.low]]
         for value in np.linspace(self.low, self.high, FIRST_STEPS + 1)[1:].tolist():
             reached = self._follow(path, value)
@@ -296,8 +296,8 @@ class Samples:
         return path
 
     def _to_merging(self, path: list[Sample]) -> list[Sample]:
-        """The path up to where the orbit meets another one at a pitchfork, and what is followed is that one: a
-        multiplier comes to +1 from one side, and goes back to it from there."""
+        """The path up to a pitchfork where the orbit meets another one, which the corrector then follows: a multiplier
+        comes to +1 from one side and leaves it to the same side."""
         for i in range(1, len(path) - 2):
             behind, ahead, beyond = path[: i + 1], path[i + 1], path[i + 2]
             while _touches(behind[-2], behind[-1], ahead, beyond):
@@ -317,8 +317,8 @@ class Samples:
         return path
 
     def _follow(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
-        """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
-        far. They end early where the orbit does, the budget, or the attempts."""
+        """Samples from the last one to ``value``, by smaller steps where Newton's method fails. They end early with
+        the orbit, the budget, or the attempts."""
         path, target = list(behind), value
         smallest = _SHORTEST * abs(value - path[-1].value)
         while path[-1].value != value:
@@ -328,7 +328,7 @@ class Samples:
             last, guess = path[-1], self._foreseen(path[: -_BEHIND - 1 : -1], target)
             try:
                 found = self._sampled(target, guess, last)
-                # A large jump means that Newton's method has found another orbit.
+                # A large jump shows that Newton's method has found another orbit.
                 other = self.jumped(found.orbit, guess) or not self._connected(last, guess, found)
             except SpentError:
                 break
@@ -345,11 +345,11 @@ class Samples:
         return path[len(behind) :]
 
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
-        """True if an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
-        between them, in a fold at the square root of a half; to another orbit it is a jump at any place."""
+        """True if an orbit that was not predicted is on the branch of the last one: then another lies about halfway
+        between them, in a fold at the square root of a half; towards another branch a jump remains."""
         change = found.orbit - last.orbit
         size = self.size * float((np.abs(change) / self.size).max())
-        # Where a multiplier passes +1 another orbit may be as near as anything.
+        # Where a multiplier passes +1 another orbit may be arbitrarily near.
         passes = found.passes(last)
         if passes and not self._goes_through(last, found):
             return False
@@ -365,7 +365,7 @@ class Samples:
     def _goes_through(self, left: Sample, right: Sample) -> bool:
         """True if one orbit has a multiplier that passes +1 between two samples: then samples come together there.
 
-        Two orbits that pass each other at a distance have multipliers on either side, and none comes together.
+        Two orbits that pass each other at a distance have multipliers on different sides, and samples stay apart.
         """
         apart = np.inf
         for _ in range(_HALVED):
@@ -376,7 +376,7 @@ class Samples:
                 middle = self._sampled(0.5 * (left.value + right.value), 0.5 * (left.orbit + right.orbit), left)
             except SpentError:
                 raise
-            except AnalysisError:  # where it passes, H - 1 is singular
+            except AnalysisError:  # H - 1 is singular at the passage
                 return bool(np.isfinite(before))
             left, right = (left, middle) if middle.passes(left) else (middle, right)
         return True
@@ -387,7 +387,7 @@ def _sample(value: float, orbit: Orbit) -> Sample:
 
 
 def _found(compute: Callable[[], T]) -> T | None:
-    """Result of a function; None where there is nothing."""
+    """Result of a function; None after an AnalysisError."""
     try:
         return compute()
     except SpentError:
@@ -397,7 +397,7 @@ def _found(compute: Callable[[], T]) -> T | None:
 
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
-    """True if a multiplier on one side of +1 heads for it from both sides of the gap between two of four samples."""
+    """True if a multiplier on one side of +1 approaches it from both sides of the gap between two of four samples."""
     places = np.array([each.value for each in (first, left, right, last)])
     off = np.array([each.beside_plus_one for each in (first, left, right, last)])
     if not np.isfinite(off).all() or (np.sign(off) != np.sign(off[1])).any():
