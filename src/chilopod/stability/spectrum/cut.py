@@ -32,7 +32,7 @@ class Cut:
     states: Array  # states there, shape (parts + 1, n)
     units: Array  # sizes of the states, shape (n,)
     sections: Sequence[Array]  # bases, in units
-    factors: Sequence[Array]  # derivatives of the flow over the parts in these bases, the last with the symmetry in time
+    factors: Sequence[Array]  # derivatives of the flow over the parts in these, the last one with the symmetry in time
     errors: Sequence[Array]  # bounds on the errors of their entries
 
     @property

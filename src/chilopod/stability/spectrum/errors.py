@@ -27,7 +27,7 @@ _EPSILON = float(np.finfo(float).eps)
 
 
 def stable_within(values: ComplexArray, bound: float, bounds: Array | float | None = None) -> bool | None:
-    """Stability by multipliers, shape (n,), with a bound on the error of all that are not small, or one bound each: True
+    """Stability by multipliers, shape (n,), with a bound on the error of all that are not small, or one each: True
     if all lie inside the unit circle by more than their bounds, False if one lies outside by more, None if the errors
     leave it undecided."""
     modulus = np.abs(values)

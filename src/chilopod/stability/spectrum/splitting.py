@@ -134,8 +134,8 @@ def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
 def _moved(
     factors: Sequence[Array], errors: Sequence[Array], groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]
 ) -> Array:
-    """Change of the logarithms when factors change by their errors, group by group: the largest over random signs (in one
-    draw the contributions may cancel), with a safety factor."""
+    """Change of the logarithms when factors change by their errors, group by group: the largest over random signs (in
+    one draw the contributions may cancel), with a safety factor."""
     nodes = [np.hstack(bases) for bases in zip(*groups, strict=True)]
     sizes = np.cumsum([0, *(len(values) for values in known)])
     moved = np.zeros(sizes[-1])

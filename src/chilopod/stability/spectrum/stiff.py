@@ -1,8 +1,8 @@
-"""Eigenvalues of the derivative of a return where some directions decay beyond all resolution.
+"""Eigenvalues of the derivative of a return with directions that decay beyond all resolution.
 
-Of a direction that decays by e^-1000 within a step of an implicit method, the derivative of the flow retains nothing,
-nor does it have to for the multipliers. Its exponent is the mean of the rates at which an orthonormal frame is
-stretched that the flow carries along, the first k columns on the space of the k slowest directions for every k (Dieci,
+The derivative of the flow does not resolve a direction that decays by e^-1000 within a step of an implicit method, and
+the multipliers do not need it. Its exponent is the mean stretching rate of an orthonormal frame that the flow
+carries, whose first k columns span the space of the k slowest directions for every k (Dieci,
 Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
 """
 
@@ -108,8 +108,8 @@ def _stretched(
     system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, most: int
 ) -> tuple[Stretched, int]:
     """A frame over a part, and the number of halvings of the part, at most ``most``.
-    A part is halved if two computations differ: a direction that turns from a fast decay to a slow one needs short steps,
-    as after a start.
+    A part is halved if two computations differ: a direction that turns from a fast decay to a slow one needs short
+    steps, as after a start.
     """
     n = units.size
     sums, turned, halved = np.zeros((2, n)), np.ones(n), 0
@@ -118,7 +118,7 @@ def _stretched(
         part = system.flow_frame(state, units, _behind_motion(system, frame, state, units), t0, ends[-1])
         both = np.stack([part.stretch, part.other])
         if is_autonomous(system):
-            # The stretch of the motion is known; the rest of the stretch of the first two's plane belongs to the second.
+            # The stretch of the motion is known; the second has the rest of the stretch of the first two's plane.
             speeds = [float(np.linalg.norm(np.asarray(system.velocity(x)) / units)) for x in (state, part.state)]
             known = np.log(speeds[1] / speeds[0])
             both[:, 1:2] += both[:, :1] - known

@@ -20,7 +20,7 @@ from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 
-_ALIGNED = 1e-9  # difference from one of a cosine that counts as one: an angle of 4e-5 (elements differ by 6e-4 or more)
+_ALIGNED = 1e-9  # difference from one of a cosine that counts as one: an angle of 4e-5 (elements differ by 6e-4)
 _NULL = 1e-8  # difference of equal eigenvalues of elements; 1 - cos(2 pi / 10 000) is 2e-7
 _MOST_SPACES = 500  # largest number of fixed-point spaces, counting conjugate ones once
 _MOST_ENTRIES = 2**23  # numbers in the projectors to the fixed-point spaces of single elements: 64 MiB
@@ -130,7 +130,7 @@ def _kind(block: Block, critical: Event, quadratic: int, returns: int) -> Symmet
 
 
 def _quadratics(rho: Array) -> int:
-    """Number of quadratic equivariants V -> V: the multiplicity of V in its symmetric square (Sattinger, Group Theoretic
+    """Number of quadratic equivariants V -> V: multiplicity of V in its symmetric square (Sattinger, Group Theoretic
     Methods in Bifurcation Theory, Springer 1979)."""
     one, two = (np.trace(power, axis1=1, axis2=2) for power in (rho, rho @ rho))
     return round(float((one * (one**2 + two)).mean() / 2.0))
