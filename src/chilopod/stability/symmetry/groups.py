@@ -50,8 +50,8 @@ class Group(ReadOnlyArrays):
         Scales of the coordinates x, shape (n,): entry (i, j) of an element is of the order of ``scales[i] / scales[j]``
         at most. Between coordinates that no element mixes they have no meaning.
     component
-        Number of each coordinate's set, shape (n,), such as one kind of state over all cells of a ring: neither elements
-        nor ``to_orthogonal`` mix the sets, so their units are independent.
+        Number of each coordinate's set, shape (n,), such as one kind of state over all cells of a ring: neither
+        elements nor ``to_orthogonal`` mix the sets, so their units are independent.
     """
 
     generators: Array

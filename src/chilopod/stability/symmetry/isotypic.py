@@ -1,8 +1,8 @@
 """Symmetry-adapted bases: matrices that commute with a finite group become block-diagonal, with one block for each
 irreducible representation.
 No tables of characters are needed: the eigenspaces of a generic symmetric matrix that commutes with the group are
-irreducible (a mean over the group of a random one is generic). Characters give their equivalence and type (Serre, Linear
-Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections from one of them give all
+irreducible (a mean over the group of a random one is generic). Characters give their equivalence and type (Serre,
+Linear Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections from one give all
 its copies (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer
 1988, sections XII.2 and XII.3).
 """
@@ -77,13 +77,13 @@ class Block(ReadOnlyArrays):
     def reduced(self, matrices: ArrayLike) -> Array:
         """Reduced form of matrices M, shape (..., n, n), that commute with the group.
 
-        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; a matrix that does not commute is replaced by the
-        mean of P M P^-1 over the group. Complex type: dual @ M @ basis, shape (..., m d, m d).
+        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; a matrix that does not commute is replaced by
+        the mean of P M P^-1 over the group. Complex type: dual @ M @ basis, shape (..., m d, m d).
         """
         return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
-        """Bound on the absolute error of the reduced matrices, from that of the matrices' entries (a number or an array)
+        """Bound on the absolute error of the reduced matrices, from that of the matrices' entries (one number or all)
         and round-off."""
         round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
         entries = np.asarray(error, dtype=np.float64) + round_off

@@ -82,8 +82,8 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def met(self, anchor: A, found: R, off: float, stalled: int, singular: bool) -> bool:
-        """True if the corrections end at this error, which the last few did not halve; ``singular``: along some direction
-        they cannot reduce it."""
+        """True if the corrections end at this error, which the last few did not halve; ``singular``: along some
+        direction they cannot reduce it."""
 
     @abstractmethod
     def step(self, anchor: A, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[A, S]:

@@ -43,7 +43,7 @@ def trace(
     points
         Largest number of steps; None for any number.
     look
-        Function ``look(step, ending)`` that finds the events within a step, and the reason if the curve ends with it; it
+        Function ``look(step, ending)`` that finds the events within a step, and the ending if the curve ends there; it
         raises a ChilopodError if a shorter step may succeed.
     keep
         Function ``keep(found, count)`` that receives the events of the accepted step with number ``count``.
