@@ -43,6 +43,7 @@ class Interval(NamedTuple):
 
 class Control(NamedTuple):
     """Step control of an integration."""
+
     tolerance: float  # estimated error of a step over the size of every state and entry of the derivative
     most_steps: int  # budget of steps in an interval
     units: Any  # units of the states, shape (n,), positive

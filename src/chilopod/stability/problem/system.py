@@ -22,9 +22,7 @@ Flow = Callable[[Array, float, float], tuple[Array, Array]]
 
 _HIGHEST_ORDER = 1000
 _SAME = 1e-8  # difference of equal matrices, relative to their size
-_ROUND_OFF = (
-    1e-7  # relative to the largest entry, in units that balance the matrix: with the above, some last digits
-)
+_ROUND_OFF = 1e-7  # relative to the largest entry, in units that balance the matrix: with the above, some last digits
 
 
 @dataclass(frozen=True)

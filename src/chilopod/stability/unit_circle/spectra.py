@@ -133,8 +133,8 @@ class Spectra:
         return self._known[value] is not None
 
     def beside(self, place: float, apart: float = 0.0) -> tuple[float, float]:
-        """The nearest values with a matrix on either side of a place, at a least distance from it; without one, the place
-        or the value beyond it."""
+        """The nearest values with a matrix on either side of a place, at a least distance; without one, the place or
+        the value beyond it."""
         here = bisect.bisect_left(self.values, place)
         left = next((v for v in reversed(self.values[:here]) if place - v >= apart), min(self.values[0], place))
         after = self.values[bisect.bisect_right(self.values, place) :]
@@ -303,8 +303,8 @@ def _stretches(balanced: Array) -> Array:
 def _eigenvalues(balanced: Array) -> ComplexArray:
     """Eigenvalues by falling modulus, shape (k, m).
 
-    The states with the largest rows come first: for a matrix graded downward the QR algorithm resolves small eigenvalues
-    relative to their size (Stewart, Numer. Math. 90, 2001), for others they are rounding.
+    The states with the largest rows come first: for a matrix graded downward the QR algorithm resolves small
+    eigenvalues relative to their size (Stewart, Numer. Math. 90, 2001), for others they are rounding.
     """
     order = np.argsort(-np.abs(balanced).max(axis=-1), axis=-1)
     each = np.arange(len(balanced))[:, None]

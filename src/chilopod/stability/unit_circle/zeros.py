@@ -38,7 +38,7 @@ _ROUGH = 2.0**-34  # least width of a piece that is not a polynomial, relative t
 _FINEST = 1e-12  # width of a part in which zeros are not separated, relative to the interval
 _ULPS = 256.0  # width of the finest piece in units in the last place
 
-_WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # places in such a part, and least slope of a monotonic one, relative to the steepest
+_WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # places in a part, and least relative slope for a simple zero
 _REAL = 1e-6  # largest imaginary part of a place where a level is just reached
 
 _DEGREES = np.arange(DEGREE + 1.0)
@@ -78,9 +78,9 @@ def find_zeros(
 ) -> Zeros:
     """All zeros of an analytic function, which need not be scaled, in an interval.
 
-    Below its ``error``, given as a logarithm, shape (k,), a value is zero. When the budget of values is spent (``left``,
-    by default 20 000 in all), the widest pieces have been searched, and the changes of sign so far are reported. Zeros
-    between two values for which ``skip`` is true are ignored.
+    Below its ``error``, given as a logarithm, shape (k,), a value is zero. When the budget of values is spent
+    (``left``, by default 20 000 in all), the widest pieces have been searched, and the changes of sign so far are
+    reported. Zeros between two values for which ``skip`` is true are ignored.
     """
     search = _Search(function, error, skip, low, high)
     room_left = left if left is not None else lambda: 20_000 - search.asked
