@@ -187,7 +187,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     if result.values.size == system.dimension - (system.period is None):
         return result
     remark = (
-        f"only the {result.values.size} multipliers of largest modulus were asked for, and decide whether the orbit "
+        f"only the {result.values.size} multipliers of largest modulus were computed; they decide whether the orbit "
         f"is stable; the next one has a modulus of about {of_period:.3g}"
     )
     return replace(result, remarks=(remark,))

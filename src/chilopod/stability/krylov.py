@@ -1,5 +1,5 @@
-"""Multipliers of largest modulus of a large system, without the derivative of its flow as a matrix: what
-``multipliers(leading=)`` computes.
+"""Multipliers of largest modulus of a large system, without the derivative of its flow as a matrix, for
+``multipliers(leading=)``.
 
 The derivative is applied to directions. A block of directions resolves multiple multipliers, as of a ring, in as many
 copies as it has columns, and the compiled flow carries several directions at nearly the cost of one, so single

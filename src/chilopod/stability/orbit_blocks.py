@@ -34,7 +34,7 @@ def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[Blocks, tuple[str, .
     if group.order == 1:
         return (None,), ("the orbit has none of the spatial symmetries",)
     if commutes(group, orbit.image.jacobian, orbit.image.error) > 1.0:
-        return (None,), ("the return map does not have the spatial symmetries: they are left aside",)
+        return (None,), ("the return map does not have the spatial symmetries: they are not used",)
     return isotypic(group), ()
 
 

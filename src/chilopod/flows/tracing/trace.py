@@ -59,7 +59,7 @@ def trace(
     times, base
         Times between which, and state around which, the tape is compared with the function.
     events
-        Pairs of a guard g(t, x, *args) and a reset r(t, x, *args) -> state, None for none.
+        Pairs of a guard g(t, x, *args) and a reset r(t, x, *args) -> state, or None.
 
     Raises
     ------

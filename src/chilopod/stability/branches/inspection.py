@@ -80,7 +80,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event
         if (sure or (leaving and event is Event.PLUS)) and not _confirmed(within, place):
-            remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which is no event",)
+            remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which does not count",)
             continue
         point = special_point(within, place)
         if point is None:

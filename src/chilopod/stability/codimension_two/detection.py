@@ -283,7 +283,7 @@ class Detector:
             return together(self._kind, Kind.NEIMARK_SACKER)
         sign = TARGETS[signal]
         if sign == target and abs(here.overlap) < _OVERLAP:
-            return None  # of a double multiplier the overlap tells
+            return None  # the overlap identifies a double multiplier
         mode = here.spectrum.right[:, here.others[int(np.abs(nu - sign).argmin())]]
         if reverses(self._curve.system(here.at.place.values), mode, here.frame.size):
             return together(self._kind, Kind.PITCHFORK)

@@ -245,7 +245,7 @@ class _Equations:
             try:
                 self._ends[i], self._factors[i] = checked_flow(system, x, a, b)
                 if beside is not None:
-                    with np.errstate(all="ignore"):  # what is not finite is refused later
+                    with np.errstate(all="ignore"):  # values that are not finite are refused later
                         self._by_value[i] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
             except AnalysisError as error:
                 if m == 1 or isinstance(error, SpentError):

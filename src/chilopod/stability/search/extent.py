@@ -67,7 +67,7 @@ def extent(samples: Samples) -> Extent:
         ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
         end = last.value
         if samples.merges:
-            ending = f"the orbit meets another one near {end:.9g}, which goes on alone: a pitchfork of that one"
+            ending = f"the orbit meets another one near {end:.9g}, which continues alone: a pitchfork of that one"
             end = max(start, end - _MERGING * samples.width)
         return Extent(start, end, folds, ending, beside=beside)
     # Near the fold multipliers move as a root of the distance, which a search cannot resolve.

@@ -27,7 +27,7 @@ FIRST_STEPS = 8
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which the search may not resolve a fold."""
 
-_KEPT = 64  # cached systems: around a point the same one is asked for again and again
+_KEPT = 64  # cached systems: those around a point are used repeatedly
 _SHORTEST = 2.0**-10  # shortest step of a followed orbit, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
@@ -115,7 +115,7 @@ class Samples:
         self.low, self.high, self.width = low, high, high - low
         self.known = guess is None  # the systems know their orbits
         self.spent = False  # the path ends because the budget was spent
-        self.merges = False  # the path ends where the orbit meets another one, which goes on alone
+        self.merges = False  # the path ends where the orbit meets another one, which continues alone
         self.count = self._counted = 0  # orbits computed
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []

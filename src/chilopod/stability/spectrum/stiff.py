@@ -56,7 +56,7 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
     slow = int(deep[0]) if deep.size else n
     apart = np.diff(total, prepend=np.inf)[slow:] < -_GAP
     if not (apart.all() and (unsure[slow:] <= _UNSURE * np.abs(total[slow:])).all() and signs[slow:].all()):
-        raise AnalysisError("several directions decay too fast to be told apart", field="flow")
+        raise AnalysisError("several directions decay too fast to be separated", field="flow")
     values: list[ComplexArray] = []
     modes: list[ComplexArray] = []
     moved = unsure.copy()

@@ -182,7 +182,7 @@ class _Finder:
     def _probe(self) -> None:
         """Evaluate matrices wherever a multiplier may cross the circle and come back: it approaches the circle from
         both sides of a gap."""
-        self.report.remarks.append("so many multipliers: pairs are found by counting, not by a function that vanishes")
+        self.report.remarks.append("with many multipliers pairs are found by counting, not by zeros of a function")
         places = np.linspace(self.a, self.b, _PROBES)
         while places.size and self.spectra.left > places.size:
             self.spectra.at(places)
