@@ -27,6 +27,7 @@ class UndeclaredSwitch(UserWarning):
 
 def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
     """Borders of the parts of the period in which a right-hand side changes fast, shape (parts, 2).
+
     It is sampled at a fixed state on a grid of 4096 times. Where it changes between two of them by more than a fiftieth
     of its whole range, without a switch at one of the ``edges``, an integrator might step over the change.
     """

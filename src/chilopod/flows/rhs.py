@@ -228,6 +228,7 @@ class RightHandSide:
 
 def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
     """Flows by Taylor series, and by the implicit method from every state where the series take too many steps.
+
     Every call decides anew, so that no result depends on earlier calls.
     """
     latest: tuple[bytes, float, float] | None = None  # latest flow by Taylor series, to avoid a second computation

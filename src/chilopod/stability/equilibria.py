@@ -1,5 +1,6 @@
 """Equilibria of systems that do not depend on time: their state, stability, and the cycle that leaves one at a Hopf
 point.
+
 Derivatives of the right-hand side f are exact if a system provides the Taylor coefficients of f along curves (as those
 of :func:`chilopod.stability.from_rhs` do); else they come from Chebyshev series of samples along the same curves, with
 errors.

@@ -5,6 +5,7 @@ The derivative is applied to directions. A block of directions resolves multiple
 copies as it has columns, and the compiled flow carries several directions at nearly the cost of one, so single
 directions (Arnoldi's method as in ARPACK) have no advantage. Nor have restarts: the subspace may grow to the whole
 space, where it is exact.
+
 The orbit is found by Newton's method. Every linear system is solved in such a subspace to about the accuracy that the
 method can use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), from a block that includes the
 least contracting directions of earlier rounds. A strongly dissipative system takes a few directions
@@ -145,6 +146,7 @@ class TangentMap(ReadOnlyArrays):
     def images_with_error(self, directions: Array) -> tuple[Array, Array, Array]:
         """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,), relative to
         their norms instead of every entry.
+
         As in :func:`~chilopod.stability.problem.returns.flow_with_error` they are a multiple of the difference from a
         second computation with the interval in parts.
         """
@@ -180,6 +182,7 @@ class TangentMap(ReadOnlyArrays):
 
 def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time.
+
     Raises AnalysisError if the flow is not finite or does not return to the section.
     """
     velocity, normal = None, None
@@ -197,6 +200,7 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
 
 def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
     """Sizes of the states, shape (n,), as in :func:`chilopod.stability.problem.scales.sizes`, without the matrix.
+
     The size of a state is its largest value during a return, or its change within a part of the return when the others
     are disturbed at random by their own sizes. If the orbit is zero throughout, only the latter gives the ratios: the
     one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 261-287, 2000.
@@ -237,6 +241,7 @@ def closed_orbit(
     budget: Budget | None = None,
 ) -> tuple[TangentMap, Array]:
     """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
+
     A return may displace the guess by ``farthest``, relative to the sizes. If the system does not depend on time, it
     ends on the section, by default across the motion at the guess. Each round takes a return map from the budget.
     Raises AnalysisError if Newton's method does not converge.
@@ -312,6 +317,7 @@ class _Ritz:
 def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMultipliers:
     """The ``count`` multipliers of largest modulus of the return map at a state on the orbit, for given sizes of the
     states, shape (n,).
+
     A value theta with the vector y, |y| = 1, has the exact error w^T (H' y - theta y) / w^T y, with w the left
     eigenvector of the multiplier. H' y is computed again, with its error; the components of w in the random directions
     of the first block are known, and its norm is almost never much larger than they show (Kenney and Laub, *SIAM J.

@@ -132,6 +132,7 @@ def _stage_columns(step: Any) -> None:
 @fused_njit(error_model="numpy")
 def stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
     """Solve for the stages from the guess in ``moved``.
+
     At the end ``columns`` has the derivative of the stages with respect to x, and ``slopes`` and ``jacobians`` belong
     to the stages. False without convergence.
     """
@@ -219,6 +220,7 @@ def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple
 @fused_njit(error_model="numpy")
 def estimated(problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any) -> float:
     """The error of a step relative to the size of every state and entry of the derivative.
+
     The size of a state is its largest value so far, or the effect of the others on it within the step; likewise for the
     entries of the derivative, ``extent``.
     """
@@ -255,6 +257,7 @@ def estimated(problem: Any, method: Any, x: Any, h: float, step: Any, near: Any,
 def turn(frame: Any, columns: Any, jacobians: Any, weights: Any, h: float, stretch: Any, turned: Any) -> None:
     """Carry an orthonormal frame over a step: in each stage the first k columns, for every k, span the image of those
     at the start under the derivative, and grow at the rates on the diagonal of Q^T J Q.
+
     J gives the decay of a direction and the derivative its turn, so both are correct also for directions that the
     derivative itself does not resolve.
     """

@@ -49,6 +49,7 @@ def _refined(coefficients: Any, order: int, low: float, high: float) -> float:
 @njit(error_model="numpy")
 def first_exit(coefficients: Any, order: int, h: float) -> float:
     """The first z in [0, h] after which a polynomial is negative; -1 if it stays nonnegative.
+
     A polynomial that rises from zero or, by round-off, from just below counts as nonnegative there.
 
     Intervals are halved until Descartes' rule of signs for the Bernstein coefficients leaves no root or one (Basu,

@@ -158,6 +158,7 @@ def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, uni
 def await_events(tape: Any, directions: Any, motion: Any, unit: float, soon: float, t: float) -> None:
     """Set the guards that pass zero within a time ``soon`` of the start of an interval to before the event if it is
     still to come, else to after it.
+
     Events of guards that depend on time only are still to come: an event at the border of two intervals belongs to the
     second. A state on a guard that is about to fire is before the event if the reset makes it move away (an impact);
     else, as where legs change places, it counts as the state after the event.

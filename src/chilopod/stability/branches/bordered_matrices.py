@@ -17,6 +17,7 @@ _UNCERTAIN = 1e-6  # singular value, relative to the largest, that counts as zer
 def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
     """Projection onto the states with the spatial symmetries of an orbit, and of the ``mode`` of a leaving branch if
     given, in units of the states' ``sizes``, shape (n, n); None without symmetries.
+
     In this space the branch is regular where symmetry-breaking branches leave it (Golubitsky, Stewart & Schaeffer,
     *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
     """
@@ -42,6 +43,7 @@ def within_space(space: Array | None, matrix: Array) -> Array:
 
 def null_vector(bordered: Array) -> Array:
     """Unit null vector of all but the last row of a matrix, on the side of the last row.
+
     At a branch point the matrix is singular within its errors, and the shortest solution is used.
     """
     n = len(bordered) - 1

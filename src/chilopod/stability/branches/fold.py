@@ -34,6 +34,7 @@ class Fold:
 
 def find_fold(family: Family, value: float, orbit: Array, scale: float, rising: bool = True) -> Fold | None:
     """Follow an orbit, with the systems' symmetry in time, round the next fold; None without one.
+
     The orbit must not be in the fold: a curve that starts there does not pass it. The search extends as far as
     ``scale``, to higher values if ``rising``, else to lower ones.
     """

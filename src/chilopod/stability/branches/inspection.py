@@ -5,6 +5,7 @@ the test functions fit and stay clear of zero, the step has no event; else it is
 crossings of the unit circle (:mod:`~chilopod.stability.unit_circle.crossings`).
 The guarantee is that of an interpolation: crossings that the places resolve are found however close they lie; an event
 confined between two places, which are at most a sixth of a step apart, is missed.
+
 A determinant that changes its sign without a branch point shows that a step landed on another curve.
 """
 
@@ -99,6 +100,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
 
 def _confirmed(within: Within, place: Place) -> bool:
     """True if the critical multiplier changes sides at a place by more than the errors of the multipliers.
+
     Two that meet at +1 or -1 and leave along the circle, as without damping, may be on any side: the product of their
     distances shows a passage. Beside a branch point a multiplier is critical within its error, and rounding makes it
     cross.

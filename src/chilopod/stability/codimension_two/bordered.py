@@ -10,6 +10,7 @@ of Dynamical Equilibria*, SIAM 2000, ch. 4). For a pair, H'^2 - 2 kappa H' + 1 i
 of shape (2, 2) (ch. 5; Kuznetsov, *Elements of Applied Bifurcation Theory*, section 10.3). On the critical plane
 H'^2 - 2 kappa H' + 1 = (trace - 2 kappa) H' + (1 - det), so G has only two independent entries, and these two factors
 are the equations: regular also where the pair meets at +1 or -1.
+
 If the systems know their orbit, x is not an unknown; if the orbit has a spatial symmetry, x varies among the states
 with that symmetry. H - 1 is then regular also on a curve of pitchforks.
 """
@@ -55,6 +56,7 @@ class Place(ReadOnlyArrays):
 @dataclass(frozen=True)
 class Frame(ReadOnlyArrays):
     """Units and borders of the equations; adapted from point to point of a curve.
+
     With m directions of the orbit (0 if it is known) and k = 1 or 2 critical multipliers:
     """
 

@@ -1,4 +1,5 @@
 """Curves of bifurcation points in two parameters.
+
 The tracer (see :mod:`chilopod.stability.tracing.tracer`) follows them with the equations of :mod:`.bordered`, and
 points of codimension two are located within each step (see :mod:`.detection`).
 """

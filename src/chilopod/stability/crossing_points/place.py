@@ -174,6 +174,7 @@ class Regular(ReadOnlyArrays):
 
 def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regular | None:
     """Place and orbit at a multiplier +1 of a corrected orbit.
+
     There H - 1 is singular, and Newton's method stops anywhere along the mode where the residual is round-off. So the
     orbit and the determinant of H' - 1 are interpolated from regular places on both sides, or on one side at an end,
     ever closer together until interpolations of two orders agree. None if the orbit is regular or the interval leaves

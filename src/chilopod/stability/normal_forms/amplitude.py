@@ -1,4 +1,5 @@
 """The best amplitude to sample the nonlinear terms of a return map, and the terms found there.
+
 The search lowers the amplitude where the map is far from its linear part, raises it where the noise hides the nonlinear
 terms, bends the sampled curve along the centre manifold, and continues while the error of the cubic coefficient falls.
 """
@@ -64,6 +65,7 @@ class Fit:
 
 def fitted(mapped: ReturnedStates, at: CriticalOrbit, noise: float, resonance: int | None, radius: float) -> Fit | None:
     """The terms at the amplitude, and with the bend of the curve, of the most accurate cubic coefficient.
+
     The search begins at an amplitude; None if no amplitude is suitable.
     """
     third: Powers = (3, 0) if at.real else (2, 1)

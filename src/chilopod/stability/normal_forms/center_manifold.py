@@ -4,6 +4,7 @@ The manifold is W(z) = x + z q + z^2 w20 + ... (and complex conjugates), with z 
 sampled on circles |z| = r, or at z = +-r; Fourier series in the angle and Chebyshev series in r give the Taylor
 coefficients of H(W(z)), whose excess over W's own determines the bend of W (the homological equations of Kuznetsov,
 *Elements of Applied Bifurcation Theory*, section 8.7, and of Kuznetsov and Meijer 2005, here with measured numbers).
+
 Units of the states do not matter, as every entry of a state is compared with itself only.
 """
 

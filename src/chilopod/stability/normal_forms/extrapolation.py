@@ -1,4 +1,5 @@
 """Taylor coefficients of a sampled function, with error bounds.
+
 An even or odd function of the radius r is sampled at Chebyshev points of (0, s], which gives its values at those of
 [-s, s]. Its Chebyshev coefficients t_k fall geometrically down to the noise of the samples, so the series itself
 shows the size of that noise, the truncation error, and the quality of s (Trefethen,

@@ -1,4 +1,5 @@
 """Normal-form coefficients at a bifurcation, from evaluations of the return map.
+
 Near the critical orbit the return map H is sampled along the critical mode, bent by its quadratic part outside the
 critical space; this gives the terms of second and third order on the critical space (Kuznetsov, *Elements of Applied
 Bifurcation Theory*, sections 5.4, 8.7 and 9.2). Only H is needed: no derivatives of the right-hand side by hand and no

@@ -119,6 +119,7 @@ def find_orbit(
     For a system that does not depend on time the result has the shortest period, even if the guess is nearer to up to
     eight times that: if the motion closes earlier, the orbit is corrected again over that time. (An orbit of twice the
     period that branches off at a period doubling does not close earlier.)
+
     If Newton's method fails at the guess, it is tried from a state further along the motion, provided that every state
     may be time 0, and then after the motion has settled on an attracting orbit.
 
@@ -304,6 +305,7 @@ def _found(system: SystemLike, x: Array, duration: float, size: Array, with_erro
 
 def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
     """Basis of the states with the spatial symmetries of a state, shape (n, k); None if it has none.
+
     In this space H - 1 is regular also where a symmetry-breaking mode is critical.
     """
     if system.symmetry is not None or not spatial_symmetries(system):

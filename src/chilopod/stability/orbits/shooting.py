@@ -1,4 +1,5 @@
 """The equations of a periodic orbit: states at instants that divide a return evenly, each carried to the next one.
+
 One node is single shooting. Over a whole return a motion may magnify a deviation by thousands, which makes corrections
 useless; over a part of it a deviation grows only by a root of that. The linear equations are condensed to the
 first state, the time of a return and the parameter (Ascher, Mattheij & Russell, *Numerical Solution of Boundary Value
@@ -53,6 +54,7 @@ class Nodes(ReadOnlyArrays):
 @dataclass(frozen=True)
 class Closed(ReadOnlyArrays):
     """A corrected orbit: its nodes, the sizes of the states, shape (n,), and the return of the last node.
+
     The derivatives of a return, with respect to the state, shape (n, n), and to the parameter, shape (n,), exclude the
     change of its time: they are products of those between nodes, without the rounding of a whole return.
     """

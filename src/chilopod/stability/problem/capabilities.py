@@ -1,4 +1,5 @@
 """Required and optional interfaces of a periodic system.
+
 Every capability is a protocol: a system implements it through its methods. The analyses test it by ``isinstance``, or
 by the functions at the end of this module for protocols with one member. A member that is None counts as missing, so
 instances of one class may differ (as those of :class:`chilopod.stability.PeriodicSystem`). Methods and properties must
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 @runtime_checkable
 class SystemLike(Protocol):
     """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow, which every analysis needs.
+
     A system that does not depend on time has no period of its own: see :class:`Autonomous`.
     """
 

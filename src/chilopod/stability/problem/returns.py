@@ -1,4 +1,5 @@
 """The return map of a system, whose fixed points are the periodic orbits.
+
 For a known period T it is H = S flow(T/k), with S the symmetry of order k, if any. If the system does not depend on
 time, H carries a state to the next crossing of its motion, turned by S, with a section, a hyperplane: a Poincare map
 in the coordinates of the states (Parker & Chua, *Practical Numerical Algorithms for Chaotic Systems*, 1989,
@@ -190,6 +191,7 @@ def _check_shapes(state: Array, derivative: Array, n: int) -> None:
 def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, section: Section | None = None) -> ReturnMap:
     """The return map H and its derivative at a state, shape (n,), with an optional bound on the error, which may cost a
     second computation.
+
     If the system does not depend on time, a return ends on the section: by default across the motion at ``x``.
     """
     x = np.array(x, dtype=np.float64)  # a system may write into its argument

@@ -100,6 +100,7 @@ def located(
     returns: int,
 ) -> Located:
     """Find and describe the bifurcations along the samples of a family.
+
     ``crossings(start, end)`` searches every block of the return map; ``described(crossing, block)`` gives the point,
     remarks, or both, within a number of return maps; ``fold(fold)`` a point or a remark for a fold at an end of the
     orbit.

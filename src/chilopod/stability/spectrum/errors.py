@@ -1,4 +1,5 @@
 """Errors of eigenvalues and of results from them.
+
 Where first-order bounds do not hold, a matrix is changed at random within the errors of its entries, and the error of a
 result is ``SAFETY`` times its largest observed change. This holds for simple and for defective eigenvalues, for which
 a condition number gives no error. A draw moves a result along its gradient in a random

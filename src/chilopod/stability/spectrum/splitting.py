@@ -1,4 +1,5 @@
 """Eigenvalues and eigenvectors of a product of matrices, each relative to its own scale.
+
 A product of many factors that contract some directions enormously resolves only the slow directions; the fast ones
 vanish in round-off. Subspace iteration forward through the factors gives the nested spaces of the slowest directions,
 iteration backward through the inverses those of the fastest, and their intersections split the space into groups of
@@ -30,6 +31,7 @@ def split_product(
     """Logarithms ln|eigenvalue| + i angle of the eigenvalues of ``factors[-1] @ ... @ factors[0]`` by falling modulus,
     shape (n,), its unit eigenvectors as columns, and bounds on the change of the logarithms when the entries of the
     factors change by their errors, to first order between groups.
+
     Each factor must be invertible and of moderate condition; AnalysisError if one has no finite inverse.
     """
     n = factors[0].shape[0]
@@ -77,6 +79,7 @@ def split_product(
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
     """The same for the ``count`` directions that grow most, of factors that may map the others to zero.
+
     A gap must separate these from the others, and the factors must be of moderate condition on them.
     """
     bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]

@@ -40,6 +40,7 @@ _LEFT, _APART = 1e-12, 1e-4  # stretches over a short time above round-off, and 
 def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
     """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and the errors of the
     logarithms.
+
     Directions that the derivative of the flow resolves are split by it; the others, which must be real and of different
     sizes, have the stretch of the frame and its sign. The fastest has all digits, by Liouville's formula; several share
     an error, which must not exceed 1e-6 of either.
@@ -108,6 +109,7 @@ def _stretched(
     system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, most: int
 ) -> tuple[Stretched, int]:
     """A frame over a part, and the number of halvings of the part, at most ``most``.
+
     A part is halved if two computations differ: a direction that turns from a fast decay to a slow one needs short
     steps, as after a start.
     """

@@ -1,4 +1,5 @@
 """Bifurcations with a critical multiplier in a block of a symmetry group.
+
 The block determines the multipliers that are critical together, the terms of the normal form and, at +1 and -1, the
 lines of new orbits: those fixed by an axial isotropy subgroup (equivariant branching lemma; Golubitsky, Stewart
 & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer 1988, theorem XIII.3.3; for period doublings of

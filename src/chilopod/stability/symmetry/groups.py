@@ -110,6 +110,7 @@ def _needed(by: NDArray[np.intp]) -> NDArray[np.intp]:
 
 def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
     """The isotropy subgroup of a state, shape (n,), with a bound on its error: all P of a group with P x = x.
+
     One state suffices for symmetries that hold at every instant: by uniqueness of the flow its whole orbit is
     invariant.
     """

@@ -1,5 +1,6 @@
 """Symmetry-adapted bases: matrices that commute with a finite group become block-diagonal, with one block for each
 irreducible representation.
+
 No tables of characters are needed: the eigenspaces of a generic symmetric matrix that commutes with the group are
 irreducible (a mean over the group of a random one is generic). Characters give their equivalence and type (Serre,
 Linear Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections from one give all

@@ -165,6 +165,7 @@ class Equations(ABC, Generic[A, S, R]):
 
 def inverted(matrix: Array) -> tuple[Array, bool]:
     """Inverse of the matrix of a curve, shape (N+1, N+1), or that for shortest solutions, and True for the latter.
+
     At a branch point rounding decides how nearly singular the matrix is, and a solution with its inverse may end on the
     other branch. The shortest solution leaves the residual unchanged in a singular direction of the matrix.
     """

@@ -1,4 +1,5 @@
 """The tracer: pseudo-arclength continuation of any curve, with step control, to its end.
+
 A step is predicted, corrected at right angles to the tangent at its start (Keller 1977; Kuznetsov, *Elements of
 Applied Bifurcation Theory*, section 10.2), and cut at an edge of the box or where the curve closes.
 """
