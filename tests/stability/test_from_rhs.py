@@ -342,7 +342,7 @@ def test_a_state_that_is_no_orbit_is_refused():
     def rhs(t, x):
         return [-x[0] + cos(t)]
 
-    with pytest.raises(AnalysisError, match="is no periodic orbit"):
+    with pytest.raises(AnalysisError, match="must be a periodic orbit"):
         multipliers(from_rhs(rhs, 1, 2 * pi, orbit=[0.0]))
     found = multipliers(from_rhs(rhs, 1, 2 * pi), [0.0])
     assert found.orbit[0] == pytest.approx(0.5, abs=1e-13)  # x = (cos t + sin t) / 2

@@ -134,7 +134,7 @@ def test_newtons_method_in_a_subspace():
 
 def test_no_orbit_near_the_guess():
     system = from_rhs(lambda t, x: 0.1 + 0.0 * x, 12, 1.0)
-    with pytest.raises(AnalysisError, match="no move closes the motion"):
+    with pytest.raises(AnalysisError, match="no correction closes the motion"):
         closed_orbit(system, np.ones(12))
 
 
@@ -177,7 +177,7 @@ def test_a_large_system_without_directions():
 
 def test_a_known_orbit_that_is_none():
     generator = -np.diag(np.linspace(1.0, 20.0, 100))
-    with pytest.raises(AnalysisError, match="is no periodic orbit"):
+    with pytest.raises(AnalysisError, match="must be a periodic orbit"):
         multipliers(linear(generator, np.ones(100)), leading=3)
 
 

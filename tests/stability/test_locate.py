@@ -168,7 +168,7 @@ def test_a_family_without_known_orbits_needs_a_guess():
     def system(mu):
         return PeriodicSystem(1, 1.0, lambda x, t0, t1: (x, np.eye(1)))
 
-    with pytest.raises(AnalysisError, match="does not know its periodic orbit"):
+    with pytest.raises(AnalysisError, match="has no known periodic orbit"):
         locate(system, (0.0, 1.0))
 
 

@@ -62,12 +62,12 @@ def test_the_derivative_is_within_its_bound():
     [
         (lambda: from_map(3, 1), r"image = 3: must be a function"),
         (lambda: from_map(lambda x: x, 0), r"dimension = 0: must be a whole number"),
-        (lambda: multipliers(from_map(lambda x: x, 1), [0.5]), r"image = 'ndarray': returns no pair"),
+        (lambda: multipliers(from_map(lambda x: x, 1), [0.5]), r"image = 'ndarray': must return a pair"),
         (lambda: multipliers(from_map(lambda x: (x, x), 1), [0.5]), r"image: returns an array of shape \(1,\)"),
-        (lambda: switch(logistic, 3), r"point = 3: is no located point"),
-        (lambda: proceed(logistic, None, (1.0, 2.0)), r"branch: is no branch"),
-        (lambda: find_orbit(None, [1.0]), r"system: is no system"),
-        (lambda: switch2(None, 3, ((0.0, 1.0), (0.0, 1.0))), r"point = 3: is no point of codimension two"),
+        (lambda: switch(logistic, 3), r"point = 3: must be a located point"),
+        (lambda: proceed(logistic, None, (1.0, 2.0)), r"branch: must be a branch"),
+        (lambda: find_orbit(None, [1.0]), r"system: must be a system"),
+        (lambda: switch2(None, 3, ((0.0, 1.0), (0.0, 1.0))), r"point = 3: must be a point of codimension two"),
         *(
             (lambda s=s: locate(logistic, (2.5, 3.2), [0.6], seconds=s), r"seconds.*: must be a number of seconds")
             for s in (-1.0, math.nan, "3", True)

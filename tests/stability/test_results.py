@@ -198,7 +198,7 @@ def test_several_branches_share_axes_and_marks():
 
 
 def test_a_state_that_is_not_there_is_refused_in_one_line():
-    with pytest.raises(ParameterError, match=r"^state = 1: is no state; allowed: 0 to 0$"):
+    with pytest.raises(ParameterError, match=r"^state = 1: must be a state; allowed: 0 to 0$"):
         folded().plot(Figure().add_subplot(), state=1)
 
 

@@ -73,7 +73,7 @@ def test_arguments_and_budgets():
     point = turning(0.5)
     with pytest.raises(ParameterError, match="two intervals"):
         switch2(family2(0.5), point, (0.0, 1.0))
-    with pytest.raises(AnalysisError, match="as many flows as were allowed are spent"):
+    with pytest.raises(AnalysisError, match="the budget of flows is spent"):
         switch2(family2(0.5), point, BOX, budget=3)
     (start,) = switch2(family2(0.5), point, BOX)
     with pytest.raises(ParameterError, match="second"):

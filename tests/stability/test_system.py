@@ -93,7 +93,7 @@ def test_a_capability_that_is_none_is_missing():
     for system in (Own(), Without(), plain, whole_period(Without())):
         assert not any(isinstance(system, protocol) for protocol in protocols)
         assert spatial_symmetries(system) == ()
-        with pytest.raises(AnalysisError, match="does not know its periodic orbit"):
+        with pytest.raises(AnalysisError, match="has no known periodic orbit"):
             multipliers(system)
     found = multipliers(Without(), [1.0, 1.0])
     assert found.values.tolist() == multipliers(Own(), [1.0, 1.0]).values.tolist()
@@ -146,10 +146,10 @@ def test_half_period_squares_to_the_full_period():
     [
         (np.eye(3), "wrong shape"),
         ([1.0, -1.0], "wrong shape"),
-        ([[0.0, 1.0], [-1.0, 0.5]], "no finite order"),
-        ([[1.0, 1.0], [0.0, 1.0]], "no finite order"),
-        ([[np.nan, 0.0], [0.0, 1.0]], "no finite order"),
-        (np.zeros((2, 2)), "no finite order"),
+        ([[0.0, 1.0], [-1.0, 0.5]], "must have a finite order"),
+        ([[1.0, 1.0], [0.0, 1.0]], "must have a finite order"),
+        ([[np.nan, 0.0], [0.0, 1.0]], "must have a finite order"),
+        (np.zeros((2, 2)), "must have a finite order"),
     ],
 )
 @pytest.mark.parametrize("name", ["symmetry", "spatial_symmetry"])
@@ -190,7 +190,7 @@ def test_no_orbit_to_be_found():
     system = PeriodicSystem(1, 1.0, lambda x, t0, t1: (x + (t1 - t0), np.eye(1)))
     with pytest.raises(AnalysisError, match="no periodic orbit found"):
         find_orbit(system, [0.0])
-    with pytest.raises(AnalysisError, match="does not know its periodic orbit"):
+    with pytest.raises(AnalysisError, match="has no known periodic orbit"):
         multipliers(system)
 
 

@@ -1,1 +1,1 @@
-"""How a right-hand side becomes a flow with its derivative and its error; no module here knows of orbits."""
+"""Flows of right-hand sides, with derivatives and errors; no module here uses periodic orbits."""

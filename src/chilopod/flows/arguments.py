@@ -1,4 +1,4 @@
-"""Checks of what a user hands over with a right-hand side: one line of error instead of a traceback, or of nonsense."""
+"""Checks of the user's input beside a right-hand side, with errors of one line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LONGEST_SHOWN = 60
 def checked_arguments(
     rhs: object, dimension: object, args: object, tolerance: object
 ) -> tuple[int, tuple[Any, ...], float]:
-    """Dimension, args and tolerance as what they should be."""
+    """Check dimension, args and tolerance."""
     if not callable(rhs):
         raise ParameterError("must be a function", field="rhs", value=rhs, allowed="rhs(t, x, *args)")
     try:
@@ -52,7 +52,7 @@ def checked_duration(field: str, value: object) -> float:
 
 
 def checked_count(field: str, value: object, most: int) -> int:
-    """A number of things, of which there are not more than ``most``."""
+    """A whole number from 1 to ``most``."""
     try:
         count = 0 if isinstance(value, bool) else operator.index(value)  # type: ignore[arg-type]
     except TypeError:
@@ -76,16 +76,16 @@ def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
 
 
 def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
-    """Values of a user's function, as an array of the shape it should have."""
+    """Values of a user's function as an array of the required shape."""
     try:
-        # None would pass for NaN.
+        # None would become NaN.
         array = None if result is None else np.asarray(result, dtype=np.float64)
     except (TypeError, ValueError):
         array = None
     wanted = f"an array of shape {shape}" if shape else "one number"
     if array is None:
-        what = "array of numbers" if shape else "number"
-        raise ParameterError(f"returns no {what} but {_kind_of(result)}", field=field, allowed=wanted)
+        what = "an array of numbers" if shape else "a number"
+        raise ParameterError(f"must return {what}, not {_kind_of(result)}", field=field, allowed=wanted)
     if array.shape != shape:
         raise ParameterError(f"returns an array of shape {array.shape}", field=field, allowed=wanted)
     return array
@@ -104,14 +104,14 @@ def check_shape(
     shape: tuple[int, ...],
     field: str,
 ) -> None:
-    """Evaluate a function once, and see that it gives an array of the right shape."""
+    """Evaluate a function once and check the shape of its result."""
     try:
         with np.errstate(all="ignore"):
             result = function(float(times[0]), x.copy(), *args)
     except (ArithmeticError, ValueError) as error:
         if "shape" not in str(error) and "sequence" not in str(error):
-            return  # a singularity just here: no fault of the function
-        raise ParameterError(f"returns no array of numbers ({error})", field=field) from error
+            return  # a singularity at this state is not an error
+        raise ParameterError(f"must return an array of numbers ({error})", field=field) from error
     except Exception as error:
         raise ParameterError(
             f"cannot be evaluated at a state of shape {x.shape} ({type(error).__name__}: {error})", field=field
@@ -120,7 +120,7 @@ def check_shape(
 
 
 Slopes = Callable[[Array, Array], Array]
-"""``slopes(times, states) -> dx/dt``, shapes (samples,), (n, samples) and (n, samples); NaN where it is not defined."""
+"""``slopes(times, states) -> dx/dt``, shapes (samples,), (n, samples) and (n, samples); NaN where undefined."""
 
 
 @functools.lru_cache
@@ -133,8 +133,8 @@ def _waves(n: int) -> Array:
 def check_symmetry(
     field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
 ) -> None:
-    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes: a wrong symmetry gives wrong
-    multipliers in silence."""
+    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes: a wrong symmetry would give wrong
+    multipliers without an error."""
     x = np.tile(base[:, None] + _waves(base.size), times.size)
     t = np.repeat(times, x.shape[1] // times.size)
     both = slopes(np.concatenate([t, (t + shift) % period]), np.concatenate([x, matrix @ x], axis=1))
@@ -143,20 +143,20 @@ def check_symmetry(
     if np.isfinite(off).all() and (off <= _SAME * np.abs(there)).all():
         return
     terms = np.abs(matrix) @ np.abs(here) + np.abs(there)
-    # The largest among samples of the same size, of which there are some at every time.
+    # The largest among samples of the same size; every time has some.
     alike = (base.size, times.size, len(SIZES), -1)
     largest = np.where(np.isfinite(terms), terms, 0.0).reshape(alike).max(axis=(1, 3), keepdims=True)
     wrong = (off.reshape(alike) > _SAME * largest).reshape(off.shape).any(axis=0)
     if wrong.any():
         raise ParameterError(
-            f"is no symmetry of the right-hand side, as at t = {t[wrong][0]:g}",
+            f"must be a symmetry of the right-hand side, but fails at t = {t[wrong][0]:g}",
             field=field,
             allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
         )
 
 
 def check_timeless(slopes: Slopes, base: Array, duration: float) -> None:
-    """See that a right-hand side without a period does not depend on time."""
+    """Check that a right-hand side without a period does not depend on time."""
     n = base.size
     sizes = np.array(SIZES)
     x = base[:, None] + sizes * np.cos(3.0 * np.arange(n)[:, None] + 1.0)
@@ -167,7 +167,7 @@ def check_timeless(slopes: Slopes, base: Array, duration: float) -> None:
 
 
 def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slopes:
-    """A right-hand side at many times and states, asked for one after the other."""
+    """A right-hand side at many times and states, evaluated one after the other."""
 
     def slopes(times: Array, states: Array) -> Array:
         columns = []

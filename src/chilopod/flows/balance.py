@@ -1,4 +1,4 @@
-"""Sizes of states by which a matrix is balanced."""
+"""Sizes of states that balance a matrix."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 
 
 def numerical_balance(matrix: Array) -> Array:
-    """Sizes d of the states for which the rows and columns of ``matrix[i, j] * d[j] / d[i]`` are about alike, by
-    LAPACK: for bounds on round-off."""
+    """Sizes d of the states for which rows and columns of ``matrix[i, j] * d[j] / d[i]`` have similar norms, by
+    LAPACK, for bounds on round-off."""
     d: Array = dgebal(matrix, scale=1, permute=0)[3]
     return d

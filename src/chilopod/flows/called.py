@@ -26,7 +26,7 @@ Gradient = Callable[[float, Array], Array]
 
 _COMPLEX_STEP = 1e-40
 _DIFFERENCE = 6e-6
-_OTHER = 5.0  # two independent errors differ by less than a fifth of them rarely enough
+_OTHER = 5.0  # factor on the difference of two independent errors for a bound on either
 _ANALYTIC_FLOOR = 1e-14
 _DIFFERENCE_FLOOR = 1e-8
 _SMALL = 1e-4
@@ -35,7 +35,7 @@ _MOST_CALLS = 2_000_000
 
 
 class NotAnalytic(UserWarning):
-    """A right-hand side can neither be traced nor differentiated by a complex step."""
+    """Warning: a right-hand side can neither be traced nor differentiated by a complex step."""
 
 
 @dataclass(frozen=True)
@@ -45,16 +45,16 @@ class CalledFlow:
     States are measured in units of their largest size on the way, so that tolerances mean the same in all units.
     """
 
-    # as for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative is taken by a complex step if the
-    # function takes it near the state, else by central differences.
+    # as for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative comes from a complex step if the
+    # function accepts it near the state, else from central differences.
     rhs: Callable[..., ArrayLike]
     args: tuple[Any, ...]
     jacobian: Callable[..., ArrayLike] | None
     edges: Array  # times from 0 to the period at which the integration stops and starts anew
-    # borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited there
+    # borders of the parts of the period with fast changes of the function, shape (parts, 2): steps are limited there
     fast: Array
     times: Array  # one inside every interval between edges
-    reason: str  # reason for which the function cannot be traced
+    reason: str  # obstacle to tracing the function
     tolerance: float  # local error per step
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
@@ -69,9 +69,9 @@ class CalledFlow:
         sizes = self._sizes(x, parts)
         gradient, floor = self._gradient(x, sizes)
         state, derivative = self._over(x, parts, self.tolerance, sizes, gradient)
-        # The same with a tolerance a hundred times as large errs at least ten times as much, so the difference bounds
-        # the error. Except where the step control is deceived: its estimate passes through zero now and then, and lets
-        # a step through that is too long. Other steps, from other starts, are not deceived alike.
+        # A flow with a hundred times the tolerance errs at least ten times as much, so the difference bounds the
+        # error. The exception is a step whose error estimate passes through zero and accepts a step that is too
+        # long; other steps, from other starts, do not repeat that failure.
         _, coarse = self._over(x, parts, 100.0 * self.tolerance, sizes, gradient)
         _, shifted = self._over(x, _cut(parts), self.tolerance, sizes, gradient)
         unit = sizes[None, :] / sizes[:, None]
@@ -90,7 +90,7 @@ class CalledFlow:
         return pieces(np.unique(np.concatenate([self.edges, self.fast.ravel()])), float(self.edges[-1]), t0, t1)
 
     def _sizes(self, x: Array, parts: Parts) -> Array:
-        """The largest modulus of every state on the way, at a glance."""
+        """Rough largest modulus of every state on the way."""
         largest = np.abs(x)
         unit = np.ones(x.size) * (float(largest.max()) or 1.0)
         for a, b in parts:
@@ -100,9 +100,9 @@ class CalledFlow:
         return np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
 
     def _slopes(self, a: float, b: float, sizes: Array, gradient: Gradient | None = None) -> Gradient:
-        """Slope of a state in units of its size, and of the derivative if there is a gradient, within a part."""
+        """Slope within a part of the state in units of its size and, with a gradient, of the derivative."""
         n = sizes.size
-        inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)  # at a switch it is not known which side counts
+        inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)  # the value at a switch may belong to either side
 
         def slope(t: float, y: Array) -> Array:
             t, state = min(max(t, inner_a), inner_b), y[:n] * sizes
@@ -117,7 +117,7 @@ class CalledFlow:
     def _over(
         self, x: Array, parts: Parts, tolerance: float, sizes: Array, gradient: Gradient | None = None
     ) -> tuple[Array, Array]:
-        """State and, if there is a gradient, derivative at the end of some parts."""
+        """State and, with a gradient, derivative at the end of some parts."""
         n = x.size
         y = x / sizes if gradient is None else np.concatenate([x / sizes, np.eye(n).ravel()])
         for a, b in parts:
@@ -125,8 +125,8 @@ class CalledFlow:
         return y[:n] * sizes, y[n:].reshape(-1, n) * (1.0 if gradient is None else sizes[:, None] / sizes[None, :])
 
     def _missed(self, x: Array, parts: Parts, derivative: Array, sizes: Array) -> float:
-        """Error of the derivative by differences of the flow: where f jumps with the state, it stays however small
-        the difference is taken."""
+        """Error of the derivative by differences of the flow: where f jumps with the state, the error remains for
+        every small difference."""
         direction = np.cos(5.0 * np.arange(x.size) + 0.7)
         off = []
         for h in (_SMALL, _SMALL / 3.0):
@@ -136,7 +136,7 @@ class CalledFlow:
             if off[-1] <= _DISAGREES * float(np.abs(derivative).max()):
                 return 0.0
         if off[1] < 0.5 * off[0]:
-            return 0.0  # falls with the difference: curvature
+            return 0.0  # an error that falls with the difference is curvature
         warnings.warn(
             "the derivative of the flow disagrees with its differences: the right-hand side jumps somewhere in the "
             "state. Write it without branches (numpy.where, sign, maximum), and the jumps are crossed exactly",
@@ -149,7 +149,7 @@ class CalledFlow:
         return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
 
     def _gradient(self, x: Array, sizes: Array) -> tuple[Gradient, float]:
-        """The derivative of f near a state, by what f allows, and its error relative to its largest entry."""
+        """The derivative of f near a state, by the best method for f, and its error relative to its largest entry."""
         if self.jacobian is not None:
             return self._given, _ANALYTIC_FLOOR
         if _is_analytic(self.rhs, self.args, x, sizes, self.times):
@@ -192,14 +192,14 @@ class CalledFlow:
             calls += 1
             if calls > _MOST_CALLS:
                 raise AnalysisError(
-                    f"takes too many steps, and came to t = {t:g} only",
+                    f"takes too many steps: the integration stopped at t = {t:g}",
                     field="rhs",
-                    allowed="a right-hand side that is less stiff, or one without branches, which is traced",
+                    allowed="a less stiff right-hand side, or one without branches, which can be traced",
                 )
             if ended[0] != 0.0:
                 raise deadline.over()
             slope = f(t, y)
-            if not np.isfinite(slope).all():  # scipy would shorten its step for ever
+            if not np.isfinite(slope).all():  # scipy would shorten its step without end
                 raise AnalysisError(
                     f"the motion diverges, or the right-hand side is not finite, at t = {t:g}", field="rhs"
                 )
@@ -226,14 +226,14 @@ class CalledFlow:
 
 
 def _cut(parts: Parts) -> Parts:
-    """The same parts, each in three, so that the steps fall elsewhere almost from the start."""
+    """The same parts, each cut in three, so that the steps differ almost from the start."""
     cuts = [[a + part * (b - a) for part in (0.0, 0.0477, 0.382)] + [b] for a, b in parts]
     return [part for times in cuts for part in zip(times, times[1:], strict=False)]
 
 
 def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, sizes: Array, times: Array) -> bool:
-    """True if a right-hand side takes complex states, and complex steps agree with differences on both sides of zero,
-    at all of some times."""
+    """True if a right-hand side accepts complex states, and complex steps agree with differences on both sides of
+    zero, at all given times."""
     step = sizes * np.cos(2.0 * np.arange(x.size) + 0.1)
     shift = sizes * np.cos(np.arange(x.size) + 0.3)
     for t, part in itertools.product(times.tolist(), (0.7, -0.7, 3.1, -3.1)):
@@ -243,12 +243,12 @@ def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array,
                 warnings.simplefilter("error")
                 tilted = np.asarray(rhs(t, probe + 1j * _COMPLEX_STEP * step, *args))
                 up, down = (np.asarray(rhs(t, probe + h * step, *args), dtype=np.float64) for h in (1e-6, -1e-6))
-        except Exception:  # whatever a user's function raises on complex input means the same: it does not take it
+        except Exception:  # any exception on complex input means that the function does not accept it
             return False
         if not np.iscomplexobj(tilted):
             return False
         difference = (up - down) / 2e-6
-        # Where terms cancel, the difference has their round-off: relative to f, in units of the state.
+        # Where terms cancel, the difference holds their round-off: relative to f, in units of the state.
         allowed = 1e-4 * (np.abs(difference) + np.abs(up))
         if not (np.abs(tilted.imag / _COMPLEX_STEP - difference) <= allowed).all():
             return False

@@ -1,4 +1,4 @@
-"""Ends of integrations, cuts of intervals and loops over many states, which the compiled flows share."""
+"""Ends of integrations, cuts of intervals and loops over many states, shared by the compiled flows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from chilopod.flows import deadline
 Array = NDArray[np.float64]
 
 RESOLUTION = 4096
-"""A pulse in time has to be seen on a grid of so many points over the period; then it is resolved exactly."""
+"""Number of grid points over the period; a pulse in time that the grid meets is resolved exactly."""
 
 DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
 """How an integration ends."""
@@ -23,13 +23,13 @@ DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8
 _REASONS = {
     NOT_FINITE: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
     BUDGET: (
-        "takes too many steps, and came to t = {t:g} only",
+        "takes too many steps: the integration stopped at t = {t:g}",
         "method='implicit' if it is stiff, or a shorter interval",
     ),
     STALLED: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
     SLIDES: (
         "slides along a switching surface from t = {t:g} on: the motion is pushed back from both sides",
-        "a right-hand side that says how it slides",
+        "a right-hand side that defines the sliding motion",
     ),
     CHATTERS: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
     GRAZES: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),
@@ -37,11 +37,11 @@ _REASONS = {
 
 
 class TooManySteps(AnalysisError):
-    """The budget of steps did not suffice, as of a right-hand side that is stiff."""
+    """The budget of steps is spent, as for a stiff right-hand side."""
 
 
 def failure(status: int, t: float) -> AnalysisError:
-    """The error of an integration that ended at a time before its end."""
+    """The error for an integration that stopped early at a time."""
     if status not in _REASONS:
         return deadline.over()
     reason, advice = _REASONS[status]
@@ -49,7 +49,7 @@ def failure(status: int, t: float) -> AnalysisError:
 
 
 def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[float, float]]:
-    """Cut [t0, t1] at times that come again every period; ``edges`` run from 0 to the period, or are none."""
+    """Cut [t0, t1] at times that recur every period; ``edges`` run from 0 to the period, or are empty."""
     if edges.size == 0:
         return [(t0, t1)] if t1 > t0 else []
     first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))

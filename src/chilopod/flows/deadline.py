@@ -1,4 +1,4 @@
-"""A limit of time that flows see while they are computed."""
+"""A time limit that is checked during flows."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ class SpentError(AnalysisError):
 
 
 class Deadline:
-    """A limit of time; within its context flows end when it is over, in the midst of an integration too.
+    """A time limit; within its context a flow ends at the limit, even inside an integration.
 
     Time that numba spends compiling is not counted.
 
     Parameters
     ----------
     seconds
-        Time from now on, s; infinite for no limit.
+        Time from now, s; infinite for no limit.
 
     Raises
     ------
     ParameterError
-        If it is no number, or negative.
+        If ``seconds`` is not a number or is negative.
     """
 
     def __init__(self, seconds: float = math.inf) -> None:
@@ -52,16 +52,16 @@ class Deadline:
 
     @property
     def late(self) -> bool:
-        """True if the time is over."""
+        """True once the limit is reached."""
         return _now() > self._ends
 
     def prolong(self, seconds: float) -> None:
-        """Allow at least some more time from now on, s."""
+        """Extend the limit to at least some time from now, s."""
         self._ends = max(self._ends, _now() + seconds)
         self._stop[0] = 0.0
 
     def __enter__(self) -> Self:
-        if self._ends < math.inf:  # else an outer one holds
+        if self._ends < math.inf:  # else an outer limit holds
             self._token = _STOP.set(self._stop)
             self._wait()
         return self
@@ -86,12 +86,12 @@ class Deadline:
 
 
 def stop() -> Array:
-    """Flag that compiled code looks at, shape (1,): not zero once the time is over.
+    """Flag for compiled code, shape (1,): not zero once the limit is reached.
 
     Raises
     ------
     SpentError
-        If it is over now.
+        If the limit is reached already.
     """
     found = _STOP.get()
     if found is None:
@@ -102,8 +102,8 @@ def stop() -> Array:
 
 
 def over() -> SpentError:
-    """The error of a flow that has no more time."""
-    return SpentError("the time is over", field="seconds")
+    """The error of a flow that reached its time limit."""
+    return SpentError("the time limit is reached", field="seconds")
 
 
 def _now() -> float:

@@ -1,4 +1,4 @@
-"""Events of hybrid systems: where a motion meets a surface, and jumps."""
+"""Events of hybrid systems: a motion reaches a surface and jumps."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Event:
-    """An event of a hybrid system, such as an impact or a foot that touches down.
+    """An event of a hybrid system, such as an impact or the touchdown of a foot.
 
     Parameters
     ----------
     guard
-        ``guard(t, x, *args)`` -> a number: the event is where it passes zero. Of several events at the same instant
-        only the first of the list happens, and the others only if their guards pass zero again.
+        Function ``guard(t, x, *args)`` -> a number that passes zero at the event. Of several events at one instant
+        only the first of the list happens, the others only if their guards pass zero again.
     reset
-        ``reset(t, x, *args)`` -> the state after it, shape (n,); None where the state goes on as it is.
+        Function ``reset(t, x, *args)`` -> state after the event, shape (n,); None for an unchanged state.
     direction
-        +1 if the guard has to rise through zero, -1 if it has to fall, 0 for both.
+        Sign of the guard's passage through zero: +1 rising, -1 falling, 0 either.
     """
 
     guard: Callable[..., Any]
@@ -43,23 +43,23 @@ class Event:
 
 
 def checked_events(events: object) -> tuple[Event, ...]:
-    """Events as what they should be."""
+    """Check that events are a list of events."""
     if isinstance(events, Event):
         return (events,)
     if not isinstance(events, Sequence) or not all(isinstance(event, Event) for event in events):
-        raise ParameterError("must be events", field="events", value=events, allowed="[Event(guard, reset), ...]")
+        raise ParameterError("must be a list", field="events", value=events, allowed="[Event(guard, reset), ...]")
     return tuple(events)
 
 
 def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array, orbit: Array | None, n: int) -> None:
-    """See that guards give numbers that may pass zero, and resets states, at the orbit and around it.
+    """Check that guards return numbers that may pass zero, and resets states, at the orbit and around it.
 
     Parameters
     ----------
     events, args
         Events and arguments of the system, with n states.
     times
-        Within the period, shape (times,).
+        Times within the period, shape (times,).
     orbit
         A state, shape (n,), or None.
     """
@@ -76,17 +76,17 @@ def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array,
         if event.reset is not None:
             _value(event.reset, *places[0], args, (n,), f"events[{i}].reset")
         if asked[0] is None:
-            continue  # which tracing will tell of
+            continue  # tracing reports it
         if orbit is not None and not np.isfinite(values[0]):
             raise ParameterError("is not finite on the orbit", field=name, value=float(values[0]))
         if not np.isfinite(values).any():
-            raise ParameterError("is finite at none of the states it was tried at", field=name)
+            raise ParameterError("must be finite, but was not at any state that was tried", field=name)
         if not np.nan_to_num(values).any():
             raise ParameterError("is zero at all states", field=name, allowed="a function that passes zero")
         for j, other in known.items():
             if np.array_equal(values, other, equal_nan=True) and event.direction * events[j].direction != -1:
                 raise ParameterError(
-                    f"is that of events[{j}]: of events at the same instant only the first happens",
+                    f"must differ from that of events[{j}]: of events at one instant only the first happens",
                     field=name,
                     allowed="one event with a reset that does both",
                 )
@@ -104,7 +104,7 @@ def _value(
         return None
     if not shape:
         if isinstance(result, bool | np.bool_):
-            raise ParameterError("is true or false", field=name, allowed="a number that passes zero at the event")
+            raise ParameterError("must return a number, not true or false", field=name, allowed="zero at the event")
         if isinstance(result, list | tuple | np.ndarray) and np.size(result) == 1:
             result = np.ravel(result)[0]
     return numbers(result, shape, name)

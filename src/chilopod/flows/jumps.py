@@ -1,4 +1,4 @@
-"""Finding jumps of a right-hand side at times that were not declared as switches."""
+"""Search for jumps of a right-hand side at times that are not declared as switches."""
 
 from __future__ import annotations
 
@@ -18,19 +18,18 @@ _GRID = 4096
 _FAST = 0.02
 _MARGIN = 8
 _STEPS_IN_FAST_PART = 16
-_SETTLED = 3  # zooms after which only a jump is left of a change that had smooth parts too
+_SETTLED = 3  # zooms that leave only the jump of a change with smooth parts
 
 
 class UndeclaredSwitch(UserWarning):
-    """A right-hand side that cannot be traced jumps where that was not declared."""
+    """Warning: a right-hand side that cannot be traced has an undeclared jump."""
 
 
 def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
-    """Parts of the period in which a right-hand side changes fast: their borders, shape (parts, 2).
+    """Borders of the parts of the period in which a right-hand side changes fast, shape (parts, 2).
 
     It is sampled at a fixed state on a grid of 4096 times. Where it changes between two of them by more than a fiftieth
-    of its whole range, and not because of a switch at one of the ``edges``, an integrator might step over what is
-    there.
+    of its whole range, without a switch at one of the ``edges``, an integrator might step over the change.
     """
     period = float(edges[-1])
     times = (np.arange(_GRID) + 0.5) * (period / _GRID)
@@ -39,7 +38,7 @@ def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
     samples = np.asarray(np.where(np.isfinite(samples), samples, 0.0), dtype=np.float64)
     span = np.ptp(samples, axis=1, keepdims=True)
     change = np.abs(np.diff(samples, axis=1)) / np.where(span > 0.0, span, 1.0)
-    # Round-off of a constant is no change.
+    # Round-off of a constant is not a change.
     change[span[:, 0] <= 1e-12 * np.abs(samples).max(axis=1)] = 0.0
     change[:, np.clip(np.searchsorted(times, edges) - 1, 0, _GRID - 2)] = 0.0
     near = np.convolve(change.max(axis=0) > _FAST, np.ones(2 * _MARGIN + 1), mode="same") > 0.0
@@ -48,7 +47,7 @@ def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
 
 
 def longest_step(fast: Array, period: float, a: float, b: float) -> float:
-    """Longest step from a to b, which no border of the fast parts divides."""
+    """Longest step from a to b; no border of the fast parts lies between them."""
     middle = (0.5 * (a + b)) % period
     inside = (fast[:, 0] < middle) & (middle < fast[:, 1])
     return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
@@ -58,8 +57,8 @@ def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> 
     """Look for jumps of the right-hand side inside the intervals where it should be smooth.
 
     It is sampled at fixed states away from zero (a jump in a coefficient hides at x = 0). The fourth differences of a
-    smooth function fall as the fourth power of the spacing, those of a jump stay: wherever they stand out they are
-    followed down to an interval of 1e-12 of the period.
+    smooth function fall as the fourth power of the spacing, those of a jump do not: large ones are bisected down to
+    an interval of 1e-12 of the period.
     """
     base = np.zeros(n) if orbit is None else orbit
     states = np.array([base + np.cos(3.0 * np.arange(n) + 1.0 + s) for s in range(2)]).T
@@ -95,7 +94,7 @@ def _fourth_differences(samples: Array) -> Array:
 
 
 def _zoom(values: Callable[[float], Array], low: float, high: float, width: float, smallest: float) -> float | None:
-    """Where in an interval a function jumps, to within ``width``; None if it is smooth there after all."""
+    """Place of a function's jump in an interval, to within ``width``; None if the function is smooth there."""
     settled = np.inf
     for zoom in itertools.count():
         times = np.linspace(low, high, 17)

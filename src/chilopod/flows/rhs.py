@@ -1,4 +1,4 @@
-"""Flows of a right-hand side, by the method that suits it."""
+"""Flows of a right-hand side by a suitable method."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-14
 _SAME = 1e-6
 _FLOOR = 0.01
-"""Truncation of a Taylor step relative to the tolerance: it costs next to nothing."""
+"""Truncation of a Taylor step relative to the tolerance: a small one costs almost nothing."""
 _ESTIMATED = 100.0
-"""Estimate of the error of an implicit step relative to the tolerance: it is far larger than the error."""
+"""Error estimate of an implicit step relative to the tolerance: the estimate is far larger than the error."""
 _PATIENCE = 256
-"""Taylor steps after which a motion that would need more than the budget is left to the implicit method."""
+"""Taylor steps after which the implicit method takes over a motion that would exceed the budget."""
 
 Method = Literal["automatic", "taylor", "implicit"]
 
@@ -47,7 +47,7 @@ Method = Literal["automatic", "taylor", "implicit"]
 class Flows(NamedTuple):
     """Flows of a right-hand side; arguments and results are those of :mod:`chilopod.stability.problem.capabilities`.
 
-    Every answer follows from the arguments of its call alone.
+    Every result depends on the arguments of its call alone.
     """
 
     slopes: Slopes  # `slopes(times, states)` -> dx/dt at many times and states
@@ -55,28 +55,28 @@ class Flows(NamedTuple):
     flow: Callable[[Array, float, float], tuple[Array, Array]]
     flow_with_error: Callable[[Array, float, float], tuple[Array, Array, float | Array]]
     flow_states: Callable[[Array, float, float], Array]
-    # flow of some directions; None if there is only the whole derivative
+    # flow of some directions; None if only the whole derivative is available
     flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = None
-    # flow of an orthonormal frame, and whether the flow from a state is an implicit one; None if it never is
+    # flow of an orthonormal frame, and a test for an implicit flow from a state; None if no flow is implicit
     flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = None
     is_stiff: Callable[[Array, float, float], bool] | None = None
     # Taylor coefficients of f along curves; None where f cannot be traced, or depends on time
     velocity_series: Callable[[Array], Array] | None = None
-    concurrent: bool = False  # whether flows may run in several threads at once
+    concurrent: bool = False  # True if flows may run in several threads
 
 
 @dataclass
 class RightHandSide:
     """A right-hand side f(t, x, *args), checked, with the arguments of :func:`chilopod.stability.from_rhs`.
 
-    The ``duration`` is the period of the explicit dependence on time; where there is none, about how long a motion
-    takes. Of the results, ``start`` is the state on the orbit, None if it is not known, and ``base`` a state to try f
-    at; ``edges`` are the times from 0 to the period at which f switches, and ``times`` one inside each interval.
+    The ``duration`` is the period of the explicit dependence on time; without one, the approximate duration of a
+    motion. Of the results, ``start`` is the state on the orbit, None if unknown, and ``base`` a state to test f at;
+    ``edges`` are the times from 0 to the period at which f switches, and ``times`` one inside each interval.
 
     Raises
     ------
     ParameterError
-        If an argument is not what it should be.
+        If an argument is invalid.
     """
 
     rhs: Callable[..., ArrayLike]
@@ -110,7 +110,7 @@ class RightHandSide:
         check_events(self.events, self.args, self.times, self.start, self.dimension)
 
     def flows(self) -> Flows:
-        """Flows of the right-hand side: traced if it can be, else from calls."""
+        """Flows of the right-hand side: traced if possible, else from calls."""
         pairs = [(event.guard, event.reset) for event in self.events]
         try:
             traced = trace(
@@ -128,7 +128,7 @@ class RightHandSide:
         return flows
 
     def _refuse_calls(self, reason: Untraceable) -> None:
-        """Refuse a function of the wrong shape, and what needs one that can be traced."""
+        """Refuse a function of the wrong shape, and options that need a traced function."""
         n = self.dimension
         check_shape(self.rhs, self.args, self.times, self.base, (n,), "rhs")
         if self.jacobian is not None:
@@ -155,7 +155,7 @@ class RightHandSide:
         def slopes(t: Array, x: Array) -> Array:
             return evaluate(tape, tape.slopes, t, x, params)
 
-        made: list[ImplicitFlow] = []  # at first use, for it looks at the whole period
+        made: list[ImplicitFlow] = []  # made at first use, as it samples the whole period
 
         def implicit() -> ImplicitFlow:
             if not made:
@@ -208,7 +208,7 @@ class RightHandSide:
         return found
 
     def _check_jacobian(self, jacobian: Callable[..., ArrayLike], traced: Trace) -> None:
-        """A traced function needs no jacobian, but who hands over one that is wrong wants to know."""
+        """Check the user's jacobian: a traced function does not need it, but a wrong one is an error."""
         base, n = self.base, self.dimension
         check_shape(jacobian, self.args, self.times, base, (n, n), "jacobian")
         for t in self.times.tolist():
@@ -227,11 +227,11 @@ class RightHandSide:
 
 
 def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
-    """Flows by Taylor series, and by the implicit method from every state from which the series take too many steps.
+    """Flows by Taylor series, and by the implicit method from every state where the series take too many steps.
 
-    That is found out anew in every call, so that no answer hangs on what was asked before.
+    Every call decides anew, so that no result depends on earlier calls.
     """
-    latest: tuple[bytes, float, float] | None = None  # by Taylor series: saves computing it once more
+    latest: tuple[bytes, float, float] | None = None  # latest flow by Taylor series, to avoid a second computation
 
     def either(name: Literal["flow", "flow_with_error", "flow_states"]) -> Callable[..., Any]:
         taylor = getattr(flows, name)

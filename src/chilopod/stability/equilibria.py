@@ -1,9 +1,9 @@
-"""Equilibria of systems that do not depend on time: where they are, whether they are stable, and the cycle that leaves
-one at a Hopf point.
+"""Equilibria of systems that do not depend on time: their state, stability, and the cycle that leaves one at a Hopf
+point.
 
-Derivatives of the right-hand side f come exactly from the Taylor coefficients of f along curves through a state, where
-a system has them (those of :func:`chilopod.stability.from_rhs` do); of other systems by Chebyshev series of samples
-along the same curves, with errors.
+Derivatives of the right-hand side f are exact if a system provides the Taylor coefficients of f along curves (as those
+of :func:`chilopod.stability.from_rhs` do); else they come from Chebyshev series of samples along the same curves, with
+errors.
 """
 
 from __future__ import annotations
@@ -41,32 +41,32 @@ ROUNDING = 16.0 * _EPSILON
 """Rounding error of a right-hand side, relative to its terms: a few roundings in each."""
 
 _ROUNDS = 60
-_HALVINGS = 12  # of a step of Newton's method
-_SETTLED = 1e-9  # of the sizes of the states: a step that short may stop falling
-_NOTHING = 1e-13  # of the sizes of the states on the way: a state that small may be zero
-_SINGULAR = 1e-13  # singular value that counts as zero, the largest being one, in units that balance the matrix
-_ANGLES = 8  # on a circle: harmonics up to the third stay apart
-_SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # of the sizes of the states: where f is sampled for differences
-_FIRST = 1e-4, 1e-6  # of the frequency, the cubic term of the first cycle: amplitudes of a hundredth and a thousandth
-_MISSED = 0.3  # of its amplitude, by which the first cycle may be elsewhere than foreseen
+_HALVINGS = 12  # halvings of a step of Newton's method
+_SETTLED = 1e-9  # step, relative to the sizes of the states, that may stop falling
+_NOTHING = 1e-13  # state, relative to its sizes during the iteration, that may be zero
+_SINGULAR = 1e-13  # singular value, relative to the largest, that counts as zero, in units that balance the matrix
+_ANGLES = 8  # angles on a circle, which separate harmonics up to the third
+_SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # spans of samples of f for differences, relative to the sizes of the states
+_FIRST = 1e-4, 1e-6  # cubic terms of the first cycle, relative to the frequency: amplitudes of 1/100 and 1/1000
+_MISSED = 0.3  # largest error of the predicted first cycle, relative to its amplitude
 
 
 @dataclass(frozen=True)
 class Equilibrium(ReadOnlyArrays):
-    """A state in which a system that does not depend on time rests.
+    """An equilibrium of a system that does not depend on time.
 
     Attributes
     ----------
     state
-        The state, shape (n,).
+    State, shape (n,).
     error
-        Bound on the error of the state, shape (n,); infinite where the derivative is singular.
+    Bound on the error of the state, shape (n,); infinite where the derivative is singular.
     jacobian
         Derivative of the right-hand side there, shape (n, n).
     eigenvalues
         Eigenvalues of the derivative, by falling real part, shape (n,), in 1/s.
     error_bounds
-        On the error of each eigenvalue, shape (n,).
+        Bound on the error of each eigenvalue, shape (n,).
     """
 
     state: Array
@@ -77,8 +77,8 @@ class Equilibrium(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """True if all eigenvalues lie left of the imaginary axis: True or False by more than their errors, None where
-        these leave it undecided."""
+        """True if all eigenvalues lie left of the imaginary axis by more than their errors, False if one lies right of
+        it by more, else None."""
         if (self.eigenvalues.real < -self.error_bounds).all():
             return True
         return False if (self.eigenvalues.real > self.error_bounds).any() else None
@@ -102,7 +102,7 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     """An equilibrium, by damped Newton's method from a guess.
 
     A step is shortened until the next one, by the same derivative, would be shorter (Deuflhard, *Newton Methods for
-    Nonlinear Problems*, section 3.3): no units enter.
+    Nonlinear Problems*, section 3.3), a test without units.
 
     Parameters
     ----------
@@ -114,9 +114,9 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     Raises
     ------
     ParameterError
-        If the system depends on time, or the guess is no state of it.
+        If the system depends on time, or the guess does not have its shape.
     AnalysisError
-        If there is no equilibrium near the guess.
+        If no equilibrium is found near the guess.
     """
     checked = autonomous(system)
     x = finite_array(guess, (checked.dimension,), "guess")
@@ -140,11 +140,9 @@ def equilibrium_at(family: Family, value: float, guess: ArrayLike) -> tuple[Auto
 
 
 def autonomous(system: SystemLike) -> Autonomous:
-    """A system that is seen not to depend on time."""
+    """Check that a system does not depend on time."""
     if not is_autonomous(system):
-        raise ParameterError(
-            "depends on time: it has no equilibria", field="system", allowed="period=None, and no t in the function"
-        )
+        raise ParameterError("must not depend on time", field="system", allowed="period=None, and no t in the function")
     return system
 
 
@@ -155,7 +153,7 @@ def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
         small = np.where(np.abs(x) <= _NOTHING * largest, 0.0, x)
         for each in (small, x) if (small != x).any() else (x,):
             velocity, matrix, _ = linear_part(system, each)
-            # Solves equations whose terms are off by their rounding (Oettli & Prager, Numer. Math. 6, 1964).
+            # The state solves equations with rounded terms (Oettli & Prager, Numer. Math. 6, 1964).
             if (np.abs(velocity) <= ROUNDING * (np.abs(matrix) @ np.abs(each))).all():
                 return each, velocity, matrix
         units = numerical_balance(matrix)
@@ -173,7 +171,7 @@ def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
 
 
 def _damped(system: Autonomous, x: Array, step: Array, matrix: Array, units: Array, size: Array) -> float | None:
-    """The largest power of one half of a step that brings the equilibrium nearer; None if there is none."""
+    """The largest power of one half of a step that approaches the equilibrium; None if none does."""
     length = float(np.linalg.norm(step / size))
     share = 1.0
     for _ in range(_HALVINGS):
@@ -199,7 +197,7 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 
 def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
-    """dx/dt in a state, shape (n,), its derivative, shape (n, n), and bounds on what differences make that err by."""
+    """dx/dt at a state, shape (n,), its derivative, shape (n, n), and bounds on the latter's errors by differences."""
     size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
     size = size if given_scale(system) is None else np.asarray(given_scale(system))
     curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
@@ -212,8 +210,8 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
 
 
 def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> Array:
-    """How far the derivative may be off, shape (n, n), in a state that is off by its error and by rounding. Where terms
-    of f cancel, an entry may be nothing but the rounding of entries as large as the others, in units that balance."""
+    """Error of the derivative, shape (n, n), due to the error and rounding of the state. Where terms of f cancel, an
+    entry may be round-off of entries as large as the others, in units that balance."""
     states = disturbed(x, error + 4.0 * _EPSILON * np.abs(x), draws=4)
     others = [linear_part(system, other)[1:] for other in states]
     moved = np.max([np.abs(other - matrix) + wrong for other, wrong in others], axis=0)
@@ -224,7 +222,7 @@ def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> A
 
 def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
     """Taylor coefficients in s of f(x(s)) along curves x(s) = c0 + c1 s + ..., shape (curves, orders, n), and bounds on
-    their errors; s = 1 is where a state has moved by about its size."""
+    their errors; at s = 1 a state has moved by about its size."""
     if expands_velocity(system):
         found = system.velocity_series(curves)
         return found, np.zeros_like(found)
@@ -247,8 +245,8 @@ def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
 
 
 def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> HopfForm:
-    """The normal form at a Hopf point, of a pair near a frequency, with its error by what that of the equilibrium,
-    shape (n,), and that of the derivative make of it."""
+    """The normal form at a Hopf point, of a pair near a frequency, with its error due to those of the equilibrium,
+    shape (n,), and of the derivative."""
     matrix = linear_part(system, x)[1]
     off = matrix_error(system, x, matrix, error)
     random = np.random.default_rng(1)
@@ -262,7 +260,7 @@ def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> H
 
 
 def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, draws: int = 2) -> HopfForm:
-    """The normal form with a given derivative; of errors, those of rounding and, by some draws, of differences."""
+    """The normal form with a given derivative, with errors of rounding and, by random draws, of differences."""
     units = numerical_balance(matrix)
     values, lefts, rights = scipy.linalg.eig(matrix * units / units[:, None], left=True)
     index = int(np.abs(values - 1j * frequency).argmin())
@@ -271,7 +269,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     mode = mode / np.linalg.norm(mode)
     left = left / np.conj(left.conj() @ mode)
     turns = np.exp(2j * np.pi * np.arange(_ANGLES) / _ANGLES)[:, None]
-    # Along the mode at the size of the states, for where differences have to be taken.
+    # Along the mode at the size of the states, where differences are needed.
     size = np.where(x == 0.0, units * float((np.abs(x) / units).max() or 1.0), np.abs(x))
     reach = 0.1 * float((size / np.maximum(np.abs(mode), _EPSILON * np.abs(mode).max())).min())
     along = 2.0 * (reach * mode * turns).real
@@ -280,7 +278,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     ratios, one = units / units[:, None], np.eye(x.size)
 
     def bent(terms: Array) -> tuple[ComplexArray, Array, complex, Array]:
-        """The manifold for the terms of second order on the circle, the cubic term on it, and errors of that."""
+        """The manifold for the terms of second order on the circle, the cubic term on it, and its errors."""
         harmonics: ComplexArray = np.fft.fft(terms, axis=0) / _ANGLES / units
         second: ComplexArray = units * np.linalg.solve((2j * frequency * one - matrix) * ratios, harmonics[2])
         mean: Array = units * np.linalg.solve(-matrix * ratios, harmonics[0].real)
@@ -300,12 +298,12 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
 
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
-    """A small cycle beside a Hopf point, with the parameter that it is at, and the displacement of its state from the
-    equilibrium over the root of that of the parameter, shape (n,)."""
+    """A small cycle beside a Hopf point, with its parameter, and the displacement of its state from the equilibrium
+    over the root of that of the parameter, shape (n,)."""
     rate = point.rate
     if rate is None or point.criticality in (None, Criticality.UNDECIDED):
         raise ParameterError(
-            "is a Hopf point of which the coefficients do not tell on which side its cycles are",
+            "is a Hopf point whose coefficients leave the side of its cycles undecided",
             field="point",
             value=point.value,
         )
@@ -323,7 +321,7 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
 def _cycle(
     family: Family, point: BifurcationPoint, form: HopfForm, units: Array, share: float
 ) -> tuple[float, Orbit, Array]:
-    """The cycle whose cubic term is such a share of the frequency, or a smaller one where the manifold is bent."""
+    """The cycle whose cubic term is a given fraction of the frequency, or a smaller one where the manifold is bent."""
     assert point.rate is not None
     mode, *bends = (float(np.linalg.norm(each / units)) for each in (form.mode, form.second, form.mean))
     square = point.frequency / abs(form.cubic)
@@ -340,5 +338,5 @@ def _cycle(
         found = find_orbit(system, rest + moved, with_error=False, section=section, settle=False)
     missed = float(np.linalg.norm((found.state - rest - moved) / units))
     if not missed <= _MISSED * float(np.linalg.norm(moved / units)):
-        raise AnalysisError("the orbit that is found is another one", field="orbit")
+        raise AnalysisError("the corrector found another orbit", field="orbit")
     return value, found, (found.state - rest) / np.sqrt(abs(shift))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_RESOLVED = 1e-6  # modulus of a multiplier below which the error bound of an eigenvalue means nothing
+_RESOLVED = 1e-6  # modulus of a multiplier below which the error bound of an eigenvalue is invalid
 _SAME_ANGLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
 
@@ -44,23 +44,22 @@ class Multipliers(Result, ReadOnlyArrays):
     Attributes
     ----------
     values
-        Multipliers of the full period, by falling modulus, shape (n,); n-1 of them where the system does not depend on
-        time: the one along the motion, which is 1, is left out. Absolute accuracy is ``error_bound``: those smaller
-        than it are only known to be small (:func:`exponents` resolves them). Fewer where only the leading ones were
-        asked for.
+        Multipliers of the full period, by falling modulus, shape (n,); n-1 of them if the system does not depend on
+        time, without the one along the motion, which is 1. The absolute accuracy is ``error_bound``: smaller values
+        are only known to be small (:func:`exponents` resolves them). Fewer if only leading ones were requested.
     half_period
-        Multipliers nu of the return map of a system with a symmetry in time, of order k: ``values = nu^k`` in the same
-        order (k is 2 unless told, hence the name); None without one.
+        Multipliers nu of the return map of a system with a symmetry in time of order k (by default 2, hence the name),
+        with ``values = nu^k`` in the same order; None without one.
     error_bound
         Bound on the absolute error of every multiplier of modulus above 1e-6.
     error_bounds
-        Bounds on the absolute errors of all, shape as of ``values``; of no meaning for those below 1e-6.
+        Bounds on the absolute errors of all, in the shape of ``values``; invalid for those below 1e-6.
     orbit
         State on the orbit at time 0.
     period
         Period of the orbit.
     remarks
-        Remarks, a sentence each: that these are only the leading ones.
+        Remarks, a sentence each, such as a note on leading multipliers.
     """
 
     values: ComplexArray
@@ -73,8 +72,8 @@ class Multipliers(Result, ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """True if all multipliers lie inside the unit circle: True or False by more than the error bounds, None where
-        these leave it undecided."""
+        """True if all multipliers lie inside the unit circle by more than the error bounds, False if one lies outside
+        by more, else None."""
         return stable_within(self.values, self.error_bound, self.error_bounds)
 
     def _lines(self) -> list[str]:
@@ -97,7 +96,7 @@ class Multipliers(Result, ReadOnlyArrays):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """The multipliers of the full period, and of the return map as ``half_period``, as a dataset over
+        """Dataset of the multipliers of the full period, and of the return map as ``half_period``, over
         ``multiplier``."""
         half = self.values if self.half_period is None else self.half_period
         values = {"multipliers": self.values, "modulus": np.abs(self.values), "error_bounds": self.error_bounds}
@@ -112,17 +111,17 @@ class Exponents(Shown, ReadOnlyArrays):
     Attributes
     ----------
     values
-        Exponents (1/s), by falling real part, shape (n,) or, as of the multipliers, (n-1,): the principal logarithm of
-        the full-period multiplier over T, imaginary part in (-pi/T, pi/T]. Where the system has a symmetry in time of
-        order k they come from ln(nu^k), which is the same number.
+        Exponents (1/s), by falling real part, shape (n,) or, like the multipliers, (n-1,): principal logarithm of the
+        full-period multiplier over T, imaginary part in (-pi/T, pi/T]. With a symmetry in time of order k they come
+        from ln(nu^k), the same number.
     modes
-        Unit eigenvectors of the full-period map at time 0 as columns, the largest entry real and positive; of a system
-        that does not depend on time, those of its Poincare map on the section across the motion.
-    multipliers
-        The multipliers of the same orbit.
+        Unit eigenvectors of the full-period map at time 0 as columns, the largest entry real and positive; for a system
+        that does not depend on time, of its Poincare map on the section across the motion.
+        multipliers
+        Multipliers of the same orbit.
     error_bound
-        Bound on the absolute error (1/s) of each of ``values``, of the same shape: how far they move when the flows
-        between parts of the period change by their errors.
+        Bound on the absolute error (1/s) of each of ``values``, in the same shape: their change when the flows over
+        parts of the period change by their errors.
     """
 
     values: ComplexArray
@@ -164,11 +163,11 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     system
         The periodic system.
     orbit
-        A first guess of a state on the orbit at time 0; not needed where the system knows its orbit.
+        First guess of a state on the orbit at time 0; not needed if the system knows its orbit.
     leading
-        Number of the largest multipliers that are wanted, with their multiplicity, or one more where that would part a
-        pair; all by default. Of a system of 100 states or more that has ``flow_tangents`` (any right-hand side that can
-        be traced) they are computed in a block Krylov subspace, without the derivative of the flow as a matrix.
+        Number of largest multipliers, counted with multiplicity, or one more to complete a pair; all by default. For
+        100 states or more and a system with ``flow_tangents`` (any right-hand side that can be traced) they are
+        computed in a block Krylov subspace, without the derivative of the flow as a matrix.
 
     Raises
     ------
@@ -188,7 +187,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     if result.values.size == system.dimension - (system.period is None):
         return result
     remark = (
-        f"only the {result.values.size} multipliers of largest modulus were asked for, and decide whether the orbit "
+        f"only the {result.values.size} multipliers of largest modulus were computed; they decide whether the orbit "
         f"is stable; the next one has a modulus of about {of_period:.3g}"
     )
     return replace(result, remarks=(remark,))
@@ -204,7 +203,7 @@ def _leading_of(every: Multipliers, count: int) -> tuple[Multipliers, float]:
 
 
 def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
-    """Multipliers of many systems at their known orbits, on all cores where the systems allow it."""
+    """Multipliers of many systems at their known orbits, on all cores if the systems allow it."""
     if not systems:
         return []
     if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
@@ -223,9 +222,8 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
 def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """All Floquet exponents and modes, the strongly damped ones included.
 
-    The period is cut into factors of moderate condition and the state space split along their product, so that a
-    multiplier of 1e-60 is found with the same relative accuracy as one of 0.5; the eigenvalues of the product itself
-    would be round-off there.
+    The period is cut into factors of moderate condition and the state space split along their product, so a multiplier
+    of 1e-60 has the same relative accuracy as one of 0.5; the eigenvalues of the product itself would be round-off.
     """
     found = find_orbit(system, orbit)
     image = found.image
@@ -236,7 +234,7 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
         log_nu, modes, moved = split_product(cut.factors, cut.errors)
         modes = cut.basis @ modes
     bound = image.returns * (moved + 4.0 * _EPSILON * np.abs(log_nu)) / image.period
-    # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
+    # Principal logarithm of nu^k, with the imaginary part in (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0
     angle[np.abs(np.abs(angle) - np.pi) < _SAME_ANGLE] = np.pi

@@ -1,9 +1,9 @@
-"""Hopf points: where an equilibrium changes stability by a pair of eigenvalues, and a cycle leaves it.
+"""Hopf points: an equilibrium changes stability by a pair of eigenvalues, and a cycle leaves it.
 
 Equilibria are fixed points of the map x -> x + h phi(h A) f(x), phi(z) = (e^z - 1)/z, with A the derivative of f at x:
 a step of the exponential Euler method (Hochbruck & Ostermann, Acta Numerica 19, 2010). Its derivative there is e^(h A),
-so an eigenvalue on the imaginary axis is a multiplier on the unit circle, and what follows orbits and finds the
-crossings of their multipliers does that for equilibria. Values, errors and coefficients are then computed from f.
+so an eigenvalue on the imaginary axis is a multiplier on the unit circle, and the search for crossings of multipliers
+applies to equilibria. Values, errors and coefficients are then computed from f.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ Array = NDArray[np.float64]
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
 _EPSILON = float(np.finfo(float).eps)
-_POINTS = 2000  # return maps for what is looked at beside a point: of the map they cost next to nothing
-_BESIDE = 1e-5  # of the interval: where the rate of an eigenvalue is taken, by central differences
-_KNOWN = 1e-3  # of the interval: how sure a value has to be for a coefficient
-_KEPT = 64  # systems
+_POINTS = 2000  # budget of return maps beside a point: those of the map cost almost nothing
+_BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
+_KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
+_KEPT = 64  # cached systems
 _WORDS = (
     ("a multiplier is +1", "an eigenvalue is 0"),
     ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
@@ -53,7 +53,7 @@ _WORDS = (
     ("orbits", "equilibria"),
     ("orbit", "equilibrium"),
 )
-"""Names of equilibria and eigenvalues for those of orbits and multipliers."""
+"""Words for equilibria and eigenvalues in place of those for orbits and multipliers."""
 
 
 def locate_hopf(
@@ -72,10 +72,10 @@ def locate_hopf(
     between
         The interval, ``low < high``.
     equilibrium
-        A guess of the equilibrium for ``low``, shape (n,); it is then followed through the interval. A fold ends the
+        Guess of the equilibrium at ``low``, shape (n,), which is then followed through the interval. A fold ends the
         search, with a remark.
-    budget, seconds
-        As for :func:`chilopod.stability.locate`, of equilibria.
+        budget, seconds
+        Limits as for :func:`chilopod.stability.locate`, with equilibria for orbits.
 
     Returns
     -------
@@ -86,9 +86,9 @@ def locate_hopf(
     Raises
     ------
     ParameterError
-        If the interval or the guess is none, or the systems depend on time.
+        If the interval or the guess is invalid, or the systems depend on time.
     AnalysisError
-        If there is no equilibrium at the lower end of the interval, or ``family`` raises an exception there.
+        If no equilibrium is found at the lower end of the interval, or ``family`` raises an exception there.
     """
     low, high = checked_interval(between)
     family = functools.lru_cache(_KEPT)(family)
@@ -123,7 +123,7 @@ def _fold_remark(fold: Fold) -> str:
 def _of_map(
     samples: Samples, crossing: Crossing, matrices: Callable[[Array], tuple[Array, Array]], duration: float
 ) -> BifurcationPoint:
-    """A Hopf point as far as the map tells."""
+    """A Hopf point from the map alone."""
     (sample,) = samples.at(np.array([crossing.value]))
     relative = float(matrices(np.array([crossing.value]))[1][0])
     units = numerical_balance(sample.image.jacobian)
@@ -147,7 +147,7 @@ def _of_map(
 
 
 def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
-    """A Hopf point with all that f itself tells, or with a remark on why there is no more than the map tells."""
+    """A Hopf point with its results from f, or from the map alone with a remark on the reason."""
     reason = f"{point.multiplicity // 2} pairs are critical at once"
     if point.multiplicity <= 2:
         try:
@@ -159,9 +159,9 @@ def _described(family: Family, between: tuple[float, float], point: BifurcationP
 
 
 def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
-    """Relative error of the derivative of the map, the states being in units that balance it: of the exponential (of
-    the norm of the exponent, as Higham, *Functions of Matrices*, chapter 10), and of a state that is off by rounding,
-    magnified where the derivative of f is nearly singular."""
+    """Relative error of the derivative of the map, in units that balance the states: error of the exponential (by the
+    norm of the exponent, as Higham, *Functions of Matrices*, chapter 10), and of the rounding of the state, magnified
+    where the derivative of f is nearly singular."""
     velocity, matrix, wrong = linear_part(system, x)
     units = numerical_balance(matrix)
     ratios = units / units[:, None]
@@ -169,7 +169,7 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
     _, values, rows = np.linalg.svd(matrix * ratios)
     most = float((size / units).max())
     reach, steepest = float(np.linalg.norm(rounding)), max(float(values[0]), 1e-300)
-    # Where it is singular, terms of second or third order keep the state where it is.
+    # Where it is singular, terms of second or third order fix the state.
     off = min(reach / max(float(values[-1]), 1e-300), most * float(np.cbrt(reach / (steepest * most))))
     beside = linear_part(system, x + off * units * rows[-1])[1]
     moved = float(np.linalg.norm((np.abs(beside - matrix) + wrong) * ratios))
@@ -177,8 +177,8 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
-    """The step h of the map: a radian of the fastest oscillation or growth, so that no multiplier is lost, or about the
-    time of the decays."""
+    """The step h of the map: a radian of the fastest oscillation or growth, which preserves all multipliers, or about
+    the time of the decays."""
     values = start.eigenvalues
     fastest = float(np.maximum(np.abs(values.imag), values.real).max())
     if fastest > 0.0:
@@ -188,8 +188,8 @@ def _duration(start: Equilibrium, guess_period: float) -> float:
 
 
 def _scale(system: Autonomous, start: Equilibrium) -> Array | None:
-    """Sizes of the states, shape (n,), where an equilibrium at zero does not tell them: those at which terms of second
-    or third order of the right-hand side are as large as the linear ones along some directions."""
+    """Sizes of the states, shape (n,), for an equilibrium at zero: there the terms of second or third order of the
+    right-hand side are as large as the linear ones along some directions."""
     given = given_scale(system)
     if given is not None or start.state.any() or not expands_velocity(system):
         return given
@@ -205,7 +205,7 @@ def _scale(system: Autonomous, start: Equilibrium) -> Array | None:
 
 
 def _resting(system: SystemLike, duration: float, scale: Array | None) -> PeriodicSystem:
-    """The map of which the equilibria of a system are the fixed points."""
+    """The map whose fixed points are the equilibria of a system."""
     checked = autonomous(system)
     n = checked.dimension
 
@@ -219,7 +219,7 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
             power = scipy.linalg.expm(both)
         if not np.abs(power).max() < _LARGEST:  # NaN too
             raise AnalysisError("a disturbance grows too much within the guessed period", field="equilibrium")
-        # A relative error of the exponent is one of its norm times as much (Higham, Functions of Matrices, ch. 10).
+        # The norm of the exponent multiplies its relative error (Higham, Functions of Matrices, ch. 10).
         error = 16.0 * _EPSILON * (1.0 + float(np.abs(scaled).sum(axis=1).max())) * float(np.abs(power[:n, :n]).max())
         ratios = units[:, None] / units
         return x + units * power[:n, n], power[:n, :n] * ratios, error * ratios
@@ -232,13 +232,13 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
 def _hopf_point(
     family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
 ) -> BifurcationPoint:
-    """A Hopf point from that of the map: its value by f itself, its error, its rate and coefficient."""
+    """A Hopf point from that of the map, with value, error, rate and coefficient from f."""
     low, high = between
     value, state = point.value, point.orbit
     values = np.clip(value + _BESIDE * (high - low) * np.array([-1.0, 1.0]), low, high)
     beside = [equilibrium_at(family, each, state) for each in values.tolist()]
     rate, frequency = _rate(values, [here for _, here in beside], between, point, duration)
-    for correcting in (True, True, False):  # the search has found it almost to the last digit
+    for correcting in (True, True, False):  # the search gives almost the last digit
         system, here = equilibrium_at(family, value, state)
         index = int(np.abs(here.eigenvalues - 1j * frequency).argmin())
         state, frequency = here.state, float(here.eigenvalues[index].imag)
@@ -247,7 +247,7 @@ def _hopf_point(
             value = min(max(value - off / rate.real, low), high)
     bound = (abs(off) + float(here.error_bounds[index])) / abs(rate.real) + 4.0 * _EPSILON * abs(value)
     if not bound <= _KNOWN * (high - low):
-        raise AnalysisError("its eigenvalues are not known well enough", field="family", value=value)
+        raise AnalysisError("the eigenvalues are not accurate enough", field="family", value=value)
     form = hopf_form(system, here.state, here.error, frequency)
     with UserCode("family", value):
         cubics = [hopf_form(there, each.state, each.error, frequency).cubic.real for there, each in beside]
@@ -274,8 +274,8 @@ def _hopf_point(
 def _rate(
     values: Array, found: list[Equilibrium], between: tuple[float, float], point: BifurcationPoint, duration: float
 ) -> tuple[complex, float]:
-    """How fast the critical eigenvalue moves, left^H dA mode, which holds however near others are, and its imaginary
-    part, by the equilibria to both sides of the point."""
+    """Rate of the critical eigenvalue, left^H dA mode, which holds also near others, and its imaginary part, from the
+    equilibria on both sides of the point."""
     matrices = [each.jacobian for each in found]
     matrix = 0.5 * (matrices[0] + matrices[1])
     units = numerical_balance(matrix)
@@ -293,7 +293,7 @@ def _rate(
 
 
 def _of_equilibria(remark: str) -> str:
-    """A remark of a search for orbits, of equilibria."""
+    """A remark on orbits in words for equilibria."""
     for word, other in _WORDS:
         remark = remark.replace(word, other)
     return remark

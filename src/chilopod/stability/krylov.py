@@ -1,14 +1,14 @@
-"""Multipliers of largest modulus of a large system, without the derivative of its flow as a matrix: what
-``multipliers(leading=)`` computes.
+"""Multipliers of largest modulus of a large system, without the derivative of its flow as a matrix, for
+``multipliers(leading=)``.
 
-The derivative is known by what it does to directions. A block of them meets multipliers that agree, as those of a ring
-do, in as many copies as it has columns, and the compiled flow carries several directions at nearly the cost of one, so
-nothing is gained by one direction at a time (Arnoldi's method as in ARPACK), nor by restarts: the subspace may grow to
-the whole space, where it is exact.
+The derivative is applied to directions. A block of directions resolves multiple multipliers, as of a ring, in as many
+copies as it has columns, and the compiled flow carries several directions at nearly the cost of one, so single
+directions (Arnoldi's method as in ARPACK) have no advantage. Nor have restarts: the subspace may grow to the whole
+space, where it is exact.
 
-The orbit is found by Newton's method, every linear system solved in such a subspace to about the accuracy that the
-method can use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), with the directions that contract
-least in the rounds before in the block it starts from. Of a strongly dissipative system it takes a few directions
+The orbit is found by Newton's method. Every linear system is solved in such a subspace to about the accuracy that the
+method can use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), from a block that includes the
+least contracting directions of earlier rounds. A strongly dissipative system takes a few directions
 (compare the Newton-Picard methods of Lust, Roose, Spence and Champneys, *SIAM J. Sci. Comput.* 19, 1188, 1998).
 """
 
@@ -41,41 +41,41 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 LARGE = 100
-"""States from which on a few directions are cheaper than the whole derivative."""
+"""Number of states from which a few directions are cheaper than the whole derivative."""
 
-_LANES = 4  # columns that the compiled code carries at once
-_ROUND_OFF = 1e-14  # of the largest image: what is outside a subspace by rounding alone
-_GROWTH = 1.125  # from one subspace that is looked at to the next
-_SINGULAR = 1e-13  # singular values of H' - 1 that count as zero, H' or the unit matrix being one
+_LANES = 4  # columns that the compiled code carries together
+_ROUND_OFF = 1e-14  # part outside a subspace that is round-off, relative to the largest image
+_GROWTH = 1.125  # growth from one tested subspace to the next
+_SINGULAR = 1e-13  # singular value of H' - 1 that counts as zero, relative to H' or the unit matrix
 
-_PARTS = 16  # of a return, where the sizes of the states are looked at
-_SWEEPS, _MOST_SWEEPS = 3, 30  # through what the states make of each other; more where the orbit tells no sizes
-_STEADY = 2.0  # ratios of sizes that change by less are known well enough
+_PARTS = 16  # parts of a return at which the sizes of the states are computed
+_SWEEPS, _MOST_SWEEPS = 3, 30  # sweeps through the couplings of the states; more if the orbit gives no sizes
+_STEADY = 2.0  # change of the ratios of sizes below which they are accurate enough
 
-_ROUNDS = 30  # of Newton's method
-_WORSE = 10.0  # residuals may grow by so much
-_RESTS = 1e-8  # of the sizes: a motion that short is none
-_UNSOLVED = 0.5  # of a residual, in the whole space: no step of Newton's method
-_COARSE, _FINE = 1e-2, 1e-6  # of a residual: how accurately linear systems are solved
+_ROUNDS = 30  # rounds of Newton's method
+_WORSE = 10.0  # largest growth of a residual
+_RESTS = 1e-8  # motion, relative to the sizes, that counts as rest
+_UNSOLVED = 0.5  # remaining part of a residual, in the whole space, that fails a step of Newton's method
+_COARSE, _FINE = 1e-2, 1e-6  # accuracy of linear systems, relative to the residual
 
-_FEWEST, _SPARE = 8, 2  # columns of a block, and those beyond the multipliers that are asked for
-_CONVERGED = 1e-13  # residual, of the size of the matrix
-_SAFETY = 4.0  # on a norm of which eight components or more, in random directions, are known
-_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+_FEWEST, _SPARE = 8, 2  # columns of a block, and those beyond the requested multipliers
+_CONVERGED = 1e-13  # residual, relative to the size of the matrix
+_SAFETY = 4.0  # factor on a norm estimated from eight or more random components
+_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
 @dataclass(frozen=True)
 class KrylovSubspace(ReadOnlyArrays):
-    """A subspace V with A V = V H + Q R; A is applied to the last block alone in every round, and Q continues V."""
+    """A subspace V with A V = V H + Q R; every round applies A to the last block only, and Q continues V."""
 
     basis: Array  # V, orthonormal, shape (n, m)
-    first: int  # columns of V that span the block it started from
+    first: int  # number of columns of V that span the first block
     matrix: Array  # H = V^T A V, shape (m, m)
     coupling: Array  # R, shape (q, m), zero but for the columns of the last block; q = 0 where V is invariant
 
     def solve_shifted(self, right: Array) -> tuple[Array, float]:
-        """The v in V with the least |(A - 1) v - right|, and what is left of it relative to |right|, for a ``right`` in
-        the block that V started from: block GMRES (Saad, *Iterative Methods for Sparse Linear Systems*, 2003, section
+        """The v in V with the least |(A - 1) v - right|, and that residual relative to |right|, for a ``right`` in the
+        first block of V: block GMRES (Saad, *Iterative Methods for Sparse Linear Systems*, 2003, section
         6.12)."""
         m = self.matrix.shape[0]
         whole = np.concatenate([self.matrix - np.eye(m), self.coupling])
@@ -87,9 +87,9 @@ class KrylovSubspace(ReadOnlyArrays):
 
 
 def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[KrylovSubspace]:
-    """Subspaces of a matrix, given by what it makes of directions, shape (n, any), from a block to start from, shape
-    (n, columns). Each is larger by an eighth or more, so that what is made of all of them costs no more than a few
-    times what is made of the last one, which is invariant."""
+    """Subspaces of a matrix, given by its products with directions, shape (n, any), from a first block, shape (n,
+    columns). Each is larger by an eighth or more, so work on all of them costs only a few times that on the last one,
+    which is invariant."""
     n = len(start)
     block = _orthonormal(start, _ROUND_OFF * float(np.linalg.norm(start)), n)[0]
     first = block.shape[1]
@@ -116,7 +116,7 @@ def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[
 
 
 def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Array]:
-    """An orthonormal basis of the columns of a block and their coordinates in it, but for what is negligible."""
+    """An orthonormal basis of the columns of a block and their coordinates in it, without negligible parts."""
     left, values, right = np.linalg.svd(block, full_matrices=False)
     count = min(int((values > negligible).sum()), most)
     return left[:, :count], values[:count, None] * right[:count]
@@ -124,19 +124,19 @@ def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Arr
 
 @dataclass(frozen=True)
 class TangentMap(ReadOnlyArrays):
-    """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`) and its derivative H', no matrix."""
+    """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`), its derivative H' as a product."""
 
     system: FlowsTangents
     point: Array  # state at time 0, shape (n,)
     state: Array  # H(point)
-    duration: float  # of a return
-    returns: int  # in the full period
-    velocity: Array | None  # dx/dt at ``state``, where the system does not depend on time
-    normal: Array | None  # of the section, likewise
+    duration: float  # duration of a return
+    returns: int  # number of returns in the full period
+    velocity: Array | None  # dx/dt at ``state``, if the system does not depend on time
+    normal: Array | None  # normal of the section, likewise
 
     @property
     def section(self) -> Section | None:
-        """The section that a return ends on, through ``point``."""
+        """Section of returns, through ``point``."""
         return None if self.normal is None else Section(self.point, self.normal, self.duration)
 
     def images(self, directions: Array) -> Array:
@@ -144,11 +144,11 @@ class TangentMap(ReadOnlyArrays):
         return self._in_parts(directions, (0.0,))[1]
 
     def images_with_error(self, directions: Array) -> tuple[Array, Array, Array]:
-        """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,): by their sizes
-        as a whole, not of every entry.
+        """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,), relative to
+        their norms instead of every entry.
 
-        As in :func:`~chilopod.stability.problem.returns.flow_with_error` they are a multiple of the difference to a
-        second computation which takes the interval in parts.
+        As in :func:`~chilopod.stability.problem.returns.flow_with_error` they are a multiple of the difference from a
+        second computation with the interval in parts.
         """
         state, images = self._in_parts(directions, (0.0,))
         other, parts = self._in_parts(directions, CUTS)
@@ -172,7 +172,7 @@ class TangentMap(ReadOnlyArrays):
         return state, self._across(images)
 
     def _across(self, directions: Array) -> Array:
-        """Directions at the end of a return along the motion into the section."""
+        """Directions at the end of a return, projected along the motion into the section."""
         if self.velocity is None or self.normal is None:
             return directions
         rate = float(self.normal @ self.velocity)
@@ -183,7 +183,7 @@ class TangentMap(ReadOnlyArrays):
 def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time.
 
-    Raises AnalysisError if the flow gives anything that is not finite, or does not come back to the section.
+    Raises AnalysisError if the flow is not finite or does not return to the section.
     """
     velocity, normal = None, None
     duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
@@ -199,10 +199,10 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
 
 
 def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
-    """Sizes of the states, shape (n,), as :func:`chilopod.stability.problem.scales.sizes` says, without the matrix.
+    """Sizes of the states, shape (n,), as in :func:`chilopod.stability.problem.scales.sizes`, without the matrix.
 
-    A state is as large as it becomes during a return, or as what the others, disturbed by their own sizes at random,
-    make of it within a part of the return. Where the orbit is zero throughout that alone gives the ratios: the
+    The size of a state is its largest value during a return, or its change within a part of the return when the others
+    are disturbed at random by their own sizes. If the orbit is zero throughout, only the latter gives the ratios: the
     one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 261-287, 2000.
     """
     given = given_scale(system)
@@ -240,10 +240,10 @@ def closed_orbit(
     farthest: float = np.inf,
     budget: Budget | None = None,
 ) -> tuple[TangentMap, Array]:
-    """The return map in a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
+    """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
 
-    The guess may miss itself by ``farthest``, relative to the sizes. A return ends on the section, by default across
-    the motion in the guess, where the system does not depend on time. Each round takes a return map from the budget.
+    A return may displace the guess by ``farthest``, relative to the sizes. If the system does not depend on time, it
+    ends on the section, by default across the motion at the guess. Each round takes a return map from the budget.
     Raises AnalysisError if Newton's method does not converge.
     """
     size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)
@@ -280,7 +280,7 @@ def closed_orbit(
 
 
 def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accuracy: float) -> tuple[Array, Array]:
-    """The solution of (H' - 1) move = residual, in units of the sizes, and the directions that contract least."""
+    """The solution of (H' - 1) move = residual, in units of the sizes, and the least contracting directions."""
     units = size[:, None]
     start = np.column_stack([residual / np.linalg.norm(residual), slowest])
     for subspace in krylov_subspaces(lambda directions: image.images(units * directions) / units, start):
@@ -288,7 +288,7 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
         if left <= accuracy:
             break
     if left > _UNSOLVED:
-        raise AnalysisError("no move closes the motion: one return later all states near the guess are off alike")
+        raise AnalysisError("no correction closes the motion: a return moves all states near the guess alike")
     values, vectors = np.linalg.eig(subspace.matrix)
     largest = vectors[:, np.argsort(-np.abs(values))[: _LANES - 1]]
     return move, subspace.basis @ np.where(largest.imag.any(axis=0), largest.imag + largest.real, largest.real)
@@ -296,8 +296,8 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
 
 @dataclass(frozen=True)
 class LeadingMultipliers(ReadOnlyArrays):
-    """The largest eigenvalues of the derivative of a return map by falling modulus, shape (count,), or one more where
-    that would part a pair; a bound on the error of each; and about the modulus of the following one."""
+    """The largest eigenvalues of the derivative of a return map by falling modulus, shape (count,), or one more to
+    complete a pair; a bound on the error of each; and the approximate modulus of the next one."""
 
     values: ComplexArray
     error: Array
@@ -306,7 +306,7 @@ class LeadingMultipliers(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class _Ritz:
-    """Eigenvalues of H in a Krylov subspace, by falling modulus, and how far they are from those of the matrix."""
+    """Eigenvalues of H in a Krylov subspace, by falling modulus, and their distances from those of the matrix."""
 
     values: ComplexArray
     vectors: ComplexArray  # unit columns
@@ -315,12 +315,12 @@ class _Ritz:
 
 
 def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMultipliers:
-    """The ``count`` multipliers of largest modulus of the return map in a state on the orbit, the states being of some
-    sizes, shape (n,).
+    """The ``count`` multipliers of largest modulus of the return map at a state on the orbit, for given sizes of the
+    states, shape (n,).
 
-    A value theta with the vector y, |y| = 1, is off by w^T (H' y - theta y) / w^T y, exactly, with w the left
-    eigenvector of the multiplier. H' y is computed anew, with its error; of w, the components in the random directions
-    from which the subspace grew are known, and w is almost never much longer than they tell (Kenney and Laub, *SIAM J.
+    A value theta with the vector y, |y| = 1, has the exact error w^T (H' y - theta y) / w^T y, with w the left
+    eigenvector of the multiplier. H' y is computed again, with its error; the components of w in the random directions
+    of the first block are known, and its norm is almost never much larger than they show (Kenney and Laub, *SIAM J.
     Sci. Comput.* 15, 36, 1994).
     """
     n, units = size.size, size[:, None]
@@ -363,7 +363,7 @@ def _ritz(subspace: KrylovSubspace) -> _Ritz:
 
 
 def whole_pairs(values: ComplexArray, count: int) -> int:
-    """A number of multipliers, or one more where the last one would be without its conjugate."""
+    """A number of multipliers, or one more to include the conjugate of the last."""
     count = min(count, values.size)
     if count < values.size and values[count - 1].imag > 0.0 and values[count].imag < 0.0:
         count += 1
@@ -371,7 +371,7 @@ def whole_pairs(values: ComplexArray, count: int) -> int:
 
 
 def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
-    """True if the chosen ones are known to round-off, and no other one may yet become larger."""
+    """True if the chosen ones have converged to round-off, and no other one may become larger."""
     if ritz.values.size <= chosen:
         return False
     least = float(np.abs(ritz.values[chosen - 1]))
@@ -383,8 +383,8 @@ def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
 def _bend(
     image: TangentMap, size: Array, subspace: KrylovSubspace, state_error: Array, directions: Array, images: Array
 ) -> Array:
-    """Change of the derivative within the error of the orbit, along the direction in which the orbit is least sure, on
-    each of some vectors given by real and imaginary parts."""
+    """Change of the derivative within the error of the orbit, along its least certain direction, applied to vectors
+    given by real and imaginary parts."""
     _, values, right = np.linalg.svd(subspace.matrix - np.eye(len(subspace.matrix)))
     values = values[values > _SINGULAR * values[0]]
     weakest = subspace.basis @ right[values.size - 1]

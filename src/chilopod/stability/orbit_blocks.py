@@ -1,5 +1,5 @@
-"""The blocks that the spatial symmetries of an orbit make of its return map, and what crosses the unit circle in
-them."""
+"""Blocks of an orbit's return map by its spatial symmetries, and crossings of the unit circle in each
+block."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from chilopod.stability.unit_circle.spectra import Matrices
 Array = NDArray[np.float64]
 
 Blocks = tuple[Block | None, ...]
-"""A single None stands for the whole return map."""
+"""Blocks of a return map; a single None is the whole map."""
 
 
 def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[Blocks, tuple[str, ...]]:
-    """The blocks of the symmetries that leave an orbit as it is, and a sentence where there are none of them."""
+    """The blocks of the symmetries of an orbit, and a sentence if it has none of the system's."""
     generators = spatial_symmetries(system)
     if not generators:
         return (None,), ()
@@ -34,12 +34,12 @@ def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[Blocks, tuple[str, .
     if group.order == 1:
         return (None,), ("the orbit has none of the spatial symmetries",)
     if commutes(group, orbit.image.jacobian, orbit.image.error) > 1.0:
-        return (None,), ("the return map does not have the spatial symmetries: they are left aside",)
+        return (None,), ("the return map does not have the spatial symmetries: they are not used",)
     return isotypic(group), ()
 
 
 def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matrices], Crossings]) -> Crossings:
-    """Crossings that a search finds in a block of return maps; its multiplicities are those in the whole."""
+    """Crossings in a block of return maps, with multiplicities in the whole map."""
     if block is None:
         return search(matrices)
 
@@ -55,7 +55,7 @@ def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matr
 
 
 def block_of(blocks: Blocks, matrix: Array, multiplier: complex) -> Block | None:
-    """The block that a simple multiplier of a return map, shape (n, n), belongs to."""
+    """The block of a simple multiplier of a return map, shape (n, n)."""
     reduced = [matrix if block is None else block.reduced(matrix) for block in blocks]
     away = [float(np.abs(np.linalg.eigvals(each) - multiplier).min()) for each in reduced]
     return blocks[int(np.argmin(away))]

@@ -48,22 +48,22 @@ class Criticality(Labelled):
 
     @property
     def known(self) -> bool:
-        """True if it is the verdict of a coefficient."""
+        """True for the verdict of a coefficient."""
         return self not in (Criticality.NOT_DEFINED, Criticality.NOT_COMPUTED)
 
 
 WITHOUT_CRITICALITY = (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT, Kind.COLLISION, Kind.KREIN_COLLISION)
-"""Kinds of points at which no cubic coefficient decides."""
+"""Kinds of points without a decisive cubic coefficient."""
 
 
-_CLEAR = 3.0  # of its error, for a quadratic coefficient that makes a crossing of two orbits
-_REAL = 1e-9  # imaginary part up to which a mode is shown as a real one
-_NEGLIGIBLE = 0.3  # of the cubic term at the sampled amplitude: what the error of the quadratic one may leave open
+_CLEAR = 3.0  # least quadratic coefficient, relative to its error, of a transcritical point
+_REAL = 1e-9  # largest imaginary part of a mode that is shown as real
+_NEGLIGIBLE = 0.3  # largest negligible error of the quadratic term, relative to the cubic one as sampled
 
 
 def kind_at_plus_one(form: NormalForm) -> Kind:
-    """Kind at a real multiplier +1 where the orbit goes on: transcritical with a quadratic term that is clearly
-    there, pitchfork without one but with a cubic one, a branch point where the errors leave that open."""
+    """Kind at a real multiplier +1 if the orbit continues: transcritical with a significant quadratic term, pitchfork
+    without one but with a cubic one, branch point if the errors leave that open."""
     if form.status is not NormalFormStatus.FOUND:
         return Kind.BRANCH_POINT
     if abs(form.quadratic) > _CLEAR * form.quadratic_error:
@@ -75,7 +75,7 @@ def kind_at_plus_one(form: NormalForm) -> Kind:
 
 
 def criticality(form: NormalForm) -> Criticality:
-    """The verdict of a cubic coefficient, if there is one and no other terms decide too."""
+    """The verdict of a cubic coefficient, if it is known and decides alone."""
     if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
         return Criticality.NOT_COMPUTED
     if abs(form.cubic) <= form.cubic_error:
@@ -100,34 +100,33 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     mode
         Unit critical eigenvector, shape (n,), complex for Neimark-Sacker and Hopf.
     multiplier
-        Critical multiplier of the return map (of the half period where that symmetry exists); of a Hopf point the
-        eigenvalue i omega.
+        Critical multiplier of the return map (over half a period with that symmetry); at a Hopf point the eigenvalue
+        i omega.
     frequency
-        Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period; the principal value
-        otherwise.
+        Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period, else the principal
+        value.
     criticality
-        Verdict of the coefficient, or why there is none.
+        Verdict of the coefficient, or the reason for a missing one.
     coefficient, coefficient_error
         Cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period doubling over
-        two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where it has no
-        meaning (fold, transcritical, branch point) or where there is no normal form. At a Hopf point
+        two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None if it has no
+        meaning (fold, transcritical, branch point) or without a normal form. At a Hopf point
         the first Lyapunov coefficient l1 (Kuznetsov, section 3.5), with |a| -> |a| + 2 pi l1 |a|^3 over one period.
     rotation, rotation_error
-        Phase per period that an amplitude adds where the mode turns (Neimark-Sacker), rad per amplitude^2.
+        Change of the phase per period with the amplitude (Neimark-Sacker), rad per amplitude^2.
     period
         Period of the orbit.
     multiplicity
-        Number of critical multipliers, both of a pair counted.
+        Number of critical multipliers, counting both of a pair.
     modes
-        Unit critical eigenvectors where there are several, shape (n, modes): where a symmetry makes them several, those
-        along which new orbits branch off; else of the critical space some basis.
+        Unit critical eigenvectors if there are several, shape (n, modes): with a symmetry, the directions in which new
+        orbits branch off; else a basis of the critical space.
     symmetry
-        Consequences of the spatial symmetries, where the orbit has some.
+        Consequences of the orbit's spatial symmetries, if any.
     rate
-        Rate of a Hopf point: how fast its eigenvalue moves, in 1/s per unit of the parameter.
+        Rate of change of the eigenvalue at a Hopf point, in 1/s per unit of the parameter.
     normal_form
-        All that is known of the normal form, with a status that says why where it has no numbers; None where it was
-        not asked for, and at folds.
+        Normal form, with a status that explains missing numbers; None if not computed, and at folds.
     """
 
     kind: Kind
@@ -151,7 +150,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
 
     @property
     def sentences(self) -> str:
-        """Sentences on what happens here and which way the new orbits go."""
+        """Sentences on the kind of the point and the direction of the new orbits."""
         said = [f"{self.kind.sentence}."]
         if self.criticality.known:
             said.append(f"{self.criticality.label}: {self.criticality.sentence}.")
@@ -161,7 +160,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
 
     @property
     def row(self) -> tuple[str, str, str]:
-        """Kind, value with bound, and which way the new orbits go, for tables in text."""
+        """Kind, value with bound, and direction of the new orbits, for tables in text."""
         way = self.criticality.label if self.criticality.known else ""
         return self.kind.label, bounded(self.value, self.error_bound), way
 
@@ -186,7 +185,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
 
 
 def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
-    """A point with what its normal form says, where that means something."""
+    """A point with the coefficients of its normal form, if valid."""
     point = replace(point, normal_form=form)
     verdict = criticality(form)
     if point.kind in WITHOUT_CRITICALITY or not verdict.known:

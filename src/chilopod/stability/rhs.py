@@ -41,12 +41,12 @@ def from_rhs(
     arithmetic, the elementary functions of numpy and math, numpy arrays, loops, and functions compiled with
     ``numba.njit``; a family over parameters (arguments, closures or globals that are floats) is traced once. Jumps and
     kinks (``sign``, ``abs``, ``where``, ``%``, comparisons, ...) are found and crossed exactly, in time and in state.
-    What depends on time alone is looked at on a grid of 4096 points over the period, so a pulse that is not seen there
+    Functions of time alone are sampled on a grid of 4096 points over the period, so a pulse between the points
     (narrower than about T / 50 000) is missed.
 
     Taylor series take steps as short as the fastest decay. Where that is much faster than the motion, the system is
-    stiff, and an implicit method, Radau IIA collocation with the exact derivative of its steps, goes on in their place:
-    tried when the series have used up their steps, or from the start with ``method="implicit"``.
+    stiff, and an implicit method, Radau IIA collocation with the exact derivative of its steps, takes over: after the
+    series have used up their steps, or from the start with ``method="implicit"``.
 
     A function that branches on its arguments (``if x[0] > 0``) or calls other libraries cannot be traced. It is
     integrated by scipy's DOP853 from calls, hundreds of times slower.
@@ -54,39 +54,39 @@ def from_rhs(
     Parameters
     ----------
     rhs
-        ``rhs(t, x, *args)`` -> dx/dt, shape (n,); T-periodic in t.
-    dimension, period
-        n and T; None where ``rhs`` does not depend on t and the period belongs to the orbit.
+        Function ``rhs(t, x, *args)`` -> dx/dt, shape (n,); T-periodic in t.
+        dimension, period
+        Number of states n, and T; None if ``rhs`` does not depend on t and the period belongs to the orbit.
     args
         Parameters of the right-hand side.
     events
-        Events at which the state jumps, or the right-hand side switches, on reaching a surface. Needs functions that
-        can be traced.
+        Events at which the state jumps, or the right-hand side switches, on reaching a surface. They need functions
+        that can be traced.
     switch_times
-        Times in [0, T) at which ``rhs`` jumps or has a kink. Integration stops and restarts there. A function that is
-        traced needs none; of others, within an interval the function is only ever asked at times strictly inside it,
-        and jumps that are not declared cost time and digits: those found on a fine grid are warned of.
+        Times in [0, T) at which ``rhs`` jumps or has a kink. Integration stops and restarts there. A traced function
+        needs none; others are evaluated strictly inside each interval, and undeclared jumps cost time and digits:
+        those found on a fine grid give a warning.
     jacobian
-        ``jacobian(t, x, *args)`` -> (n, n). Of use where the function cannot be traced; without it the derivative is
-        then taken by a complex step, or where ``rhs`` does not accept complex states, by central differences, with
+        Function ``jacobian(t, x, *args)`` -> (n, n), for functions that cannot be traced; without it the derivative
+        then comes from a complex step or, if ``rhs`` does not accept complex states, from central differences, with
         about nine digits.
     symmetry, spatial_symmetry, orbit, scale, guess_period
-        See :class:`PeriodicSystem`. Where the period is not known, ``guess_period`` has to be given; ``orbit`` may be a
+        See :class:`PeriodicSystem`. Without a period ``guess_period`` must be given, and ``orbit`` may be a
         guess.
     method
-        "taylor" or "implicit", of functions that can be traced; "automatic": Taylor series, and the implicit method
-        from where these take too many steps on. That is found out anew for every system, in a second or two, so
-        families that are known to be stiff are better told. The implicit method is for smooth functions of the
-        state without events, and for some tens of states.
+        "taylor" or "implicit", for functions that can be traced; "automatic": Taylor series, and the implicit method
+        after these take too many steps. That decision takes a second or two for every system, so "implicit" is better
+        for families that are known to be stiff. The implicit method suits smooth functions of the state without
+        events, and some tens of states.
     tolerance
         Local error per step, relative to the size of each state.
 
     Warns
     -----
     UndeclaredSwitch
-        If a right-hand side that cannot be traced jumps elsewhere than at ``switch_times``.
+        If a right-hand side that cannot be traced jumps at other times than ``switch_times``.
     NotAnalytic
-        If the derivative of such a function has to be taken by differences.
+        If the derivative of such a function needs differences.
     """
     autonomous = period is None
     length = checked_duration("guess_period" if autonomous else "period", guess_period if autonomous else period)
@@ -105,7 +105,7 @@ def from_rhs(
         orbit=given.start,
         **rest,
     )
-    if not given.events:  # which a symmetry would have to respect as well
+    if not given.events:  # a symmetry would also have to hold for these
         if system.symmetry is not None:
             shift = 0.0 if autonomous else length / system.symmetry_order
             check_symmetry("symmetry", system.symmetry, shift, slopes, given.times, given.base, length)

@@ -1,4 +1,4 @@
-"""Results about any periodic system as tables, and the words and marks that they share."""
+"""Results as tables, with shared words and marks."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ _COLUMNS: dict[str, tuple[Any, ...]] = {
     "error_bounds": (float, "bound on the error of the multipliers", "1"),
 }
 
-_MOST = 6  # rows of a table, and remarks
+_MOST = 6  # largest numbers of rows of a table, and of remarks
 _MARKERS = "osD^vP*X"
 
 
 class Result(Shown):
-    """Base of results that print as a few lines, are drawn, and are tables; each class says what of."""
+    """Base of results with a printed summary, a drawing and a table, which each class defines."""
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the result on axes of matplotlib, those of a new figure by default, and return them."""
+        """Draw the result on axes of matplotlib, by default of a new figure, and return them."""
         raise NotImplementedError
 
     def to_dataset(self) -> xr.Dataset:
@@ -64,7 +64,7 @@ class Result(Shown):
         Parameters
         ----------
         path
-            File to write it to, if any; one that is there is replaced.
+            File to write to, if any; an existing one is replaced.
 
         Returns
         -------
@@ -101,7 +101,7 @@ def bounded(value: float, bound: float) -> str:
 
 
 def rows(cells: Iterable[Sequence[str]]) -> list[str]:
-    """Lines of a table, the columns below one another; of many rows the first ones."""
+    """Lines of a table with aligned columns; only the first of many rows."""
     return [f"  {line}" for line in aligned(cells, _MOST)]
 
 
@@ -130,7 +130,7 @@ def mark(axes: Axes, points: Iterable[tuple[str, float, float]]) -> None:
 
 
 def columns(points: Iterable[object], *names: str) -> dict[str, list[Any]]:
-    """Attributes of points as columns; None where a point has none."""
+    """Attributes of points as columns; None for missing ones."""
     points = list(points)
     return {name: [getattr(point, name, None) for point in points] for name in names}
 

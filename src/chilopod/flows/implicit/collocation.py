@@ -6,14 +6,14 @@ sections IV.5 and IV.8). A step solves
 
     Y_i = x + h sum_j a_ij f(t + c_j h, Y_j),        x(t + h) = Y_s,
 
-by Newton's method with the jacobian of every stage, not that of the start for all of them: the matrix of its last
-round, 1 - h a_ij J_j in block (i, j), is then the one in the derivative of these equations with respect to x,
+by Newton's method with the jacobian of every stage instead of the start's for all: the matrix of its last round,
+1 - h a_ij J_j in block (i, j), then also appears in the derivative of these equations with respect to x,
 
     dY_i - h sum_j a_ij J_j dY_j = 1,
 
-so one decomposition gives the exact derivative of the discrete map, all columns of it. The state and the columns of
-the derivative since the start are under step control together. A disturbance that decays fast makes short steps at
-the start, until it is gone, and long ones from there on.
+so one decomposition gives the exact derivative of the discrete map, all columns of it. One step control covers the
+state and the columns of the derivative since the start. A disturbance that decays fast causes short steps at the
+start until it has decayed, and long steps afterwards.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ class Interval(NamedTuple):
 
 
 class Control(NamedTuple):
-    """How an integration steps."""
+    """Step control of an integration."""
 
     tolerance: float  # estimated error of a step over the size of every state and entry of the derivative
     most_steps: int  # budget of steps in an interval
     units: Any  # units of the states, shape (n,), positive
-    near: Any  # entries of the derivative that are under step control, shape (n, n)
+    near: Any  # entries of the derivative under step control, shape (n, n)
     stop: Any  # shape (1,); not zero once there is no more time
 
 
@@ -59,8 +59,8 @@ class Outcome(NamedTuple):
     largest: Any
     extent: Any
     frame: Any  # orthonormal, shape (n, n), carried along (:func:`.stages.turn`); shape (0, 0) for none
-    # logarithm of the growth of each direction of the frame, which is added, and cosine of the largest angle it turns
-    # by in a step, shape (n,)
+    # logarithm of the growth of each direction of the frame, which is added, and cosine of its largest turn in a
+    # step, shape (n,)
     stretch: Any
     turned: Any
     report: Any  # number of steps, and the time reached, shape (2,)
@@ -68,8 +68,8 @@ class Outcome(NamedTuple):
 
 @fused_njit(error_model="numpy")
 def _predict(nodes: Any, ratio: float, last: Any, moved: Any) -> None:
-    """Guess the stages by the polynomial of the step before, which goes on for a while: Lagrange polynomials on 0 and
-    its nodes. ``ratio`` is the step over the one before; 0 if there is none."""
+    """Guess the stages by extrapolating the polynomial of the previous step: Lagrange polynomials on 0 and its nodes.
+    ``ratio`` is the step over the previous one; 0 for the first step."""
     s, n = moved.shape
     for i in range(s):
         for k in range(n):
@@ -89,7 +89,7 @@ def _predict(nodes: Any, ratio: float, last: Any, moved: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def _take(x: Any, step: Any, last: Any, result: Any) -> None:
-    """Go on to the end of a step."""
+    """Advance to the end of a step."""
     s, n = step.moved.shape
     for i in range(n):
         for j in range(s):
@@ -115,7 +115,7 @@ def _prepared(tape: Any, units: Any, params: Any, branches: Any, largest: Any) -
 
 @fused_njit(error_model="numpy")
 def _room(n: int, s: int) -> Any:
-    """A step of s stages of n states, to be filled."""
+    """An empty step of s stages of n states."""
     return Step(
         np.empty(n),
         np.empty((n, n)),
@@ -131,7 +131,7 @@ def _room(n: int, s: int) -> Any:
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control: Any, result: Any) -> int:
-    """Carry a state x, shape (n,), in units, over an interval in place; how it ends."""
+    """Carry a state x, shape (n,), in units, over an interval in place; return the status."""
     n, s, t1 = x.size, method.nodes.size, interval.t1
     problem = _prepared(tape, control.units, params, interval.branches, result.largest)
     step = _room(n, s)
@@ -147,7 +147,7 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
                 break
             for i in range(n):
                 result.largest[i] = max(result.largest[i], abs(x[i]))
-            if h == 0.0:  # at first as long as the fastest rate allows
+            if h == 0.0:  # the fastest rate limits the first step
                 rate = np.abs(step.jacobian).sum(axis=1).max()
                 h = min(t1 - t, 1.0 / rate) if rate > 0.0 else t1 - t
             fresh = False

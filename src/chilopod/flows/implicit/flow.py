@@ -23,11 +23,11 @@ from chilopod.frozen import ReadOnlyArrays
 Array = NDArray[np.float64]
 
 _STAGES, _OTHER_STAGES = 9, 7
-_NEAREST = 3  # couplings between two states up to which the derivative of one by the other is under step control
+_NEAREST = 3  # largest number of couplings between two states with their derivative under step control
 _MOST_WORK = 3e9  # multiplications
 _FEWEST_STEPS = 2000
 _FEWEST_PER_THREAD = 4
-_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
+_OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _FINER = 0.2
 _SHAKE = 2.0**-52
 _ROUNDING = 2.0**-49
@@ -40,16 +40,16 @@ class Stretched(ReadOnlyArrays):
     Attributes
     ----------
     state
-        At the end, shape (n,).
+        State at the end, shape (n,).
     frame
-        Orthonormal, shape (n, n): for every k its first k columns span what the flow made of those at the start.
+        Orthonormal frame, shape (n, n): for every k its first k columns span the images of those at the start.
     stretch
-        Logarithms of the growth of the columns, shape (n,): of the volume of the first k, less that of the first k-1.
+        Logarithms of the growth of the columns, shape (n,): the volume of the first k less that of the first k-1.
     other
-        The logarithms by another computation, which tells their error.
+        Logarithms by a second computation, for their error.
     turned
-        The smallest cosine of the angles between a column and itself a step later, shape (n,): the sign of a column
-        is carried along where it is clearly positive.
+        Smallest cosine of the angle between a column and itself a step later, shape (n,): a clearly positive one
+        preserves the sign of the column.
     """
 
     state: Array
@@ -61,7 +61,7 @@ class Stretched(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class ImplicitFlow(ReadOnlyArrays):
-    """The flow of a tape that is stiff.
+    """Flow of a stiff tape.
 
     Raises
     ------
@@ -72,17 +72,17 @@ class ImplicitFlow(ReadOnlyArrays):
     tape: Tape  # the right-hand side, without events; it may switch in time, not in the state
     params: Array  # values of its parameters
     edges: Array  # times from 0 to the period that no step may straddle
-    # borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited there
+    # borders of the parts of the period with fast changes of the function, shape (parts, 2): steps are limited there
     fast: Array
-    # estimated error of a step relative to the size of each state and entry of the derivative. The estimate is that of
-    # a formula of order s, so the error itself is far smaller where steps are short for the fast states too.
+    # estimated error of a step relative to the size of each state and entry of the derivative. The estimate belongs
+    # to a formula of order s, so the error is far smaller where steps resolve the fast states too.
     tolerance: float
     _cuts: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not can_be_implicit(self.tape):
             raise ParameterError(
-                "does not take events or switches in the state",
+                "does not support events or switches in the state",
                 field="method",
                 value="implicit",
                 allowed="'taylor', or a right-hand side that is smooth in the state",
@@ -99,9 +99,9 @@ class ImplicitFlow(ReadOnlyArrays):
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         """The same with a bound on the error of every entry of the derivative.
 
-        It is a multiple of the larger difference to two other computations, of lower order and of smaller steps, from
-        starts that are off by round-off. Two, because with one of them an entry may agree by chance; and round-off of
-        the entry and of what it may be a difference of.
+        The bound is a multiple of the larger difference from two other computations, of lower order and of smaller
+        steps, from starts disturbed by round-off; with one of them an entry may agree by chance. Round-off of the
+        entry and of the terms that it may be a difference of is added.
         """
         state, derivative = self._run(x, (t0, t1), _STAGES, self.tolerance)
         shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
@@ -141,12 +141,12 @@ class ImplicitFlow(ReadOnlyArrays):
         carried: tuple[Array, Array, Array] = (np.empty((0, 0)), np.empty(0), np.empty(0)),
         stop: Array | None = None,
     ) -> tuple[Array, Array]:
-        """State and derivative at t1; a frame is carried in place, with the stretch and the turn of its directions."""
+        """State and derivative at t1; a frame is carried in place, with the stretch and turn of its directions."""
         n, stop = self.tape.dimension, deadline.stop() if stop is None else stop
-        # Copies, because compiled code is compiled anew for arrays that are read-only.
+        # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
         if not (x.shape == (n,) and carried[0].shape[0] in (0, n) and (units is None or np.shape(units) == (n,))):
-            # Compiled code would read beyond them.
+            # Compiled code would read out of bounds.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         if not np.isfinite(x).all():
             raise AnalysisError("the state is not finite", field="rhs")
@@ -169,7 +169,7 @@ class ImplicitFlow(ReadOnlyArrays):
         return x * units, derivative * (units[:, None] / units if derived else 1.0)
 
     def _coupling(self, x: Array, t: float) -> tuple[Array, NDArray[np.bool_]]:
-        """Units of the states, shape (n,), in which the jacobian is balanced, and which states are near each other."""
+        """Units of the states, shape (n,), that balance the jacobian, and the pairs of near states."""
         jacobian = np.abs(evaluate_jacobian(self.tape, t, x, self.params)[1])
         jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)
         n = x.size
@@ -178,17 +178,17 @@ class ImplicitFlow(ReadOnlyArrays):
 
 
 def can_be_implicit(tape: Tape) -> bool:
-    """True if a right-hand side has no events, and switches in time only."""
+    """True for a right-hand side without events that switches in time only."""
     return all(kind != ops.GUARD and tape.program[4, node] == 0 for kind, node in zip(*tape.switches[:2], strict=True))
 
 
 def _branches(tape: Tape, params: Array, times: Array) -> Array:
-    """Branches of switches that know only time, shape (switches, times)."""
+    """Branches of switches that depend on time only, shape (switches, times)."""
     return branches_of(tape, evaluate(tape, tape.switches[1], times, np.zeros((tape.dimension, 1)), params))
 
 
 def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
-    """When the switches that know only time leave their branches, by bisection from a grid over the period."""
+    """Times at which switches of time alone leave their branches, by bisection from a grid over the period."""
     times = np.linspace(0.0, period, RESOLUTION + 1)
     found = []
     for s, branches in enumerate(_branches(tape, params, times)):
@@ -207,7 +207,7 @@ def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
 @functools.cache
 def _method(stages: int) -> Any:
     """Radau IIA with an odd number of stages."""
-    from scipy.special import roots_jacobi  # takes its time to import
+    from scipy.special import roots_jacobi  # slow to import
 
     from chilopod.flows.implicit.stages import Method
 
@@ -224,7 +224,7 @@ def _method(stages: int) -> Any:
 
 @functools.cache
 def _compiled() -> Any:
-    # numba takes half a second to import, and only who integrates needs it.
+    # numba takes half a second to import, and only integration needs it.
     from chilopod.flows.implicit import collocation
 
     return collocation

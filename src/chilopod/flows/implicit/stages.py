@@ -1,4 +1,4 @@
-"""One step of collocation: its stages, the estimate of its error, what it makes of a frame (:mod:`.collocation`)."""
+"""One step of collocation: stages, error estimate, and the frame carried by it (:mod:`.collocation`)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from chilopod.flows.tracing.series import slope_at
 
 _MOST_ROUNDS = 10
 _CLOSE = 1e-7
-"""A move of Newton's method after which the next one is round-off."""
+"""Newton correction after which the next one is round-off."""
 _NOISE = 2.0**-51
-"""Round-off, of the terms whose difference is the estimate of an error."""
+"""Round-off relative to the terms whose difference is the error estimate."""
 
 
 @fused_njit(error_model="numpy")
@@ -71,8 +71,7 @@ class Problem(NamedTuple):
 
     tape: Any  # its operations
     units: Any  # units of the states, shape (n,), positive; everything else here is in these units
-    # values and tangents of the tape, the tangents of the states at 1, and the branches of its switches, which hold on
-    # the interval
+    # values and tangents of the tape, with the states' own tangents 1, and the branches of its switches on the interval
     series: Any
     largest: Any  # largest moduli of the states so far, shape (n,)
 
@@ -132,10 +131,10 @@ def _stage_columns(step: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
-    """Solve for the stages; ``moved`` is a guess at first.
+    """Solve for the stages from the guess in ``moved``.
 
-    In the end ``columns`` has the derivative of the stages with respect to x, and ``slopes`` and ``jacobians`` belong
-    to the stages. False if it does not converge.
+    At the end ``columns`` has the derivative of the stages with respect to x, and ``slopes`` and ``jacobians`` belong
+    to the stages. False without convergence.
     """
     nodes, weights, largest = method.nodes, method.weights, problem.largest
     moved, slopes = step.moved, step.slopes
@@ -213,16 +212,16 @@ def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple
         off[:] = math.inf
         return off, np.zeros(off.shape)
     substitute(filtering, order, inverse)
-    # No shorter step takes away what is round-off in it.
+    # No shorter step removes its round-off.
     noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(step.jacobian) @ terms))
     return inverse @ off, noise
 
 
 @fused_njit(error_model="numpy")
 def estimated(problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any) -> float:
-    """The error of a step over what every state and entry of the derivative is large for.
+    """The error of a step relative to the size of every state and entry of the derivative.
 
-    States are measured by the largest they have been, and by what the others make of them within the step; so are the
+    The size of a state is its largest value so far, or the effect of the others on it within the step; likewise for the
     entries of the derivative, ``extent``.
     """
     largest, reached = problem.largest, step.reached
@@ -256,11 +255,11 @@ def estimated(problem: Any, method: Any, x: Any, h: float, step: Any, near: Any,
 
 @fused_njit(error_model="numpy")
 def turn(frame: Any, columns: Any, jacobians: Any, weights: Any, h: float, stretch: Any, turned: Any) -> None:
-    """Carry an orthonormal frame over a step: in each stage its columns span, the first k for every k, what the
-    derivative makes of those at the start, and grow at the rates on the diagonal of Q^T J Q.
+    """Carry an orthonormal frame over a step: in each stage the first k columns, for every k, span the image of those
+    at the start under the derivative, and grow at the rates on the diagonal of Q^T J Q.
 
-    How fast a direction decays is seen from J, and its turning from the derivative; so both are right in directions of
-    which the derivative itself retains nothing.
+    J gives the decay of a direction and the derivative its turn, so both are correct also for directions that the
+    derivative itself does not resolve.
     """
     n = frame.shape[0]
     s = weights.size

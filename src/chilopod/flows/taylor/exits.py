@@ -1,4 +1,4 @@
-"""Where a Taylor polynomial first becomes negative."""
+"""First place where a Taylor polynomial becomes negative."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _bernstein(coefficients: Any, order: int, h: float, out: Any) -> None:
 
 @njit(error_model="numpy")
 def _refined(coefficients: Any, order: int, low: float, high: float) -> float:
-    """The root between a point where a polynomial is not negative and one where it is, by bisection and Newton."""
+    """The root between a nonnegative and a negative point of a polynomial, by bisection and Newton's method."""
     z = 0.5 * (low + high)
     for _ in range(80):
         s = 0.0
@@ -48,9 +48,9 @@ def _refined(coefficients: Any, order: int, low: float, high: float) -> float:
 
 @njit(error_model="numpy")
 def first_exit(coefficients: Any, order: int, h: float) -> float:
-    """The first z in [0, h] after which a polynomial is negative; -1 if there is none.
+    """The first z in [0, h] after which a polynomial is negative; -1 if it stays nonnegative.
 
-    One that starts at zero or, by round-off, just below, and rises, has not left.
+    A polynomial that rises from zero or, by round-off, from just below counts as nonnegative there.
 
     Intervals are halved until Descartes' rule of signs for the Bernstein coefficients leaves no root or one (Basu,
     Pollack and Roy, *Algorithms in Real Algebraic Geometry*, ch. 10).

@@ -1,7 +1,7 @@
-"""Flows of taped right-hand sides, by Taylor series in compiled code that is the same for all of them.
+"""Flows of taped right-hand sides by Taylor series, in compiled code that all tapes share.
 
-A :class:`TaylorFlow` holds a tape (:func:`chilopod.flows.tracing.trace.trace`) and what steps must respect; the
-values of its parameters are an argument of every call, so one object serves a whole family::
+A :class:`TaylorFlow` holds a tape (:func:`chilopod.flows.tracing.trace.trace`) and the limits of its steps; the
+values of the parameters are an argument of every call, so one object serves a whole family::
 
     traced = trace(rhs, n, args, events=[(guard, reset)])
     flow = TaylorFlow(traced.tape, edges=(0.0, T), period=T, directions=(-1.0,))
@@ -9,9 +9,9 @@ values of its parameters are an argument of every call, so one object serves a w
 
 Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
 Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0; the
-state jumps to r_k(t, x), and the derivative gets the saltation matrix. What happens at the start:
-:func:`chilopod.flows.taylor.switching.await_events`. All of it is free of scales: multiply states, times or parameters
-by powers of ten, and the digits stay.
+state jumps to r_k(t, x), and the derivative gets the saltation matrix. Events at the start are described in
+:func:`chilopod.flows.taylor.switching.await_events`. Units do not matter: states, times or parameters multiplied by
+powers of ten give the same digits.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ Array = NDArray[np.float64]
 
 _MOST_WORK = 1e7
 _FEWEST_STEPS = 5000
-_MOST_CLOCKS = 8  # tables of 4096 rows, of as many values of the parameters
+_MOST_CLOCKS = 8  # tables of 4096 rows, each for one set of parameters
 _FEWEST_PER_THREAD = 16
 _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
-_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
-_COMMON = 20.0  # the usual difference of all entries, for those that agree by chance
-_NOTHING_BESIDE = 1e-6  # of the geometric mean of the largest in its row and in its column
+_OWN = 10.0  # factor on the difference of two independent errors for a bound on either
+_COMMON = 20.0  # factor on the usual difference of all entries, for those that agree by chance
+_NOTHING_BESIDE = 1e-6  # negligible entry, relative to the geometric mean of the largest in its row and column
 _SHAKE = 4.0 * 2.0**-53
-_UNDERFLOW = 1e-290  # numbers below have no full precision
+_UNDERFLOW = 1e-290  # limit below which numbers lose precision
 _NOTHING = np.empty((0, 0))
 
 
@@ -50,7 +50,7 @@ class Passage(NamedTuple):
 
     state: Array  # at the end, shape (n,)
     derivative: Array  # with respect to the state at the start, shape (n, n)
-    bound: Array  # bound on the error of each entry of `derivative`, shape (n, n); empty if it was not asked for
+    bound: Array  # bound on the error of each entry of `derivative`, shape (n, n); empty if not requested
     steps: int  # number of steps
 
 
@@ -60,19 +60,19 @@ class TaylorFlow:
     Parameters
     ----------
     tape
-        The right-hand side, with guards and resets.
+        Right-hand side with guards and resets.
     edges
-        Times from 0 to the period that no step may straddle; empty for none.
+        Times from 0 to the period that no step may straddle; may be empty.
     period
-        T of an explicit dependence on time; infinite if there is none.
+        Period T of an explicit dependence on time, else infinite.
     directions
         Directions of the events: 1, -1 or 0.
     tolerance
-        Truncation error of a step relative to the size of each state and entry of the derivative; never more exact
-        than round-off.
+        Truncation error of a step relative to the size of each state and entry of the derivative; at least
+        round-off.
     patience
-        Number of steps after which it is seen that the budget of steps will not suffice, as where the motion is stiff;
-        0 for none: then a motion that is slow only at first gets to its end.
+        Number of steps after which the flow ends if the budget of steps will not suffice, as for a stiff motion; 0
+        for no such test, which lets a motion that is slow only at first reach its end.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class TaylorFlow:
         n = tape.dimension
         self.tape, self.edges, self.period, self.patience = tape, np.array(edges), period, patience
         self._epsilon = max(tolerance, _LEAST_TOLERANCE)
-        self.order = max(8, math.ceil(-0.65 * math.log(self._epsilon)))  # about that of least work
+        self.order = max(8, math.ceil(-0.65 * math.log(self._epsilon)))  # near the order of least work
         self._shape = n, tape.parameters
         self._directions = np.array(directions, dtype=np.float64) if tape.switches.size else None
         self._shaken = 1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0))
@@ -96,7 +96,7 @@ class TaylorFlow:
 
     @functools.cached_property
     def most_steps(self) -> int:
-        """Budget of an integration: a few seconds."""
+        """Budget of steps of an integration: a few seconds."""
         return max(_FEWEST_STEPS, int(_MOST_WORK / (self.tape.program.shape[1] * (1 + self.tape.dimension))))
 
     def advance(
@@ -104,11 +104,10 @@ class TaylorFlow:
     ) -> Passage:
         """Carry one state from t0 to t1 >= t0, with its derivative unless ``derived`` is False.
 
-        The bound of the error is round-off and the last terms of each step, carried along by the steps' own
-        derivatives, and the difference to a second computation of another order, with other steps, at the start
-        and after every step off by several times round-off. Entries err alike relative to the first part, so that is
-        stretched to many times what is usual among them; an entry that passes through zero differs by more, and has
-        several times its own difference on top.
+        The error bound sums round-off and the last terms of each step, carried by the derivatives of the steps, and
+        adds the difference from a second computation of another order with other steps, disturbed at the start and
+        after every step by several times round-off. Relative to the first part, all entries differ alike, so that
+        part is scaled to many times the usual difference; several times its own difference is added for each entry.
 
         Raises
         ------
@@ -116,7 +115,7 @@ class TaylorFlow:
             If the motion does not reach t1: it diverges, slides, chatters, grazes, or takes too many steps.
         """
         n = self.tape.dimension
-        # Copies, because compiled code is compiled anew for arrays that are read-only.
+        # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
             derivative = np.eye(n) if derived else np.empty((n, 0))
@@ -127,7 +126,7 @@ class TaylorFlow:
         steps = self._run(x, (t0, t1), params, derivative, bound)
         self._run(other_x * self._shaken, (t0, t1), params, other, other=True)
         difference = np.abs(other - derivative)
-        # An entry that is zero but for round-off says nothing of how much the others differ.
+        # An entry that is zero within round-off gives no information on the others' differences.
         beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))
         known = (bound > _UNDERFLOW) & (bound > _NOTHING_BESIDE * beside)
         ratios = np.sort(difference[known] / bound[known])
@@ -138,8 +137,8 @@ class TaylorFlow:
     def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
         """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number).
 
-        The series of the directions themselves are carried, so that the work is that of their number, and no matrix of
-        shape (n, n) is made. Raises as :meth:`advance`.
+        The series of the directions are carried, so the work is proportional to their number, without any matrix of
+        shape (n, n). Raises the errors of :meth:`advance`.
         """
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         images = np.array(directions, dtype=np.float64, order="C")
@@ -171,13 +170,13 @@ class TaylorFlow:
         stepwise: bool = True,
         stop: Array | None = None,
     ) -> int:
-        """Carry state, derivative and bound over an interval in place; number of steps. The ``other`` of two
-        computations has another order and other steps."""
+        """Carry state, derivative and bound over an interval in place; return the number of steps. ``other`` selects
+        the second computation, of another order with other steps."""
         kernels = _compiled()
         stop = deadline.stop() if stop is None else stop
         n, parameters = self._shape
         if not (x.shape == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
-            # Compiled code would read beyond them.
+            # Compiled code would read out of bounds.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         report, steps = np.zeros(2), 0
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
@@ -192,7 +191,7 @@ class TaylorFlow:
         return steps
 
     def _clock_table(self, params: bytes) -> tuple[Array, float]:
-        """Functions of time on a grid over the period, the last of each the largest modulus, and the period."""
+        """Functions of time on a grid over the period, each with its largest modulus last, and the period."""
         tape = self.tape
         if tape.clocks.size == 0:
             return np.zeros((0, 0)), 1.0
@@ -204,7 +203,7 @@ class TaylorFlow:
 
 @functools.cache
 def _compiled() -> Any:
-    # numba takes half a second to import, and only who integrates needs it.
+    # numba takes half a second to import, and only integration needs it.
     from chilopod.flows.taylor import stepping
 
     return stepping

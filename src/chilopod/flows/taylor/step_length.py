@@ -1,4 +1,4 @@
-"""How long a step of a Taylor series may be (:mod:`.stepping`)."""
+"""Length of a step of a Taylor series (:mod:`.stepping`)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 from chilopod.compiled import fused_njit
 
 _UNDERFLOW = 1e-290
-"""Numbers below have no full precision: their round-off looks like a singularity."""
+"""Limit below which numbers lose precision: their round-off would look like a singularity."""
 _SAME = 3e-13
-"""Round-off in a pulse of a thousandth of the period; a narrower one costs a step at every point of the grid in it."""
+"""Round-off in a pulse of a thousandth of the period; a narrower one costs a step at each of its grid points."""
 
 
 @fused_njit(error_model="numpy")
@@ -23,10 +23,10 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
         first = 0
         while first < 3 and coefficients[first] == 0.0:
             first += 1
-        # What starts with a high power (the far end of a chain) is small within a step, and no matter of accuracy.
+        # A series that starts with a high power (the far end of a chain) is small within a step and does not matter.
         if first == 3:
             continue
-        # Newton's method for the logarithms, which are convex: from below after one round, in a few rounds.
+        # Newton's method for the logarithms, which are convex: it converges from below in a few rounds.
         best = 0.0
         while True:
             z = best if best > 0.0 else h
@@ -87,7 +87,7 @@ def agrees(tape: Any, clock: Any, series: Any, order: int, t: float, h: float, u
                     s = s * z + values[clocks[c], k]
                     size = size * z + abs(values[clocks[c], k])
                 value = table[c, row]
-                # Nothing but this part of the largest value may be passed over.
+                # Only this part of the largest value may be neglected.
                 if not abs(s - value) <= _SAME * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
                     before = (u - spacing) / unit
                     return before if before > 0.1 * z else 0.5 * min(h, z)

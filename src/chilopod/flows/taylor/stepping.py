@@ -1,7 +1,7 @@
 """The solution of dx/dt = f(t, x) over an interval, with its derivative, through switches and events, in compiled code.
 
-Steps are as long as the Taylor series allows: the last coefficients of every state, every entry of the derivative and
-every switching function are below the tolerance relative to the largest of its own, so that units do not matter
+Steps are as long as the Taylor series allows: the last coefficients of every state, entry of the derivative and
+switching function are below the tolerance relative to the largest of the same series, so that units do not matter
 (compare Jorba and Zou, *Experimental Mathematics* 14, 99, 2005). A step ends where a switching function leaves its
 branch. There the derivative is multiplied by the saltation matrix (Leine and Nijmeijer, *Dynamics and Bifurcations of
 Non-Smooth Mechanical Systems*, Springer 2004, ch. 7)
@@ -27,24 +27,24 @@ from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.series import expand, loaded
 
 _ROUNDING = 2.0**-53
-_FIRST = 0.37  # of the interval: the first step of the second of two computations is no longer
+_FIRST = 0.37  # longest first step of the second computation, relative to the interval
 _BLOCK = 64
 _AT_ONCE = 1e-13
-"""Smallest difference of two instants, relative to the time: an event nearer to the border of an interval is on it."""
+"""Smallest difference of two instants, relative to the time: an event nearer to an interval's border is on it."""
 
 
 class Control(NamedTuple):
-    """How an integration steps."""
+    """Step control of an integration."""
 
     epsilon: float  # truncation error of a step relative to the size of each state and entry of the derivative
     order: int  # order of the series
     most_steps: int  # budget of steps in an interval
-    # number of steps after which, and at every doubling, the budget has to suffice for the rest of the interval at the
-    # mean length of a step so far; 0 for never
+    # number of steps after which, and at every doubling, the budget must suffice for the rest of the interval at the
+    # mean length of a step so far; 0 for no such test
     patience: int
-    shake: float  # relative error made in every state after every step, and in the time before it: round-off, enlarged
-    # true if every step computes its own derivative, by which that so far is then multiplied; else it carries the
-    # columns of the derivative along, of which there may be any number: directions
+    shake: float  # relative disturbance of every state after every step, and of the time before it: enlarged round-off
+    # True if every step computes its own derivative, which multiplies the derivative so far; else a step carries the
+    # columns of the derivative, which may be any directions
     stepwise: bool
     stop: Any  # shape (1,); not zero once there is no more time
 
@@ -68,11 +68,11 @@ class _Block(NamedTuple):
 def _first_crossing(
     tape: Any, series: Any, order: int, h: float, remaining: float, soon: float, work: Any
 ) -> tuple[float, int, float]:
-    """When the first switch leaves its branch, which, and with which sign of the slope; number -1 if none does.
+    """Time, number and sign of the slope of the first switch that leaves its branch; number -1 if none does.
 
-    Of those within a time ``soon`` of each other, which only rounding tells apart, it is the first of the list. Events
-    of guards that know only time are left to the next interval where they happen so shortly before the ``remaining``
-    time is over.
+    Among switches within a time ``soon`` of each other, whose order is round-off, the first of the list counts. Events
+    of guards that depend on time only belong to the next interval if they happen that shortly before the end of the
+    ``remaining`` time.
     """
     switches, branches = tape.switches, series.branches
     found, crossing, direction = h, -1, 0.0
@@ -80,7 +80,7 @@ def _first_crossing(
         g = series.values[switches[1, s]]
         ends = 2 if switches[0, s] == ops.FLOOR else 1
         for end in range(ends):
-            # What stays positive on the branch: g, -g, g - floor or floor + 1 - g.
+            # The function that stays positive on the branch: g, -g, g - floor or floor + 1 - g.
             sign = (1.0 - 2.0 * end) if switches[0, s] == ops.FLOOR else branches[s]
             for k in range(order + 1):
                 work[k] = sign * g[k]
@@ -106,7 +106,7 @@ def _assign(matrix: Any, values: Any) -> None:
 def _absorb(block: Any, count: int, total: Any, bound: Any) -> None:
     """Multiply the derivative by the factors of a block of steps, and carry the bound of its error.
 
-    A step that errs by e_s contributes |P_s| e_s |D_s|, D_s what came before it and P_s what came after it.
+    A step with error e_s contributes |P_s| e_s |D_s|, with D_s the product before it and P_s the product after it.
     """
     n = total.shape[0]
     before = np.empty((count + 1, n, n))
@@ -124,7 +124,7 @@ def _absorb(block: Any, count: int, total: Any, bound: Any) -> None:
 
 @fused_njit(error_model="numpy", inline="always")
 def _multiply(block: Any, count: int, factor: Any, stepwise: bool, outcome: Any) -> int:
-    """Take a factor, the last of ``count`` + 1 in the block, into the derivative; returns how many are in the block."""
+    """Take a factor, the last of ``count`` + 1 in the block, into the derivative; return the number in the block."""
     if outcome.bound.shape[0] > 0:
         _assign(block.factors[count], factor)
         count += 1
@@ -138,7 +138,7 @@ def _multiply(block: Any, count: int, factor: Any, stepwise: bool, outcome: Any)
 
 @fused_njit(error_model="numpy", inline="always")
 def _expanded(tape: Any, motion: Any, control: Any, t: float, steps: int, unit: float) -> tuple[bool, float]:
-    """Expand the series of a step; whether it is finite, and the unit of time in which it is."""
+    """Expand the series of a step; return True if it is finite, and the unit of time in which it is."""
     n, order, switches = tape.layout[0], control.order, tape.switches
     values, tangents, columns = motion.series.values, motion.series.tangents, motion.seeds.shape[1]
     for _ in range(24):
@@ -161,7 +161,7 @@ def _expanded(tape: Any, motion: Any, control: Any, t: float, steps: int, unit: 
 
 @fused_njit(error_model="numpy", inline="always")
 def _step(tape: Any, motion: Any, control: Any, h: float, noise: int, factor: Any) -> int:
-    """Take a step: the state at its end, and the derivative along the seeds in ``factor``; returns the next noise."""
+    """Take a step: the state at its end, and the derivative along the seeds in ``factor``; return the next noise."""
     values, tangents, order = motion.series.values, motion.series.tangents, control.order
     for i in range(tape.layout[0]):
         s = 0.0
@@ -181,7 +181,7 @@ def _step(tape: Any, motion: Any, control: Any, h: float, noise: int, factor: An
 
 @fused_njit(error_model="numpy", inline="always")
 def _bound_step(tangents: Any, order: int, h: float, error: Any) -> None:
-    """Bound on the error of the derivative of a step: the round-off of its terms, and the last of them."""
+    """Bound on the error of the derivative of a step: round-off of its terms, and the last terms."""
     n, last = error.shape[0], h**order
     for i in range(n):
         for j in range(n):
@@ -206,12 +206,12 @@ def _enlarge_scales(tape: Any, motion: Any, order: int, h: float) -> None:
 def _chosen(
     tape: Any, directions: Any, clock: Any, motion: Any, control: Any, when: Any, steps: int, work: Any
 ) -> tuple[float, int, float]:
-    """The length of a step, and the switch at its end as of :func:`_first_crossing`; ``when`` has the time, its unit,
-    the units that remain, and those within which two instants are one."""
+    """Length of a step, and the switch at its end as in :func:`_first_crossing`; ``when`` has the time, its unit, the
+    units that remain, and the units within which two instants are equal."""
     t, unit, remaining, soon = when
     series, order = motion.series, control.order
     h = step_size(tape, series, motion.seeds.shape[1], order, remaining, control.epsilon)
-    if control.shake > 0.0 and steps == 1:  # no step is one of the other computation's, to round as that
+    if control.shake > 0.0 and steps == 1:  # no step equals one of the other computation and rounds alike
         h = min(h, _FIRST * remaining)
     elif h < remaining and h > 0.5 * remaining:
         h = 0.5 * remaining
@@ -227,8 +227,8 @@ def _chosen(
 
 @fused_njit(error_model="numpy", inline="always")
 def _spent(control: Any, steps: int, done: float, whole: float) -> int:
-    """DONE if there is time for a step within the budget, which has to last to the end of the interval, of which a part
-    is done."""
+    """DONE if the time and the budget allow another step; the budget must last to the end of the interval, of which a
+    part is done."""
     if control.stop[0] != 0.0:
         return TIME_OVER
     check = control.patience
@@ -249,14 +249,14 @@ def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: Any, control: Any, outcome: Any) -> int:
-    """Carry a state x, shape (n,), over an interval from the start to the end of a span in place; how it ends.
+    """Carry a state x, shape (n,), over an interval from the start to the end of a span in place; return the status.
 
     Parameters
     ----------
     directions
-        Directions of the events; None where the tape has no switches, and what goes through them is not compiled.
+        Directions of the events; None for a tape without switches, whose code is then not compiled.
     clock
-        Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
+        Functions of time on a grid over the period, each with its largest modulus last, and the period.
     """
     t0, t1 = span
     n, order, switches = tape.layout[0], control.order, tape.switches.shape[1]

@@ -1,4 +1,4 @@
-"""Branches of switches, and motions that go through a switch or an event."""
+"""Branches of switches, and motions through a switch or an event."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from chilopod.flows.carrying import DONE, GRAZES, SLIDES
 from chilopod.flows.tracing.series import FLOOR, GUARD, Series, branch_at, choose, expand, expand_values, values_at
 
 _ZERO = 1e-13
-"""A switching function this small, relative to what it was before, is zero."""
+"""Size of a switching function, relative to its earlier values, that counts as zero."""
 
 
 class Motion(NamedTuple):
-    """A state on its way, and its series there."""
+    """A state along a motion, and its series there."""
 
     x: Any  # state, shape (n,)
     seeds: Any  # directions of the tangents, shape (n, columns)
@@ -37,7 +37,7 @@ def start(tape: Any, motion: Any, t: float) -> None:
 
 @fused_njit(error_model="numpy")
 def settle(tape: Any, motion: Any, unit: float) -> int:
-    """Choose the branch of every switch at a state; where its function is zero, by where that goes."""
+    """Choose the branch of every switch at a state; where its function is zero, by the sign of its derivative."""
     switches = tape.switches
     values, branches, scales = motion.series.values, motion.series.branches, motion.scales
     choose(tape, motion.series)
@@ -56,7 +56,7 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
                 settled = False
         if settled:
             return DONE
-    # Changed twice: f points to the switching surface on both sides.
+    # The branch changed twice: f points to the switching surface on both sides.
     for s in range(switches.shape[1]):
         g = values[switches[1, s], 0]
         if switches[0, s] != GUARD and abs(g) <= _ZERO * scales[s]:
@@ -66,13 +66,13 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
 
 @fused_njit(error_model="numpy")
 def is_timed(tape: Any, s: int) -> bool:
-    """True if a switch is a guard that knows only time."""
+    """True if a switch is a guard that depends on time only."""
     return bool(tape.switches[0, s] == GUARD and tape.program[4, tape.switches[1, s]] == 0)
 
 
 @fused_njit(error_model="numpy")
 def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
-    """Choose anew the branches of the switches whose own functions jump where another one switches."""
+    """Update the branches of switches whose own functions jump with another switch."""
     program, terms, slopes, switches = tape.program, tape.terms, tape.slopes, tape.switches
     values, branches, scales = motion.series.values, motion.series.branches, motion.scales
     first = tape.layout[3]
@@ -88,7 +88,7 @@ def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
-    """Put the state where an event puts it, with what it makes of the tangents and of dx/dt; whether it moves."""
+    """Apply the reset of an event to the state, the tangents and dx/dt; return True if the state changes."""
     values, tangents = motion.series.values, motion.series.tangents
     moves = False
     for i in range(tape.layout[0]):
@@ -104,8 +104,8 @@ def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
 
 @fused_njit(error_model="numpy")
 def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any) -> int:
-    """Go through a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``; how it
-    ends."""
+    """Pass a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``; return the
+    status."""
     n, switches = tape.layout[0], tape.switches
     values, branches = motion.series.values, motion.series.branches
     g = switches[1, s]
@@ -156,12 +156,12 @@ def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, uni
 
 @fused_njit(error_model="numpy")
 def await_events(tape: Any, directions: Any, motion: Any, unit: float, soon: float, t: float) -> None:
-    """Set the guards that pass zero within a time ``soon`` of the start of an interval to before it, if the event is
+    """Set the guards that pass zero within a time ``soon`` of the start of an interval to before the event if it is
     still to come, else to after it.
 
-    That is so of guards that know only time: an event at the border of two intervals belongs to the second. A state on
-    a guard that moves as if to fire is one before the event if the event leaves it moving away (an impact); else, as
-    where legs change places, it may as well be the state after it, and is taken for that.
+    Events of guards that depend on time only are still to come: an event at the border of two intervals belongs to the
+    second. A state on a guard that is about to fire is before the event if the reset makes it move away (an impact);
+    else, as where legs change places, it counts as the state after the event.
     """
     switches, series, scales = tape.switches, motion.series, motion.scales
     for s in range(switches.shape[1]):

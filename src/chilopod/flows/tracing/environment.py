@@ -1,8 +1,8 @@
-"""Everything a Python function depends on besides its arguments: told apart by kind, and put back traced.
+"""Dependencies of a Python function besides its arguments: sorted by kind, and replaced by traced versions.
 
 The floats among a function's arguments, defaults, closure and globals become parameters of the tape; whole numbers,
-strings and the code itself are part of the key under which the tape is kept. So a family of lambdas over a parameter is
-traced once, and a changed global is not overlooked.
+strings and the code itself are part of the tape's cache key. So a family of lambdas over a parameter is traced once,
+and a changed global gives a new tape.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ _OUTSIDE = ("numpy", "scipy", "math", "builtins", "numba")
 
 
 class Opaque(Exception):
-    """Holds an object whose contents may change unnoticed: a tape cannot be kept for another time."""
+    """A function holds an object whose contents may change unnoticed, so its tape cannot be cached."""
 
 
 def python_function(value: Any) -> Any:
-    """The Python function behind a compiled one; the value itself if it is none."""
+    """The Python function behind a compiled one; any other value itself."""
     inner = getattr(value, "py_func", None)
     return inner if isinstance(inner, types.FunctionType) else value
 
@@ -47,12 +47,12 @@ def _names(code: types.CodeType) -> tuple[str, ...]:
 
 
 def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
-    """A hashable description of a value, and all floats in it appended to a list.
+    """A hashable description of a value; all its floats are appended to a list.
 
     Raises
     ------
     Opaque
-        If it holds objects of unknown kinds.
+        If the value holds objects of unknown kinds.
     """
     if isinstance(value, float | np.floating):  # np.float64 is a float
         floats.append(float(value))
@@ -97,7 +97,7 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
 
 def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> Any:
     """The value with its floats replaced by those of an iterator, in the order of :func:`describe`, and numpy and math
-    by versions that take traced numbers; with no iterator, floats stay."""
+    by versions for traced numbers; without an iterator, floats stay."""
     value = python_function(value)
     if isinstance(value, float | np.floating):
         return value if source is None else next(source)

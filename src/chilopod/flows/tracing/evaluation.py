@@ -1,5 +1,5 @@
-"""Values of a tape at many times and states at once, and its Taylor coefficients along curves: for checks and for
-equilibria, not for integration."""
+"""Values of a tape at many times and states, and its Taylor coefficients along curves, for checks and equilibria
+(not for integration)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 def evaluate(tape: Tape, nodes: Integers, t: Any, x: Any, params: Array) -> Array:
     """Values of some nodes, shape (nodes, ...), at times and states of shapes (...) and (n, ...), or one of either.
 
-    The nodes of resets have none.
+    Nodes of resets have no values.
     """
     from chilopod.flows.tracing import series  # numba takes half a second to import
 
-    # Copies, because compiled code is compiled anew for arrays that are read-only.
+    # Copies, because numba would compile again for read-only arrays.
     times, states = np.array(t, dtype=np.float64, ndmin=1), np.array(x, dtype=np.float64).reshape(len(x), -1)
     found = np.empty((nodes.size, max(times.size, states.shape[1])))
     series.sample(tape, np.array(params, dtype=np.float64), times, states, nodes, found)

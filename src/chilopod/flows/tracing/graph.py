@@ -1,4 +1,4 @@
-"""Operations under construction: common subexpressions shared, numbers folded, sums gathered."""
+"""Operations under construction, with shared subexpressions, folded numbers and gathered sums."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ _DERIVATIVES = {
     ops.EXP: ops.EXP,
     **{ops.SIN: ops.COS, ops.COS: ops.SIN, ops.SINH: ops.COSH, ops.COSH: ops.SINH},
 }
-"""Functions w of the same operand with c' = w a'; that of the cosine has a sign of its own."""
+"""Functions w of the same operand with c' = w a'; the cosine's has the other sign."""
 
 LEAVES = {ops.STATE: ops.MOVING, ops.TIME: ops.TIMED, ops.PARAMETER: ops.CONSTANT, ops.NUMBER: ops.CONSTANT}
 
 
 class Graph:
-    """Operations under construction; nodes are numbers, in the order in which they came."""
+    """Operations under construction; nodes are numbered in order of creation."""
 
     def __init__(self, dimension: int, parameters: int) -> None:
         self.nodes: list[Node] = []
@@ -60,11 +60,11 @@ class Graph:
 
     def number(self, value: float) -> int:
         """The node of a number."""
-        # The bits, because NaN equals nothing and 0.0 equals -0.0.
+        # The bits, because NaN does not equal itself and 0.0 equals -0.0.
         return self._new(ops.NUMBER, (int(np.float64(value).view(np.int64)),))
 
     def value(self, node: int) -> float | None:
-        """The value of a number node, None of any other."""
+        """The value of a number node; None for any other."""
         code, operands = self.nodes[node]
         return float(np.int64(operands[0]).view(np.float64)) if code == ops.NUMBER else None
 
@@ -137,7 +137,7 @@ class Graph:
             return self.linear([(a, b)])
         if a == b:
             return self._new(ops.SQUARE, (a,))
-        # Numbers in front of a factor go in front of the product, where they cost nothing.
+        # Numbers in front of a factor move to the front of the product, at no cost.
         for one, other in ((a, b), (b, a)):
             code, operands = self.nodes[one]
             if code == ops.LINEAR and len(operands) == 2 and self.depends[other] != ops.CONSTANT:
@@ -211,7 +211,7 @@ class Graph:
         if node in self.weights:
             return node
         one = self.number(1.0)
-        self.weights[node] = -1  # w may be made of the node itself
+        self.weights[node] = -1  # w may depend on the node itself
         if code in _DERIVATIVES:
             weight = self.function(_DERIVATIVES[code], a)
         elif code == ops.TAN:
@@ -266,7 +266,7 @@ class Graph:
         return self._new(ops.SELECT, (sign, above, below))
 
     def operands(self, node: int) -> list[int]:
-        """The nodes a node is computed from, weights included."""
+        """The operands of a node, weights included."""
         code, operands = self.nodes[node]
         return [] if code in LEAVES else list(operands)
 

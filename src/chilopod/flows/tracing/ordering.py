@@ -72,7 +72,7 @@ def _operands(graph: Graph, node: int, flat: Terms) -> list[int]:
 
 
 def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
-    """All nodes that some nodes need, in the order in which they came: every one after its operands."""
+    """All nodes that some nodes need, in order of creation: each after its operands."""
     seen: set[int] = set()
     ahead = list(roots)
     while ahead:
@@ -87,7 +87,7 @@ def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
 
 
 def _flattened(graph: Graph, roots: Sequence[int]) -> Terms:
-    """The terms of the sums, those of a sum that only one other uses taken into that one."""
+    """The terms of the sums; a sum that only one other sum uses is merged into it."""
     reached = _reached(graph, roots, {})
     uses = dict.fromkeys(reached, 0)
     for node in roots:
@@ -115,7 +115,7 @@ def _flattened(graph: Graph, roots: Sequence[int]) -> Terms:
 
 
 def _live(graph: Graph, roots: Sequence[int], every: Sequence[int], flat: Terms) -> set[int]:
-    """The nodes whose tangents are needed: not those that only serve as the w of a function."""
+    """The nodes whose tangents are needed; those used only as the w of a function need none."""
     surfaces = [graph.nodes[i][1][0] for i in every if graph.nodes[i][0] in (ops.STEP, ops.FLOOR)]
     ahead, live = [*roots, *surfaces], set[int]()
     while ahead:
@@ -136,7 +136,7 @@ def _linear_in_time(graph: Graph, every: Sequence[int], flat: Terms) -> set[int]
 
 
 def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
-    plain: set[int] = set()  # what a Taylor series sees from everywhere
+    plain: set[int] = set()  # functions that a Taylor series resolves everywhere
     linear = _linear_in_time(graph, every, flat)
     for node in every:
         code, operands = graph.nodes[node]
@@ -152,6 +152,6 @@ def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
                 simple = code in (ops.STEP, ops.FLOOR) and operands[0] in plain
             if simple:
                 plain.add(node)
-    # Sums and products of these show what they show, but drown a small tail in a large constant.
+    # Sums and products of these add no features, but a large constant may hide a small tail.
     combined = (ops.LINEAR, ops.PRODUCT, ops.SQUARE, ops.SELECT, ops.STEP, ops.FLOOR)
     return [i for i in every if graph.depends[i] == ops.TIMED and i not in plain and graph.nodes[i][0] not in combined]

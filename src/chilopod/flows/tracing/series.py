@@ -72,13 +72,13 @@ def values_at(
 ) -> None:
     """Coefficients 0 to ``order`` of the operations from ``start`` up to ``stop``, and of the states from ``slopes``.
 
-    Single arrays are its arguments, and all orders are one call: arrays are counted as they are handed over, which
-    takes as long as the arithmetic of a small system.
+    Its arguments are single arrays, and one call handles all orders: counting references to arrays takes as long as
+    the arithmetic of a small system.
     """
     for k in range(order + 1):
         for i in range(start, stop):
             code, a, b = program[0, i], program[1, i], program[2, i]
-            s, odd = 0.0, 0.0  # two sums at once do not wait for each other
+            s, odd = 0.0, 0.0  # two independent sums run in parallel
             if code == LINEAR:
                 for j in range(a, b):
                     s += values[terms[0, j], 0] * values[terms[1, j], k]
@@ -148,7 +148,7 @@ def _add(tangents: Any, i: int, k: int, a: int, at: int, factor: float) -> None:
 def tangents_at(
     program: Any, terms: Any, slopes: Any, start: int, stop: int, order: int, unit: float, values: Any, tangents: Any
 ) -> None:
-    """The same for the tangents, where they are needed; the values have to be there."""
+    """The same for the tangents that are needed, from values computed before."""
     nodes, orders, lanes = tangents.shape
     tangents = as_lanes(tangents.reshape(nodes, orders, lanes // HALF, HALF), HALF)
     for k in range(order + 1):
@@ -189,7 +189,7 @@ def tangents_at(
 
 @fused_njit(error_model="numpy")
 def loaded(tape: Any, params: Any, orders: int, directions: int, branches: Any) -> Any:
-    """Series with the numbers, the parameters and what depends on them only, and zeros for all that moves."""
+    """Series with the numbers, the parameters and their functions, and zeros for everything that moves."""
     n, parameters, first, stop, _, nodes = tape.layout
     values, lanes = np.zeros((nodes, orders)), -(-directions // HALF) * HALF
     for i in range(parameters):
@@ -219,8 +219,8 @@ def choose(tape: Any, series: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: Any) -> None:
-    """Values of some nodes at times and states, shapes (samples,), (n, samples) and (nodes, samples), the branches
-    chosen; of the times or states there may be one for all samples."""
+    """Values of some nodes at times and states, with their branches; shapes (samples,), (n, samples) and (nodes,
+    samples), where all samples may share one time or state."""
     series = loaded(tape, params, 1, 0, np.zeros(tape.switches.shape[1]))
     n, values = tape.layout[0], series.values
     for m in range(found.shape[1]):
@@ -234,7 +234,7 @@ def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: A
 
 @fused_njit(error_model="numpy")
 def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, jacobian: Any) -> bool:
-    """f and its jacobian in a state, all in units of the states, with the branches as they are; False if not finite."""
+    """f and its jacobian at a state, in units of the states, with the current branches; False if not finite."""
     program, terms, slopes, first, stop = tape.program, tape.terms, tape.slopes, tape.layout[3], tape.layout[4]
     values, tangents = series.values, series.tangents
     for i in range(x.size):
@@ -254,7 +254,7 @@ def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, j
 
 @fused_njit(error_model="numpy")
 def differentiate(tape: Any, params: Any, t: float, x: Any, slope: Any, jacobian: Any) -> None:
-    """f and its jacobian at a state, the branches chosen."""
+    """f and its jacobian at a state, with its branches."""
     series = loaded(tape, params, 1, x.size, np.zeros(tape.switches.shape[1]))
     for i in range(x.size):
         series.values[i, 0] = x[i]
@@ -284,7 +284,7 @@ def expand_values(tape: Any, order: int, stop: int, unit: float, series: Any) ->
     """Coefficients 0 to ``order`` of the states and of all operations up to ``stop``, in powers of the time since the
     start over ``unit``.
 
-    ``values[state, 0]`` and ``values[time, 0]`` have to be set.
+    ``values[state, 0]`` and ``values[time, 0]`` must be set.
     """
     values, first = series.values, tape.layout[3]
     values[tape.layout[0], 1] = unit
@@ -293,7 +293,7 @@ def expand_values(tape: Any, order: int, stop: int, unit: float, series: Any) ->
 
 @fused_njit(error_model="numpy", inline="always")
 def expand(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
-    """The same with the tangents; those of the states have to be set at order 0."""
+    """The same with the tangents; those of the states must be set at order 0."""
     expand_values(tape, order, stop, unit, series)
     if series.tangents.shape[2] > 0:
         program, terms, first = tape.program, tape.terms, tape.layout[3]

@@ -1,4 +1,4 @@
-"""A numpy, a math and builtins that take traced numbers, for functions under tracing."""
+"""Versions of numpy, math and builtins for traced numbers."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def _clip(value: Any, low: Any = None, high: Any = None, **_: Any) -> Any:
 
 def _where_arrays(condition: Any, *choices: Any) -> Any:
     if len(choices) != 2:
-        raise Untraceable("it asks where an array is not zero")
+        raise Untraceable("it needs the places where an array is not zero")
     return wrapped(np.frompyfunc(_where, 3, 1)(*(plain(as_traced(value)) for value in (condition, *choices))))
 
 
 def _solve(matrix: Any, right: Any) -> Any:
-    """Gaussian elimination; where the size of a pivot is not known, the one on the diagonal is taken."""
+    """Gaussian elimination; a pivot of unknown size is taken from the diagonal."""
     if not (_has_traced(matrix) or _has_traced(right)):
         return np.linalg.solve(matrix, right)
     a, b = plain(as_traced(matrix)).copy(), plain(as_traced(right)).copy()
@@ -68,7 +68,7 @@ def _solve(matrix: Any, right: Any) -> Any:
         rows = range(column, n)
         pivot = max(rows, key=lambda row: worth(a[row, column]))
         if any(isinstance(a[row, column], Traced) for row in rows):
-            # Which one is large enough is not known now: the one on the diagonal, as of every mass matrix.
+            # The largest pivot is unknown while tracing: the diagonal one is used, which suits mass matrices.
             pivot = column if worth(a[column, column]) != 0.0 else pivot
             if worth(a[pivot, column]) == 0.0:
                 pivot = next(row for row in rows if isinstance(a[row, column], Traced))
@@ -97,7 +97,7 @@ def _has_traced(value: Any) -> bool:
 
 
 def _array(value: Any, *args: Any, **options: Any) -> Any:
-    """Arrays of floats may be written into later; those of whole numbers are indices."""
+    """Traced copies of float arrays, which may be written into later; arrays of whole numbers are indices."""
     if _has_traced(value):
         return as_traced(value).copy()
     result = np.array(value, *args, **{key: part for key, part in options.items() if key != "like"})
@@ -171,11 +171,11 @@ _SAME_NAME = (
     *("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "expm1", "log1p", "log2", "log10", "exp2"),
     *("floor", "ceil", "trunc", "hypot", "copysign", "cbrt", "radians", "degrees"),
 )
-"""Functions that math and numpy call alike."""
+"""Functions with the same name in math and numpy."""
 
 
 def _instead() -> dict[int, Any]:
-    """Stand-ins for functions that take no traced numbers, by identity."""
+    """Stand-ins, by identity, for functions that do not accept traced numbers."""
     pairs: list[tuple[Any, Any]] = [
         (np.array, _array),
         (np.asarray, lambda value, *a, **o: value if isinstance(value, TracedArray) else _array(value, *a, **o)),
@@ -215,7 +215,7 @@ def _most(plain: Callable[..., Any], ufunc: np.ufunc) -> Callable[..., Any]:
 
 
 class Module:
-    """A module whose functions take traced numbers."""
+    """A module with functions for traced numbers."""
 
     def __init__(self, module: Any) -> None:
         self._module = module
@@ -229,7 +229,7 @@ _MODULES = {"numpy", "math", "numpy.linalg"}
 
 
 def stand_in(value: Any) -> Any:
-    """Stand-in of a module, function or class while tracing: mostly itself."""
+    """Stand-in of a module, function or class while tracing; most stand for themselves."""
     if getattr(value, "__name__", None) in _MODULES and isinstance(value, type(math)):
         return Module(value)
     return _INSTEAD.get(id(value), value)

@@ -6,8 +6,8 @@ Taylor coefficients obey a recurrence (Griewank and Walther, *Evaluating Derivat
 
 * ``LINEAR``: a sum of nodes with constant weights, ``PRODUCT``, ``SQUARE``, ``QUOTIENT``;
 * functions c = phi(a) with c' = w a', where w is another node of the tape: sin, cos, exp, ... ;
-* ``STEP`` (the sign of its operand) and ``FLOOR``, constant along a step of the integration and the only places where
-  a right-hand side or its derivatives may jump, and ``SELECT``, one of two nodes by a ``STEP``.
+* ``STEP`` (the sign of its operand) and ``FLOOR``, constant along a step of the integration and the only operations
+where a right-hand side or its derivatives may jump, and ``SELECT``, one of two nodes by a ``STEP``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STEP, FLOOR, SELECT = 8, 9, 10
 EXP, SIN, COS, TAN, SINH, COSH, TANH, LOG, SQRT, POWER, ATAN, ASIN = range(11, 23)
 
 GUARD = 23
-"""As a kind of switch: the guard of an event."""
+"""Kind of switch: the guard of an event."""
 
 CONSTANT, TIMED, MOVING = 0, 1, 2
 """Dependence of a node: on parameters only, on time too, or on the state."""
@@ -35,7 +35,7 @@ CONSTANT, TIMED, MOVING = 0, 1, 2
 class Tape(NamedTuple):
     """The operations that evaluate dx/dt = f(t, x), the guards g_k(t, x) and resets r_k(t, x) of its events.
 
-    Compiled code takes it as it is; its arrays are read-only.
+    Compiled code uses it directly; its arrays are read-only.
 
     Nodes are numbered: n states, time, parameters, numbers, then operations, each after its operands: those that depend
     on the parameters only, those of f and the guards, those of the resets.
@@ -54,8 +54,8 @@ class Tape(NamedTuple):
     # function, and for guards the number of the event, else the node of the switch
     switches: Integers
     resets: Integers  # nodes of the resets, shape (events, n)
-    # functions of time alone that are more than polynomials in t, cos(a t), sin(a t): these may hold pulses that a
-    # Taylor series does not see
+    # functions of time alone beyond polynomials in t, cos(a t), sin(a t): these may have pulses that a Taylor series
+    # misses
     clocks: Integers
 
     @property

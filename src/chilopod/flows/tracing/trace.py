@@ -1,4 +1,4 @@
-"""Tapes of right-hand sides: traced, verified, and kept."""
+"""Tapes of right-hand sides: traced, verified and cached."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _NEAR = 1e-13
 class Trace:
     """A tape and the values of its parameters for one function with its arguments."""
 
-    tape: Tape  # the operations, shared by all functions that differ in floats only
+    tape: Tape  # operations, shared by all functions that differ in floats only
     params: Array  # values of the parameters, shape (parameters,)
-    derived: dict[Any, Any]  # whatever follows from the tape alone, kept with it
+    derived: dict[Any, Any]  # cache of results that depend on the tape alone
 
 
 _Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], tuple[Tape, dict[Any, Any]]]]]
@@ -49,22 +49,22 @@ def trace(
     base: ArrayLike | None = None,
     events: Sequence[tuple[Callable[..., Any], Callable[..., ArrayLike] | None]] = (),
 ) -> Trace:
-    """Record what a right-hand side does, once for all values of the floats it depends on.
+    """Record the operations of a right-hand side, once for all values of its floats.
 
     Parameters
     ----------
     rhs, dimension, args
-        As of :func:`chilopod.stability.from_rhs`. Floats in ``args``, arrays of them, and those inside tuples and lists
-        are parameters of the tape.
+        Right-hand side as in :func:`chilopod.stability.from_rhs`. Floats in ``args``, alone or in arrays, tuples and
+        lists, are parameters of the tape.
     times, base
-        Between which times and around which state the tape is compared with the function.
+        Times between which, and state around which, the tape is compared with the function.
     events
-        Pairs of a guard g(t, x, *args) and a reset r(t, x, *args) -> state, None for none.
+        Pairs of a guard g(t, x, *args) and a reset r(t, x, *args) -> state, or None.
 
     Raises
     ------
     Untraceable
-        If it is no fixed sequence of known operations, or the tape and the function do not agree.
+        If it is not a fixed sequence of known operations, or the tape and the function do not agree.
     """
     functions = (rhs, *(part for event in events for part in event))
     floats: list[float] = []
@@ -106,7 +106,7 @@ def _traced(
     symbolic: bool,
     baked: tuple[int, ...],
 ) -> tuple[Tape, tuple[int, ...]]:
-    """Trace with all floats as parameters, then with those as numbers whose values turn out to be needed."""
+    """Trace with all floats as parameters, then with needed values as numbers."""
     everything = tuple(range(len(floats)))
     while True:
         graph = Graph(dimension, len(floats) - len(baked) if symbolic else 0)
@@ -123,7 +123,7 @@ def _traced(
             baked = everything
         except RecursionError:
             raise Untraceable("it is too deeply nested") from None
-        except Exception as error:  # whatever a user's function raises means the same
+        except Exception as error:  # any exception of a user's function means the same
             if not symbolic or baked == everything:
                 raise Untraceable(f"{type(error).__name__}: {error}") from None
             baked = everything
@@ -144,7 +144,7 @@ def _record(
         if count is not None and array.shape != (count,):
             raise Untraceable(f"returns the shape {array.shape}")
         if count is None and array.size != 1:
-            raise Untraceable("a guard is no number")
+            raise Untraceable("a guard must return one number")
         if len(graph.nodes) > _MOST_NODES:
             raise Untraceable("it takes too many operations")
         return [node_of(graph, value) for value in array.ravel()]
@@ -177,15 +177,15 @@ def _verify(
         near = evaluate(tape, tape.slopes, t * (1 + _NEAR), x, params * (1 - _NEAR))
         pairs.append((real, own, np.abs(near - own)))
     if not pairs:
-        raise Untraceable("it could not be evaluated at any state it was tried at")
+        raise Untraceable("it could not be evaluated at any state that was tried")
     real, own, rounding = (np.array(part) for part in zip(*pairs, strict=True))
     if real.shape != own.shape:
         raise Untraceable(f"returns the shape {real.shape[1:]}")
     both = np.isfinite(real) & np.isfinite(own)
     size_of = np.abs(np.where(both, real, 0.0)).max(axis=0)
-    # The order of sums is another: where the function is sensitive to that, as sin is of large numbers, so is this.
+    # The order of sums differs, which matters where the function is sensitive to it, as sin of large numbers.
     allowed = _AGREES * size_of + np.where(both, rounding, 0.0)
     if (np.abs(np.where(both, real - own, 0.0)) > allowed).any() or (
         np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
     ).any():
-        raise Untraceable("it gives other values when called again: it has a memory, or chance in it")
+        raise Untraceable("it gives other values when called again: it has memory or random numbers")

@@ -1,9 +1,8 @@
-"""Numbers and arrays that record what is done with them.
+"""Numbers and arrays that record operations.
 
 A function that is called with these records its operations in a :class:`chilopod.flows.tracing.graph.Graph`.
-Whatever needs the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`; where
-that value depends on the parameters only, :class:`Concrete`, and the function can be traced anew with those as plain
-numbers.
+A use of the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`; if the value
+depends on parameters only, :class:`Concrete`, and the function can be traced again with those as plain numbers.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from chilopod.flows.tracing.tape import CONSTANT
 
 
 class Untraceable(Exception):
-    """A right-hand side that is no fixed sequence of known operations; the message says what stands against it."""
+    """A right-hand side is not a fixed sequence of known operations; the message names the obstacle."""
 
 
 class Concrete(Exception):
-    """The value of an expression of these parameters alone is needed."""
+    """The value of an expression of the given parameters alone is needed."""
 
     def __init__(self, parameters: frozenset[int]) -> None:
         super().__init__()
@@ -47,7 +46,7 @@ class _Recording:
 
 
 class Traced(_Recording, np.lib.mixins.NDArrayOperatorsMixin):
-    """One number under tracing: a node of a graph. It is an array of no dimension."""
+    """One number under tracing: a node of a graph, and an array without dimensions."""
 
     __slots__ = ("graph", "node")
     ndim = 0
@@ -60,15 +59,15 @@ class Traced(_Recording, np.lib.mixins.NDArrayOperatorsMixin):
         self.graph = graph
         self.node = node
 
-    # Whoever asks for the value needs it.
+    # The caller needs the value.
 
     def _value(self, *_: Any) -> Any:
         if self.graph.depends[self.node] == CONSTANT:
             raise Concrete(self.graph.parameters_below(self.node))
-        raise Untraceable("it asks for the value of a number: a branch, an index, or a function of another library")
+        raise Untraceable("it needs the value of a number: a branch, an index, or a function of another library")
 
     __bool__ = __float__ = __int__ = __index__ = __complex__ = __hash__ = __round__ = _value
-    # Equal to nothing but itself: a test that spares the one state where a formula has a gap.
+    # Equal only to itself, for tests that exclude the one state where a formula has a gap.
     __eq__ = object.__eq__
     __ne__ = object.__ne__
 
@@ -117,10 +116,10 @@ def _scalar(name: str, build: Callable[..., int]) -> Callable[..., Any]:
 
 
 SCALAR: dict[str, Callable[..., Any]] = {name: _scalar(name, build) for name, build in BUILDS.items()}
-"""Functions of single numbers, which may be traced or not, by the name of their ufunc."""
+"""Functions of single numbers, traced or plain, by the name of their ufunc."""
 
 REPLACED: dict[Any, Callable[..., Any]] = {}
-"""Functions of numpy that have a version of their own for traced arrays (see :mod:`.standins`)."""
+"""Functions of numpy with a separate version for traced arrays (see :mod:`.standins`)."""
 
 
 class TracedArray(_Recording, np.ndarray[Any, np.dtype[Any]]):
@@ -158,7 +157,7 @@ class TracedArray(_Recording, np.ndarray[Any, np.dtype[Any]]):
 
 
 def as_traced(value: Any) -> Any:
-    """Anything like an array as one that may hold traced numbers."""
+    """An array-like as an array that may hold traced numbers."""
     if isinstance(value, TracedArray):
         return value
     if isinstance(value, Traced):
@@ -174,7 +173,7 @@ def plain(value: Any) -> Any:
 
 
 def wrapped(value: Any) -> Any:
-    """The reverse of :func:`plain`; an array of no dimension becomes the number in it."""
+    """The inverse of :func:`plain`; an array without dimensions becomes its number."""
     if isinstance(value, np.ndarray) and value.dtype == object:
         return value.view(TracedArray) if value.ndim else value[()]
     return value
@@ -191,7 +190,7 @@ def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[
     if options.pop("where", True) is not True:
         raise Untraceable(f"it calls numpy.{ufunc.__name__} with where=")
     if out is not None and isinstance(out[0], Traced):
-        out = None  # as of x += 1: the name stands for another number from now on
+        out = None  # as in x += 1: the name now refers to another number
     operands = [plain(value if isinstance(value, np.ndarray) else as_traced(value)) for value in inputs]
     if ufunc is np.matmul and method == "__call__":
         result = _matmul(operands[0], operands[1])

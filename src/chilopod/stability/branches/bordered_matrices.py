@@ -1,4 +1,4 @@
-"""The bordered matrix of a curve of periodic orbits: the space of states that it is solved in, and its tangent."""
+"""Bordered matrix of a curve of periodic orbits, its space of states and its tangent."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
-_UNCERTAIN = 1e-6  # singular value, relative to the largest, that counts as zero: as uncertain as a difference is
+_UNCERTAIN = 1e-6  # singular value, relative to the largest, that counts as zero: the error of a difference
 
 
 def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
-    """Projection onto the states with the spatial symmetries of an orbit, and of a ``mode`` along which a branch
-    leaves it if there is one, in units of the states' ``sizes``, shape (n, n); None if there are no symmetries.
+    """Projection onto the states with the spatial symmetries of an orbit, and of the ``mode`` of a leaving branch if
+    given, in units of the states' ``sizes``, shape (n, n); None without symmetries.
 
-    Among these its branch is regular where others leave it that break the symmetries (Golubitsky, Stewart & Schaeffer,
+    In this space the branch is regular where symmetry-breaking branches leave it (Golubitsky, Stewart & Schaeffer,
     *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
     """
     if system.symmetry is not None or not spatial_symmetries(system):
@@ -29,8 +29,8 @@ def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array 
 
 
 def within_space(space: Array | None, matrix: Array) -> Array:
-    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), within a space of states; across it that of
-    a contraction."""
+    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), restricted to a space of states, replaced
+    by a contraction across it."""
     if space is None:
         return matrix
     n = len(space)
@@ -42,9 +42,9 @@ def within_space(space: Array | None, matrix: Array) -> Array:
 
 
 def null_vector(bordered: Array) -> Array:
-    """Unit vector that all but the last row of a matrix map to zero, on the side of the last row.
+    """Unit null vector of all but the last row of a matrix, on the side of the last row.
 
-    At a branch point the matrix is singular, but for its errors; of its solutions the shortest strays least.
+    At a branch point the matrix is singular within its errors, and the shortest solution is used.
     """
     n = len(bordered) - 1
     if not np.isfinite(bordered).all():

@@ -1,9 +1,8 @@
-"""Branches of periodic orbits: pseudo-arclength continuation in one parameter, with what happens along the way.
+"""Branches of periodic orbits: pseudo-arclength continuation in one parameter, with their special points.
 
-A branch is a curve of pairs (orbit, parameter) with H(x, p) = x. It is followed by its arclength, so that folds are
-ordinary points of it (see :mod:`.curve`). Every step is looked into for what happens in it (see
-:mod:`.inspection`). A branch can be followed in pieces: what it ends with is all that the next step
-depends on.
+A branch is a curve of pairs (orbit, parameter) with H(x, p) = x. Its coordinate is the arclength, so folds are regular
+points (see :mod:`.curve`). Every step is searched for events (see :mod:`.inspection`). A branch can be followed in
+pieces: the next step depends only on its end.
 """
 
 from __future__ import annotations
@@ -44,13 +43,13 @@ __all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proce
 Array = NDArray[np.float64]
 
 LONGEST = 0.15
-"""Largest step along a curve by default, in units of the states' sizes and of the branch's scale."""
+"""Default largest step along a curve, in units of the states' sizes and of the branch's scale."""
 
 BUDGET = 200_000
-"""Flows that a branch may ask for by default."""
+"""Default budget of flows of a branch."""
 
-_STYLES = {True: "-", False: "--", None: ":"}  # of lines, by stability
-_NARROWEST = 1e-9  # width of an interval, relative to the values in it
+_STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
+_NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]
 
@@ -66,19 +65,19 @@ class Branch(Result):
     Attributes
     ----------
     points
-        Along the curve, special points among them.
+        Points along the curve, special points included.
     ending
-        Reason for which it ends.
+        Reason for its end.
     step
-        Along the curve, with which it goes on.
+        Next step along the curve.
     periods
-        Number of periods of the systems that its orbits take.
+        Number of the systems' periods in one period of its orbits.
     symmetric
-        True if it stays among the orbits with the systems' symmetry in time.
+        True if its orbits have the systems' symmetry in time.
     reason
         Reason for the loss of the curve; empty if it was not lost.
     remarks
-        Sentences on what could not be made out on the way.
+        Sentences on events that remained undecided.
     """
 
     points: tuple[BranchPoint, ...]
@@ -97,12 +96,12 @@ class Branch(Result):
 
     @property
     def sizes(self) -> Array:
-        """Sizes of the states along the curve, shape (n,): tangents have them in these units."""
+        """Sizes of the states along the curve, shape (n,), the units of tangents."""
         return self.units[:-1]
 
     @property
     def scale(self) -> float:
-        """Scale of the parameter along the curve: tangents have it in this unit."""
+        """Scale of the parameter along the curve, the unit of tangents."""
         return float(self.units[-1])
 
     @property
@@ -111,10 +110,9 @@ class Branch(Result):
         return tuple(point for point in self.points if point.special is not None)
 
     def _stretches(self) -> list[tuple[bool | None, int, int]]:
-        """Stretches that are stable, unstable or undecided, each with its first and last point; none goes round a
-        fold."""
+        """Stable, unstable and undecided stretches, each with its first and last point; a fold ends a stretch."""
         folds = itertools.accumulate(point.special is Kind.FOLD for point in self.points)
-        # At a special point a multiplier is critical: the points beside it decide.
+        # At a special point a multiplier is critical, so the points beside it decide.
         beside = [{each.stable for each in pair if each.special is None} for pair in itertools.pairwise(self.points)]
         verdicts = [told.pop() if len(told) == 1 else None for told in beside]
         found, first = [], 0
@@ -141,7 +139,7 @@ class Branch(Result):
         ]
 
     def _picture(self) -> str:
-        # The state that moves most, in its size along the curve, tells the branch from others.
+        # The state that changes most, relative to its size, distinguishes the branch from others.
         moved = np.ptp([point.orbit for point in self.points], axis=0) / self.sizes
         return picture(lambda axes: self.plot(axes, int(moved.argmax())), "branch of periodic orbits")
 
@@ -152,13 +150,13 @@ class Branch(Result):
         Parameters
         ----------
         axes
-            Axes of matplotlib; those of a new figure by default.
+            Axes of matplotlib; by default of a new figure.
         state
             Number of the state, from 0.
         """
         values, orbits = map(np.array, columns(self.points, "value", "orbit").values())
         if state not in range(orbits.shape[1]):
-            raise ParameterError("is no state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
+            raise ParameterError("must be a state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
         axes, color, state = axes_for(axes), None, int(state)
         for verdict, first, last in self._stretches():
             part = slice(first, last + 1)
@@ -169,8 +167,8 @@ class Branch(Result):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """The points as a dataset over ``point``, in their order along the curve; ``special`` is empty at ordinary
-        ones. Multipliers are those of the full period."""
+        """Dataset of the points over ``point``, in order along the curve; ``special`` is empty at ordinary points.
+        Multipliers belong to the full period."""
         verdicts = [VERDICTS[None if point.special else point.stable] for point in self.points]
         values = columns(self.points, "value", "special", "period", "orbit", "multipliers")
         about = columns((each.bifurcation for each in self.points), "error_bound", "criticality", "coefficient")
@@ -200,24 +198,24 @@ def follow(
     family
         ``family(value)`` is the system.
     start
-        From :func:`begin` or :func:`switch`; or a point of another branch; or an orbit, or a guess of one, at the lower
-        end of the interval.
+        Start from :func:`begin` or :func:`switch`, a point of another branch, or an orbit (or a guess) at the lower end
+        of the interval.
     between
-        Interval of the parameter; the branch ends where it reaches an end of it, and the family is asked for no value
-        outside. Its width becomes the branch's scale.
+        Interval of the parameter; the branch ends at an end of it, and the family is called for values inside only.
+        Its width becomes the branch's scale.
     points
-        Number of ordinary points after which the branch ends; by default it goes on to an end of the interval, or until
-        it is closed, lost, or has spent its budget.
+        Number of ordinary points after which the branch ends; by default it continues to an end of the interval, or
+        until it is closed, lost, or out of budget.
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
     closely
-        True to look at the multipliers at nine places within every step, a flow each; otherwise only where the ends
-        of a step tell that something happens.
+        True to compute the multipliers at nine places within every step, a flow each; otherwise only if the ends of
+        a step show an event.
     precision
-        Precision to which orbits are solved for, relative to the sizes of the states: as good as the flow is at best.
+        Precision of orbits relative to the sizes of the states, limited by the accuracy of the flow.
     symmetric
-        True to stay among the orbits that have the systems' symmetry in time. By default the full period is used
-        even where there is such a symmetry, for the orbits of interest have lost it.
+        True to follow orbits with the systems' symmetry in time. By default the full period is used, since the orbits
+        of interest have usually lost that symmetry.
     budget, seconds
         Number of flows, and time in s, after which the branch ends.
     progress
@@ -226,10 +224,10 @@ def follow(
     Raises
     ------
     ParameterError
-        If the interval is no interval, ``points`` is no positive whole number, or a step is not positive; or if
-        ``start`` is a bifurcation point, which :func:`switch` is for.
+        If the interval, ``points`` or a step is invalid, or ``start`` is a bifurcation point, which needs
+        :func:`switch`.
     AnalysisError
-        If there is no orbit to start with.
+        If no orbit is found at the start.
     """
     low, high = _checked(between, points, longest)
     if not step > 0:
@@ -257,35 +255,35 @@ def proceed(
     seconds: float = math.inf,
     progress: Progress = _silent,
 ) -> Branch:
-    """Follow a branch on from where it ends. In pieces it has the same points as in one; where the system has no period
-    of its own, points of the same curve, for the last section is taken anew.
+    """Continue a branch from its end. The points equal those of a single run; for a system without a period of its own
+    they are other points of the same curve, as the last section is rebuilt.
 
     Parameters
     ----------
     family, points, longest, closely, precision, budget, seconds, progress
-        As for :func:`follow`; ``points`` are those that are added.
+        Arguments of :func:`follow`; ``points`` counts the added ones.
     branch
-        From :func:`follow` or from here.
+        Branch from :func:`follow` or :func:`proceed`.
     between
-        Interval of the parameter, which may have become another one; the branch keeps its units.
+        Interval of the parameter, which may differ from the first; the branch keeps its units.
 
     Returns
     -------
-    The branch as it was with the new points behind.
+    The branch with the new points at its end.
 
     Raises
     ------
     ParameterError
-        As :func:`follow`, and if the branch leaves the interval where it ends.
+        As :func:`follow`, and if the branch ends at an end of the interval.
     """
     low, high = _checked(between, points, longest)
     if not isinstance(branch, Branch):
-        raise ParameterError("is no branch", field="branch", value=branch, allowed="what `follow` gives")
+        raise ParameterError("must be a branch", field="branch", value=branch, allowed="a Branch from `follow`")
     end = branch.points[-1]
     if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
         raise ParameterError(
-            "does not go on beyond the branch's last point", field="between", value=between,
-            allowed=f"{end.value!r} well within",
+            "must extend beyond the branch's last point", field="between", value=between,
+            allowed=f"an interval around {end.value!r}",
         )  # fmt: skip
     orbits: dict[str, Any] = {"periods": branch.periods, "symmetric": branch.symmetric, "precision": precision}
     allowed = Budget(budget, seconds)
@@ -293,7 +291,7 @@ def proceed(
     first = branch.points[0]
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None
-    # At a point where branches meet the matrix is singular, so it is taken a step ahead.
+    # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = branch.step if leaving else 0.0
     anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
     return _followed(curve, branch, anchor, points, longest, closely, progress)
@@ -304,7 +302,7 @@ def _checked(between: tuple[float, float], points: int | None, longest: float) -
     if not (np.isfinite(low) and np.isfinite(high) and low < high and np.isfinite(high - low)):
         raise ParameterError("must rise from a lower to a higher finite value", field="between", value=between)
     if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
-        raise ParameterError("is too narrow for the numbers in it", field="between", value=between)
+        raise ParameterError("is too narrow for double precision", field="between", value=between)
     if points is not None:
         checked_count("points", points, sys.maxsize)
     if not longest > 0:
@@ -315,16 +313,16 @@ def _checked(between: tuple[float, float], points: int | None, longest: float) -
 def _anchored(
     family: Family, curve: Curve, start: Start | BranchPoint | Orbit | ArrayLike, low: float, step: float
 ) -> Anchor:
-    """Where the first step starts; the curve gets the sizes of its states."""
+    """Anchor of the first step; the curve gets the sizes of its states."""
     if isinstance(start, BifurcationPoint):
         raise ParameterError(
-            "is a bifurcation point", field="start", value=start.kind.label, allowed="what switch(family, point) gives"
+            "is a bifurcation point", field="start", value=start.kind.label, allowed="a start from `switch`"
         )
     if not isinstance(start, Start | BranchPoint):
         guess = start.state if isinstance(start, Orbit) else start
         start = begin(family, low, guess, symmetric=curve.symmetric)
     if not curve.between[0] <= start.value <= curve.between[1]:
-        raise ParameterError("does not hold the start", field="between", value=curve.between, allowed=f"{start.value}")
+        raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
     if isinstance(start, Start):
         curve.periods = start.periods
         curve.sizes = branch_sizes(curve, start)

@@ -1,4 +1,4 @@
-"""Points along a branch of periodic orbits, and what steps from one of them need."""
+"""Points along a branch of periodic orbits, and anchors of steps."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class BranchPoint(ReadOnlyArrays):
     special
         Kind of the bifurcation here; None at ordinary points.
     units
-        Sizes of the states and scale of the parameter that the tangent is in, shape (n+1,); None: the states' own.
+        Sizes of the states and scale of the parameter, the units of the tangent, shape (n+1,); None: the states' own.
     period
-        The full period of the orbit; None where it was not asked for.
+        Full period of the orbit; None if not computed.
     error_bound
-        Bound on the absolute error of the multipliers that are not small (below 0.5, and below the largest): by the
-        error of the flow there, and by that of the orbit.
+        Bound on the absolute error of the multipliers that are not small (below 0.5, and below the largest), from the
+        errors of the flow and of the orbit.
     bifurcation
         Bifurcation point with bound, mode, multiplier and normal form; None at ordinary points.
     """
@@ -58,8 +58,8 @@ class BranchPoint(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """True if all multipliers lie inside the unit circle: True or False by more than the error bound, None where it
-        leaves that undecided, as at most special points."""
+        """True if all multipliers lie inside the unit circle by more than the error bound, False if one lies outside by
+        more, else None, as at most special points."""
         return stable_within(self.multipliers, self.error_bound)
 
 
@@ -68,14 +68,14 @@ class Anchor(ReadOnlyArrays):
     """A point from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
 
     last: BranchPoint  # the point
-    # Jacobian of [H - x; tangent . step] there with respect to state and parameter in units, shape (n+1, n+1).
+    # Jacobian of [H - x; tangent . step] with respect to state and parameter in units, shape (n+1, n+1).
     matrix: Array
-    before: Before | None = None  # the point before it, seen from here
-    # Section on which returns end during the step, for a system without a period of its own.
+    before: Before | None = None  # previous point in coordinates of this one
+    # Section of returns during the step, for a system without a period of its own.
     section: Section | None = None
     # Projection onto the states with the orbit's spatial symmetries, shape (n, n); None if there are none.
     space: Array | None = None
-    leaving: bool = False  # True if the point is one where branches meet: the matrix is then one taken ahead
+    leaving: bool = False  # True at a branch point: the matrix then belongs to a place ahead
     lengthening: float = 0.0  # relative change of the period along the curve
 
     @property
@@ -90,7 +90,7 @@ class Anchor(ReadOnlyArrays):
 
 
 class Returned(NamedTuple):
-    """A state and the value of the parameter; the return of the state, and that at a neighbouring value if known."""
+    """A state and the value of the parameter, the return of the state, and that at a neighbouring value if known."""
 
     x: Array
     value: float
@@ -99,8 +99,8 @@ class Returned(NamedTuple):
 
 
 class OnCurve(NamedTuple):
-    """An orbit on the curve: state, value of the parameter, return map on the section of the step's start, and by how
-    much its derivative is wrong, in units, beside its own error (infinite if nobody asked)."""
+    """An orbit on the curve: state, value of the parameter, return map on the section of the step's start, and the
+    error of its derivative, in units, due to the orbit (infinite if not computed)."""
 
     x: Array
     value: float

@@ -1,4 +1,4 @@
-"""Where branches start: at an orbit that is known, or at a point where others leave one."""
+"""Starts of branches: at a known orbit, or at a bifurcation point of another branch."""
 
 from __future__ import annotations
 
@@ -26,49 +26,49 @@ from chilopod.stability.problem.scales import sizes
 Array = NDArray[np.float64]
 
 IN_FOLD = 1e-6
-"""Part of a unit tangent along the parameter below which a curve starts in a fold, as closely as its start is known."""
+"""Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
 
 _MOST_PERIODS = 1000
-_RESTS = 0.01  # of each state: a guess that near an equilibrium, from which no orbit is found, is meant to be it
-_BESIDE = 1e-3  # in units: where second differences are taken
-_SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
-_BENT = 0.3  # of a change of state: by so much a map departs from its linear part at the size of a state
-_PARTS = 2.0**-8, 2.0**-4  # of a return
-_DECADES, _HALVINGS = 12, 12  # of the size, on its logarithm
+_RESTS = 0.01  # distance, relative to each state, within which a failed guess counts as an equilibrium
+_BESIDE = 1e-3  # step of second differences, in units
+_SINGULAR = 1e-9  # singular value, relative to the largest, below which another curve crosses
+_BENT = 0.3  # relative departure of a map from its linear part that defines the size of a state
+_PARTS = 2.0**-8, 2.0**-4  # fractions of a return
+_DECADES, _HALVINGS = 12, 12  # range and halvings of the search for the logarithm of a size
 
 _LEFT_BY_NONE = {
-    Kind.FOLD: "is a fold: the branch itself goes round it, with follow",
-    Kind.NEIMARK_SACKER: "is a Neimark-Sacker point: what leaves it is a torus, which is announced but not followed",
+    Kind.FOLD: "is a fold: `follow` passes it along the same branch",
+    Kind.NEIMARK_SACKER: "is a Neimark-Sacker point: a torus leaves it, which cannot be followed",
     Kind.KREIN_COLLISION: "is a Krein collision: no periodic orbits leave it",
 }
-"""Kinds of points that no branch is switched to from, and why."""
+"""Kinds of points without a branch to switch to, with the reason."""
 
 
 @dataclass(frozen=True)
 class Start(ReadOnlyArrays):
-    """Where a branch starts, and which way.
+    """Start of a branch, with its direction.
 
     Attributes
     ----------
     value, orbit
-        Parameter, and state on the orbit at time 0, shape (n,).
+        Value of the parameter, and state on the orbit at time 0, shape (n,).
     rising
         True if the parameter rises at first, along the curve through the orbit.
     mode
-        If not None: the direction of the state, shape (n,), in which the branch leaves; ``rising`` means nothing then.
+        Direction of the state, shape (n,), in which the branch leaves; ``rising`` is then unused. May be None.
     crossing
-        True if the branch that leaves has a direction of its own in the parameter as well (transcritical).
+        True if the leaving branch also has a component along the parameter (transcritical).
     old
-        The tangent of the branch that is left, shape (n+1,), in the states' and the parameter's own units, if known.
+        Tangent of the old branch, shape (n+1,), in the states' and the parameter's own units, if known.
     periods
-        Number of periods that its orbits take.
+        Number of the systems' periods in one period of its orbits.
     period
-        The full period of the orbit that is left, where the system does not depend on time.
+        Full period of the old orbit, if the system does not depend on time.
     bifurcation
-        The point that is left, if it is one.
+        Bifurcation point of the start, if any.
     outward
-        If not None: a direction of the state, shape (n,), with which the branch goes from an orbit of its own beside
-        the point that it leaves; ``rising`` then only says the same of the parameter.
+        Direction of the state, shape (n,), of a branch that starts at an orbit beside the bifurcation point;
+        ``rising`` is then the direction of the parameter. May be None.
     """
 
     value: float
@@ -102,11 +102,11 @@ def begin(
     value
         Value of the parameter.
     orbit
-        A state on the orbit or near it, shape (n,): the orbit is solved for. Not needed where the system knows it.
-    rising
-        The direction to start in.
-    periods, symmetric
-        As for :func:`chilopod.stability.follow`.
+        State on the orbit or near it, shape (n,), which is corrected. Not needed if the system knows its orbit.
+        rising
+        True to start towards rising parameters.
+        periods, symmetric
+        Arguments of :func:`chilopod.stability.follow`.
     seconds
         Time, s, after which the search for the orbit ends.
 
@@ -131,7 +131,7 @@ def begin(
 
 
 def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
-    """See that a guess of an orbit is no equilibrium, which is one often enough."""
+    """Check that a guess of an orbit is not an equilibrium, a frequent mistake."""
     if not is_autonomous(system):
         return
     x = np.asarray(guess, dtype=np.float64)
@@ -143,7 +143,7 @@ def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
         raise AnalysisError(
             "is an equilibrium, not an orbit",
             field="orbit",
-            allowed="a state on an orbit; of equilibria locate_hopf, then switch, find the cycles",
+            allowed="a state on an orbit; locate_hopf, then switch, find the cycles of an equilibrium",
         )
 
 
@@ -153,32 +153,32 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     Parameters
     ----------
     family
-        As it was given to :func:`chilopod.stability.locate` or :func:`chilopod.stability.follow`.
+        Family given to :func:`chilopod.stability.locate` or :func:`chilopod.stability.follow`.
     point
-        The located point, or a special point on a branch; or a Hopf point from :func:`chilopod.stability.locate_hopf`.
+        Located point, special point on a branch, or Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
-        Number of periods that the orbits of the branch take that is left.
+        Number of the systems' periods in one period of the old branch's orbits.
 
     Returns
     -------
-    Of a pitchfork two: along the critical mode and against it. Of a transcritical point and a branch point two: the two
-    directions of the other branch. Of a period doubling one: the two sides are the same orbits, a period later. Of a
-    Hopf point one, at a small cycle beside it, on the side where there are cycles, towards larger ones. Where there are
-    several critical modes, as a symmetry makes them, so many for each of ``point.modes``.
+    A pitchfork has two: along the critical mode and against it. A transcritical point and a branch point have two: the
+    directions of the other branch. A period doubling has one: its two sides are the same orbits, a period apart. A Hopf
+    point has one, at a small cycle on the side where cycles exist, towards larger ones. With several critical modes,
+    due to a symmetry, these numbers hold for each of ``point.modes``.
 
     Raises
     ------
     ParameterError
-        If nothing that can be followed leaves the point, or it is no special point.
+        If no branch that can be followed leaves the point, or it is not a special point.
     """
     old, periods = None, checked_count("periods", periods, _MOST_PERIODS)
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
-            raise ParameterError("is no special point", field="point", value=point.value)
+            raise ParameterError("must be a special point", field="point", value=point.value)
         old = None if point.units is None else point.tangent * point.units
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
-        raise ParameterError("is no located point", field="point", value=point, allowed="one that `locate` gives")
+        raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
     kind = point.kind
     if kind in _LEFT_BY_NONE:
         raise ParameterError(_LEFT_BY_NONE[kind], field="point", value=point.value)
@@ -196,8 +196,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
             Start(point.value, point.orbit, mode=mode, periods=2 * periods, period=twice, bifurcation=point)
             for mode in modes
         )
-    # Of several modes each has a branch of its own, and the equation for where two curves cross holds only where a
-    # symmetry tells them apart.
+    # With several modes each has its own branch, and the equation for a crossing of two curves holds only where a
+    # symmetry separates them.
     axial = point.symmetry is not None and bool(point.symmetry.branches)
     crossing = kind is not Kind.PITCHFORK and (len(modes) == 1 or axial)
     return tuple(
@@ -208,8 +208,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
 
 
 def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
-    """Sizes of the states along a branch, shape (n,): the system's own, or how far from the orbit its return map is no
-    longer linear, or what the interval makes of the orbit, with ratios that the orbit tells."""
+    """Sizes of the states along a branch, shape (n,): the system's own, or the distance from the orbit at which its
+    return map becomes nonlinear, or the orbit's change over the interval, with ratios from the orbit."""
     x, value = start.orbit, start.value
     system, section = curve.system(value), curve.section_at(x, value, start.period)
     given = given_scale(system)
@@ -218,13 +218,13 @@ def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
     found = _linear_within(curve, x, value, section)
     if not isinstance(start, Start) or start.outward is None:
         return found
-    # A small cycle tells nothing of those that it grows into, by the root of the parameter.
+    # A small cycle does not determine the sizes of later ones, which grow as the root of the parameter.
     grown = np.abs(start.outward) * math.sqrt(curve.scale)
     return found * max(1.0, float((grown / found).max()))
 
 
 def _linear_within(curve: Curve, x: Array, value: float, section: Section | None) -> Array:
-    """Sizes of the states, shape (n,), within which returns from an orbit are linear."""
+    """Sizes of the states, shape (n,), up to which returns near an orbit are linear."""
     system = curve.system(value)
     image = curve.image(x, value, section)
     base = sizes(system, x, image.period / image.returns)
@@ -243,7 +243,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
         return not float(np.abs((states - linear[0] - r * linear[1]) / base).max()) <= _BENT * r * reach
 
     def bent(r: float) -> bool:
-        # A map that contracts strongly forgets where it was taken: then the way there is bent, not its end.
+        # A strongly contracting map forgets its argument: the motion is then nonlinear, not its end.
         try:
             with np.errstate(all="ignore"):
                 there = x + r * direction
@@ -260,7 +260,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
         low, high = high, high * step
         if bent(high) is (step > 1.0):
             break
-    else:  # linear: as far as the interval takes the orbit
+    else:  # linear: the orbit's change over the interval
         n = x.size
         derivative = curve.parameter_derivative(x, value, section)
         slope = np.linalg.lstsq(np.eye(n) - image.jacobian * base / base[:, None], derivative / base)[0]
@@ -272,12 +272,12 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
 
 
 def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
-    """Where the first step of a branch starts, its matrix taken so far ``ahead`` if others start there too.
+    """Anchor of the first step of a branch; its matrix is computed ``ahead`` by a distance where branches meet.
 
     Raises
     ------
     AnalysisError
-        If the branch has no direction of its own there.
+        If the direction of the branch is not unique there.
     """
     section = curve.section_at(start.orbit, start.value, start.period)
     image = curve.image(start.orbit, start.value, section, with_error=True)
@@ -287,14 +287,14 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     matrix = curve.matrix(image.jacobian, derivative, np.zeros(n + 1))[:-1]
     if not np.isfinite(matrix).all():
         raise AnalysisError(
-            "the flow is not finite at values of the parameter beside it", field="start", allowed="another value"
+            "the flow is not finite at neighbouring values of the parameter", field="start", allowed="another value"
         )
     if start.mode is None:
         tangent = _along(matrix, start.rising)
         if start.outward is not None and float(tangent[:-1] @ (start.outward / units[:-1])) < 0.0:
             tangent = -tangent
     elif start.crossing:
-        # Where a symmetry makes several modes critical, it is a crossing of two among the orbits that have the mode's.
+        # With several critical modes by symmetry, two branches cross among the orbits with the mode's symmetry.
         space = symmetric_space(curve.system(start.value), start.orbit, units[:-1], start.mode / units[:-1])
         tangent = _other(curve, start, section, within_space(space, matrix))
     else:
@@ -313,22 +313,22 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
 
 
 def _along(matrix: Array, rising: bool) -> Array:
-    """Unit vector that a matrix, shape (n, n+1), maps to zero."""
+    """Unit null vector of a matrix, shape (n, n+1)."""
     _, values, rows = np.linalg.svd(matrix)
     if values[-1] <= _SINGULAR * max(1.0, float(values[0])):
         raise AnalysisError(
-            "branches meet here: the orbit alone does not tell which one to follow",
+            "branches meet here: the orbit alone does not determine one",
             field="start",
             allowed="another value, or switch from the located point",
         )
     tangent: Array = rows[-1]
-    # At a fold neither way rises: then along the largest part of the state.
+    # At a fold the parameter does not rise: the largest part of the state gives the direction.
     along = tangent[-1] if abs(tangent[-1]) > IN_FOLD else tangent[np.abs(tangent).argmax()]
     return tangent if bool(along > 0.0) is rising else -tangent
 
 
 def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -> Array:
-    """Tangent of the other of two curves that cross: of the algebraic branching equation (Keller 1977; Kuznetsov,
+    """Tangent of the second of two crossing curves, by the algebraic branching equation (Keller 1977; Kuznetsov,
     *Elements of Applied Bifurcation Theory*, section 10.2.3), with second differences of H."""
     n = start.orbit.size
     units = curve.units(n)
@@ -350,14 +350,14 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
     discriminant = b * b - a * c
     if not discriminant > 0.0:
         raise AnalysisError("no other branch crosses here", field="start", value=start.value)
-    # a s^2 + 2 b s t + c t^2 = 0, written so that nothing cancels
+    # a s^2 + 2 b s t + c t^2 = 0, written without cancellation
     q = b + np.copysign(np.sqrt(discriminant), b)
     found = [s * basis[0] + t * basis[1] for s, t in ((-q, a), (c, -q))]
     found = [each / np.linalg.norm(each) for each in found]
     old = _old_tangent(curve, start, units)
     if old is not None:
         other = min(found, key=lambda each: abs(float(each @ old)))
-    else:  # the one that is less of a function of the parameter
+    else:  # the tangent with the smaller part along the parameter
         other = min(found, key=lambda each: abs(float(each[-1])))
     assert start.mode is not None
     along = float(other[:-1] @ (start.mode / units[:-1]))
@@ -365,7 +365,7 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
 
 
 def _old_tangent(curve: Curve, start: Start, units: Array) -> Array | None:
-    """Unit tangent of the branch that is left, in units; None if nothing tells it."""
+    """Unit tangent of the old branch, in units; None if unknown."""
     if start.old is not None:
         old = start.old / units
         return np.asarray(old / np.linalg.norm(old))

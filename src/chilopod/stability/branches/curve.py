@@ -1,7 +1,7 @@
 """The curve of periodic orbits of a family: equations for the tracer.
 
-The curve is H(x, p) = x, in units: x in the sizes of the states, p in a scale. Of a system without a period of its own,
-every step has the section across the motion where it starts.
+The curve is H(x, p) = x, in units: x in the sizes of the states, p in a scale. For a system without a period of its
+own, every step uses the section across the motion at its start.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 PRECISION = 1e-12
-"""How closely orbits are solved for by default, of the sizes of the states; where the flow is not as good, as it is."""
+"""Default precision of orbits, relative to the sizes of the states; the accuracy of the flow limits it."""
 
-_CLEAR = 10.0  # times the difference of two computations: a residual that may be the flow's error
-_SMALLEST = 1e-3  # of the units: an orbit that is smaller is solved for no more closely
-_FEWEST_NODES, _MANY_NODES = 3, 6  # a return that magnifies less is as good in one; that magnifies more is none
-_SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen to differ by so much at most
-_SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
-_NOT_SMALL = 0.5  # modulus of a multiplier
-_PARTS = 64  # of a period, in which the states on an orbit are looked at
+_CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
+_SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
+_FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, and above which one fails
+_SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, relative to it
+_SHRUNK = 10.0  # motion, relative to the largest so far, that counts as shrunk, in cube roots of the precision
+_NOT_SMALL = 0.5  # modulus of a multiplier that is not small
+_PARTS = 64  # parts of a period at which states on an orbit are sampled
 _SAME_PERIOD = 1e-3  # relative difference of the periods of the same orbit
 
 
 class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
-    """The curve H(x, p) = x of a family, solved for to a precision relative to the sizes of the states."""
+    """The curve H(x, p) = x of a family, to a precision relative to the sizes of the states."""
 
-    first: BranchPoint  # of a curve that is followed
+    first: BranchPoint  # first point of the curve
 
     def __init__(
         self, family: Family, scale: float, sizes: Array | None = None, *, precision: float = PRECISION, **returns: Any
@@ -55,7 +55,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         super().__init__(family, scale, sizes, **returns)
         self.precision = precision
         self.box = np.array([self.between])
-        self._motion = 0.0  # the largest within a period so far
+        self._motion = 0.0  # largest motion within a period so far
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
@@ -76,10 +76,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def anchor(
         self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0, leaving: bool = False
     ) -> Anchor:
-        """The anchor of a point, its matrix taken so far ``ahead`` along the tangent."""
+        """The anchor of a point, with its matrix computed ``ahead`` by a distance along the tangent."""
         section = self.section_at(last.orbit, last.value, last.period)
         matrix = self._matrix_at(last, ahead, section)
-        # The matrix of a point where branches meet was not its own, so it tells nothing about the next one.
+        # The matrix of a branch point was computed ahead, so it gives no prediction.
         if before is None or before.special is not None:
             return self.anchored(last, matrix, section, leaving=leaving)
         return self.anchored(last, matrix, section, before, read_only(self._matrix_at(before, 0.0, section)))
@@ -93,7 +93,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         matrix_before: Array | None = None,
         leaving: bool = False,
     ) -> Anchor:
-        """The anchor of a point with its matrix, and the point before it with the matrix there."""
+        """The anchor of a point with its matrix, and the previous point with its matrix."""
         n = last.orbit.size
         space = symmetric_space(
             self.system(last.value), last.orbit, self.units(n)[:n], last.tangent[:n] if leaving else None
@@ -112,7 +112,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return Anchor(last, matrix, Before(back, tangent, matrix_before), section, space, leaving, lengthening)
 
     def parameters(self, anchor: Anchor) -> tuple[slice, Array]:
-        """Where the parameter stands among the coordinates, and its unit."""
+        """Index of the parameter among the coordinates, and its unit."""
         n = anchor.last.orbit.size
         return slice(n, n + 1), np.array([self.scale])
 
@@ -131,7 +131,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return float(np.abs(residual).max()) / max(_SMALLEST, self._relative_size(found.x))
 
     def met(self, anchor: Anchor, found: Returned, off: float, stalled: int, singular: bool) -> bool:
-        """True if an orbit is solved for: a residual that no longer falls is what the flow is good to."""
+        """True if the corrector has converged: a residual that no longer falls is the error of the flow."""
         if off <= self.precision:
             return True
         size = self._relative_size(found.x)
@@ -141,7 +141,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return residual <= _CLEAR * self.noise(found.x, found.value, anchor.section)
 
     def exact(self, anchor: Anchor, found: Returned, row: Array) -> Array | None:
-        """The matrix at an orbit, where the branch leaves another one."""
+        """The matrix at an orbit near a branch point."""
         if not anchor.leaving:
             return None
         jacobian = self.image(found.x, found.value, anchor.section).jacobian
@@ -149,9 +149,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return within_space(anchor.space, self.matrix(jacobian, derivative, row))
 
     def step(self, anchor: Anchor, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Anchor, OnCurve]:
-        """The orbit near a guess; by multiple shooting where a return magnifies so much that the guess is none, or that
-        rounding is magnified to more than an orbit is solved for. ``bounded``: with a bound on the error of the
-        multipliers at its end."""
+        """The orbit near a guess, by multiple shooting where a return magnifies errors of the guess, or rounding, above
+        the precision. ``bounded``: with a bound on the error of the multipliers at its end."""
         last, n, space = anchor.last, anchor.last.orbit.size, anchor.space
         self.steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
         timed = self._timed(anchor, float(np.linalg.norm(guess.moved)))
@@ -160,7 +159,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         if count >= _MANY_NODES:
             moved, x, value, image, derivative = self._shot(anchor, timed, plane, count)
             if bounded:
-                with contextlib.suppress(AnalysisError):  # over the whole return the flow may magnify too much
+                with contextlib.suppress(AnalysisError):  # the flow may magnify too much over the whole return
                     image = replace(image, error=self.image(x, value, timed.section, with_error=True).error)
         else:
             timed, solved = self._solved(anchor, timed, guess, plane, count)
@@ -182,8 +181,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _solved(
         self, anchor: Anchor, timed: Anchor, guess: Guess, plane: Plane, count: int
     ) -> tuple[Anchor, Corrected[Returned]]:
-        """The orbit near a guess, or near what multiple shooting finds where that leads nowhere; and the anchor with
-        the time that a return takes there."""
+        """The orbit near a guess, or where that fails near the result of multiple shooting; and the anchor with the
+        duration of a return there."""
         matrix = within_space(anchor.space, guess.matrix)
         try:
             return timed, self.corrected(timed, Guess(guess.moved, matrix), plane)
@@ -229,7 +228,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return (np.append(x, value) - start) / units, x, value, image, across @ found.by_value * self.scale
 
     def _inside(self, value: float) -> float:
-        """A value of the parameter that the family may be asked for; on the interval's end but for rounding, that."""
+        """A value of the parameter inside the interval; one within rounding of an end becomes that end."""
         inside = min(max(value, self.between[0]), self.between[1])
         if not abs(value - inside) <= self.precision * self.scale:
             raise OutsideBoxError(0, inside, value)
@@ -238,14 +237,14 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _wrong(
         self, anchor: Anchor, x: Array, image: ReturnMap, moved: Array, matrix: Array, off: float, weakest: float
     ) -> float:
-        """How far off the derivative at an orbit is because the orbit is: by ``off`` from the residual that is left,
-        and by ``weakest`` times the error of the flow."""
+        """Error of the derivative due to that of the orbit: ``off`` from the remaining residual, and ``weakest`` times
+        the error of the flow."""
         n = x.size
         # Units may be much larger than the orbit.
         reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
         length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(matrix[:n] - anchor.matrix[:n])) / length
-        # The flow's error, relative to what it may magnify, is a bound already.
+        # The flow's error relative to its magnification is a bound already.
         sizes = self.units(n)[:-1]
         error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
         flow = float(error.max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
@@ -257,7 +256,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         Raises
         ------
         AnalysisError
-            If the orbit shrinks into an equilibrium there.
+            If the orbit has shrunk into an equilibrium.
         """
         anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
@@ -274,7 +273,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             tangent[:-1] = along @ tangent[:-1]
             tangent /= np.linalg.norm(tangent)
             matrix[:-1] = along @ matrix[:-1]
-            # H - x on the new section: the motion itself is mapped to zero, not to its negative shadow.
+            # H - x on the new section: it maps the direction of the motion to zero.
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
         point = BranchPoint(value, x, values, tangent, units=self.units(x.size), period=image.period, error_bound=bound)
@@ -282,9 +281,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return replace(step, end=self.anchored(point, matrix, section, before, anchor.matrix))
 
     def _check_moving(self, section: Section, velocity: Array, found: OnCurve) -> None:
-        """See that an orbit has not shrunk into an equilibrium: past one come the same orbits again, half a period
-        later. Before it, a part f of the largest motion is a parameter f^2 away from the Hopf point, which the
-        precision leaves uncertain by its f-th part."""
+        """Check that an orbit has not shrunk into an equilibrium, beyond which the same orbits come again half a period
+        later. A fraction f of the largest motion lies at a distance f^2 in the parameter from the Hopf point, and the
+        precision leaves that uncertain by an f-th part."""
         motion = float(np.linalg.norm(velocity / self.units(velocity.size)[:-1])) * found.image.period
         self._motion = max(self._motion, motion)
         if float(section.normal @ velocity) > 0.0 and motion >= _SHRUNK * np.cbrt(self.precision) * self._motion:
@@ -295,7 +294,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         raise AnalysisError(
             "the orbit shrinks into an equilibrium: a Hopf point"
             if extent <= motion
-            else "the orbit nearly rests in its section, and the next step has no direction",
+            else "the motion nearly stops in the section, and the next step has no direction",
             field="orbit",
         )
 
@@ -309,14 +308,14 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return np.array(states)
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and the coordinates by which it is known again: any
-        state of its orbit will do where any is time 0."""
+        """Displacement of the first point, its tangent, and the coordinates that identify it: for a system that does
+        not depend on time, any state of its orbit counts."""
         moved = self.moved(anchor.last, self.first.orbit, self.first.value)
         seen = slice(None) if anchor.section is None else slice(moved.size - 1, None)
         return moved, self.first.tangent, seen
 
     def is_first(self, step: Step[Anchor, OnCurve]) -> bool:
-        """True if a state of the first orbit is on the orbit that a step ends in, where any is time 0."""
+        """True if a state of the first orbit is on the orbit at the end of a step, for any choice of time 0."""
         first, point = self.first, step.end.last
         if step.start.section is None:
             return True
@@ -327,12 +326,12 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
         share = np.clip(-(path[:-1] * chords).sum(axis=1) / lengths, 0.0, 1.0)
         distance = np.linalg.norm(path[:-1] + share[:, None] * chords, axis=1)
-        # Chords run inside the curve by an eighth of the square of the part, times its bend.
+        # A chord lies inside the curve by an eighth of its squared length times the curvature.
         return bool(distance.min() <= np.abs(np.diff(path, n=2, axis=0)).max())
 
     def multipliers(self, image: ReturnMap, wrong: float = 0.0) -> tuple[ComplexArray, float]:
         """Multipliers of the full period, by falling modulus, and a bound on the errors of those that are not small,
-        for a derivative that is wrong by so much, in units, beside its own error; infinite if no bound is wanted."""
+        for an additional error of the derivative, in units; infinite without a bound."""
         if not (np.isfinite(wrong) and np.isfinite(image.error).all()):
             return return_multipliers(image) ** image.returns, np.inf
         sizes = self.units(image.state.size)[:-1]
@@ -351,7 +350,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)
 
     def _timed(self, anchor: Anchor, ahead: float) -> Anchor:
-        """An anchor with the time of a return so far ahead, by those of the last two points."""
+        """An anchor with the duration of a return extrapolated from those of the last two points."""
         if anchor.section is None:
             return anchor
         longer = 1.0 + min(max(anchor.lengthening * ahead, -_SOONER), _LATER)
@@ -359,7 +358,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     def _matrix_at(self, last: BranchPoint, ahead: float, section: Section | None) -> Array:
         x = last.orbit + ahead * last.tangent[:-1] * self.units(last.orbit.size)[:-1]
-        # As at the end of a step, to the bit.
+        # Equal to the end of a step, to the bit.
         jacobian = self.image(x, last.value, section, with_error=True).jacobian
         derivative = self.parameter_derivative(x, last.value, section)
         return self.matrix(jacobian, derivative, last.tangent)

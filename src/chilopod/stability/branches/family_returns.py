@@ -1,4 +1,4 @@
-"""Returns of a family of systems over a parameter, in units, with their derivative by the parameter."""
+"""Returns of a family of systems, in units, with their derivative with respect to the parameter."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from chilopod.stability.problem.returns import (
 
 Array = NDArray[np.float64]
 
-_PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
-_STEEP = 10.0  # times as far, in units, the difference moves the return, about
-_RETRIES, _STEEPER = 1, 100.0  # with a smaller difference, and how much smaller where there is no return
-_KEPT = 8  # systems: making one may cost more than a flow
+_PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
+_STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink
+_RETRIES, _STEEPER = 1, 100.0  # number of retries without a return, and factor on the step of each
+_KEPT = 8  # cached systems: making one may cost more than a flow
 
 
 class FamilyReturns:
     """Return maps of the systems of a family, with the scale of the parameter and the sizes of the states along a curve
-    (None: their own units), of orbits that take a number of periods, or have the systems' symmetry in time.
+    (None: their own units), for orbits over a number of periods, or with the systems' symmetry in time.
 
     Where systems flow each (see :class:`chilopod.stability.FlowsEach`), the derivative with respect to the
-    parameter costs next to nothing on two cores. The family is asked for values of an interval at most.
+    parameter costs almost nothing on two cores. The family is called for values of the interval only.
     """
 
     def __init__(
@@ -58,17 +58,17 @@ class FamilyReturns:
         self.periods = periods
         self.symmetric = symmetric
         self.budget = Budget(math.inf) if budget is None else budget
-        self.steepness = 1.0  # of the return map over the parameter, in units
+        self.steepness = 1.0  # steepness of the return map over the parameter, in units
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
         self._each: dict[type, bool] = {}
         self._dimension = 0
 
     def system(self, value: float) -> SystemLike:
-        """System under study: over the full period, or as many as the orbits take."""
+        """System under study, over the periods of the orbits."""
         return self._systems(value)[1]
 
     def _systems(self, value: float) -> tuple[SystemLike, SystemLike]:
-        """The family's system, and what is studied of it."""
+        """The family's system and the system under study."""
         known = self._known.get(value)
         if known is None:
             with UserCode("family", value):
@@ -99,7 +99,7 @@ class FamilyReturns:
             return return_map(system, x, with_error, section)
 
     def section_at(self, x: Array, value: float, period: float | None) -> Section | None:
-        """Across the motion in a state, where returns need one; the full period is a guess of the system if None."""
+        """Section across the motion at a state, if returns need one; by default the system guesses the full period."""
         system = self.system(value)
         duration = None if period is None else period / returns_per_period(system)
         return section_at(system, x, self.sizes, duration)
@@ -110,7 +110,7 @@ class FamilyReturns:
         return self.difference(x, value, section, mapped, beside)
 
     def mapped(self, x: Array, value: float, section: Section | None) -> tuple[Array, Array | None]:
-        """H at a state, and at a neighbouring value of the parameter if that costs no time."""
+        """H at a state, and at a neighbouring value of the parameter if that is free."""
         self.budget.take()
         own, system = self._systems(value)
         with UserCode("flow", value):
@@ -129,7 +129,7 @@ class FamilyReturns:
             return returned_states(system, x[None], section)[0], None
 
     def noise(self, x: Array, value: float, section: Section | None) -> float:
-        """How far apart two computations of a return end, in units: what the flow's error leaves of a residual."""
+        """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
         image, system = self.image(x, value, section), self.system(value)
         duration, passing = image.period / image.returns, x[None]
         times = [part * duration for part in CUTS] + [duration]
@@ -139,20 +139,20 @@ class FamilyReturns:
         return float(np.abs((turned(system, passing)[0] - image.state) / self.units(x.size)[:-1]).max())
 
     def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
-        """True if a system flows each; asked once for each class, for the answer takes longer than some flows."""
+        """True if a system implements ``FlowsEach``; cached for each class, as the test is slower than some flows."""
         kind = type(system)
         if kind not in self._each:
             self._each[kind] = isinstance(system, FlowsEach)
         return self._each[kind]
 
     def _parameter_step(self, value: float, steepness: float) -> float:
-        """A small change of the parameter that stays within the interval, as the numbers are that differ by it."""
+        """A small exact change of the parameter that stays within the interval."""
         step = _PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP)
         step = max(step, 8.0 * float(np.spacing(abs(value))))
         return (value + step) - value if value + step <= self.between[1] else (value - step) - value
 
     def difference(self, x: Array, value: float, section: Section | None, mapped: Array, beside: Array | None) -> Array:
-        """dH/dp per scale, shape (n,), from H at a state, and at a neighbouring value where that is known."""
+        """dH/dp per scale, shape (n,), from H at a state, and at a neighbouring value if known."""
         units, steepness = self.units(x.size)[:-1], self.steepness
         for last in (*[False] * _RETRIES, True):
             step = self._parameter_step(value, steepness)
@@ -168,7 +168,7 @@ class FamilyReturns:
                 continue
             difference: Array = (beside - mapped) / (step / self.scale)
             found = float(np.abs(difference / units).max())
-            # A return that magnifies bends within less of the parameter.
+            # A return that magnifies needs a smaller step of the parameter.
             if last or not 2.0 * max(_STEEP, steepness) < found < np.inf:
                 break
             steepness, beside = found, None

@@ -1,4 +1,4 @@
-"""Folds: where an orbit that is followed through a parameter ends, because it meets another one and both vanish."""
+"""Folds: an orbit ends along the parameter where it meets another one and both vanish."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from chilopod.stability.tracing.ending import Ending
 Array = NDArray[np.float64]
 
 _STEPS = 40
-_FLOWS = 2000  # a step
-_STEP = 0.01  # along the curve, in units of the states' sizes and the parameter's scale
+_FLOWS = 2000  # budget of a step
+_STEP = 0.01  # step along the curve, in units of the states' sizes and the parameter's scale
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,10 @@ class Fold:
 
 
 def find_fold(family: Family, value: float, orbit: Array, scale: float, rising: bool = True) -> Fold | None:
-    """Follow an orbit, with the systems' symmetry in time, round the fold next to it; None if there is none.
+    """Follow an orbit, with the systems' symmetry in time, round the next fold; None without one.
 
-    The orbit must not be in the fold: a curve that starts there does not pass it. The fold is looked for as far away as
-    ``scale``, at higher values if ``rising``, else at lower ones.
+    The orbit must not be in the fold: a curve that starts there does not pass it. The search extends as far as
+    ``scale``, to higher values if ``rising``, else to lower ones.
     """
     between = value - scale, value + scale
     try:

@@ -1,13 +1,12 @@
 """Events within a step along a curve of periodic orbits.
 
-The return map is looked at in the ends of a step and at nine places in between. Where polynomials of degree eight
-through what vanishes at an event fit, and stay clear of zero, nothing happens; elsewhere the step is searched, on
-orbits that are solved for, for all crossings of the unit circle (:mod:`~chilopod.stability.unit_circle.crossings`).
-What is guaranteed is that of an interpolation: a course of the multipliers that the places show is followed however
-close its crossings lie; one that is confined between two places, which are a sixth of a step apart at most, is not
-seen.
+The return map is computed at the ends of a step and at nine places in between. If polynomials of degree eight through
+the test functions fit and stay clear of zero, the step has no event; else it is searched, on corrected orbits, for all
+crossings of the unit circle (:mod:`~chilopod.stability.unit_circle.crossings`).
+The guarantee is that of an interpolation: crossings that the places resolve are found however close they lie; an event
+confined between two places, which are at most a sixth of a step apart, is missed.
 
-A determinant that changes its sign where no branches meet tells of a step that landed on another curve.
+A determinant that changes its sign without a branch point shows that a step landed on another curve.
 """
 
 from __future__ import annotations
@@ -37,38 +36,38 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, dis
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_CLEAR = 4.0  # times what a polynomial is uncertain by
-_BUDGET = 400  # orbits that are solved for within one step
-_ERROR = 1e-10  # relative, of the return map's derivative at an orbit that was solved for
-_CLOSE = 1e-9  # of a step: how closely a point is located along the curve
-_BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, where branches meet
-_CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # of a step: how far beside a place its sides are told apart
-_SURE = 3.0  # times its error: so far from the circle a multiplier is on one side of it
-_COMPLEX = 1e-5  # imaginary part from which a multiplier on the circle is one of a pair
+_CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
+_BUDGET = 400  # corrected orbits within one step
+_ERROR = 1e-10  # relative error of the return map's derivative at a corrected orbit
+_CLOSE = 1e-9  # precision of a located point along the curve, relative to the step
+_BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a branch point
+_CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
+_SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
+_COMPLEX = 1e-5  # least imaginary part of a multiplier on the circle that belongs to a pair
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 
 @dataclass(frozen=True)
 class Found:
     """Events within a step: the special points in order, with an ordinary one between any two, and a sentence for each
-    thing that could not be made out."""
+    undecided event."""
 
     points: tuple[BranchPoint, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
 def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
-    """Find what happens within a step, between its ends even where these give no reason to if ``closely``.
+    """Find the events within a step; with ``closely`` also between ends that show none.
 
     Raises
     ------
     AnalysisError
-        If the step landed on another curve, or the curve cannot be solved for in between.
+        If the step landed on another curve, or the corrector fails in between.
     """
     within = Within(curve, step)
     leaving = step.start.leaving
     rising = float(step.start.tangent[-1])
-    # What starts at a fold does not find it again.
+    # A curve that starts at a fold does not find it again.
     turned = not leaving and abs(rising) > _CLOSE and rising * float(step.tangent[-1]) < 0.0
     flipped = not leaving and _sign(step.start.matrix) != _sign(step.matrix)
     crossed, single = (_crossed_within(within), None) if closely else _crossed_between_ends(within, turned)
@@ -82,7 +81,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event
         if (sure or (leaving and event is Event.PLUS)) and not _confirmed(within, place):
-            remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which is no event",)
+            remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which does not count",)
             continue
         point = special_point(within, place)
         if point is None:
@@ -92,7 +91,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     points: list[BranchPoint] = []
     last = np.inf
     for at, special in found:
-        if last < at:  # stability between two special points is that of an ordinary one
+        if last < at:  # an ordinary point gives the stability between two special ones
             points.append(within.ordinary(0.5 * (last + at)))
         points.append(special)
         last = at
@@ -100,11 +99,11 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
 
 
 def _confirmed(within: Within, place: Place) -> bool:
-    """True if what passes at a place is on the other side behind it, by more than the errors of the multipliers.
+    """True if the critical multiplier changes sides at a place by more than the errors of the multipliers.
 
-    Where two meet at +1 or -1 and leave along the circle, as without damping, either of them is on any side: that one
-    passed is told by the product of their distances. Beside a point where branches meet a multiplier is critical within
-    its error, and rounding makes it cross.
+    Two that meet at +1 or -1 and leave along the circle, as without damping, may be on any side: the product of their
+    distances shows a passage. Beside a branch point a multiplier is critical within its error, and rounding makes it
+    cross.
     """
     crossing = place.crossing
     if crossing.collision or crossing.change == 0:
@@ -122,8 +121,8 @@ def _confirmed(within: Within, place: Place) -> bool:
 
 
 def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
-    """On which side of the circle the critical multiplier is, and of a real one the sign of the product of all
-    distances from it; 0 each if the errors of multipliers and orbit do not tell."""
+    """Side of the circle of the critical multiplier and, for a real one, the sign of the product of all distances from
+    it; 0 for either that the errors of multipliers and orbit leave undecided."""
     curve, step, crossing = within.curve, within.at(at), place.crossing
     (here, value_here, returned, _), section = step.found, within.step.start.section
     units = curve.units(here.size)
@@ -142,7 +141,7 @@ def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
         return away, np.array([spec.error[index], spec.error @ others]), image
 
     away, error, image = off(here, value_here)
-    # The orbit is least sure in the direction in which the matrix is weakest: along it the margin is asked anew.
+    # The orbit is least certain in the weakest direction of the matrix: the margin is computed again along it.
     wrong = np.abs(image.state - here) + np.broadcast_to(image.error, returned.jacobian.shape) @ units[:-1]
     left, sizes, right = np.linalg.svd(step.matrix)
     if not sizes[-1] > 0.0:
@@ -154,7 +153,7 @@ def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
 
 
 def _places(within: Within, crossed: bool, single: Event | None, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
-    """Where something happens within a step, in order: multipliers cross the circle, or the curve turns."""
+    """Places of events within a step, in order: multipliers cross the circle, or the curve turns."""
     step = within.step
     remarks: tuple[str, ...] = ()
     places = []
@@ -168,7 +167,7 @@ def _places(within: Within, crossed: bool, single: Event | None, turned: bool) -
         places += [_placed(within, each, block) for each in found.crossings if each.value > _CLOSE * step.size]
     if turned and not any(place.fold or place.branching for place in places):
         fold = _fold(within, 0.0, step.size)
-        # Where branches meet the tangent is uncertain, and may seem to turn.
+        # At a branch point the tangent is uncertain, and may seem to turn.
         places.append(
             replace(fold, fold=False, branching=True) if _branches_meet(within.at(fold.crossing.value)) else fold
         )
@@ -187,7 +186,7 @@ def _placed(within: Within, crossing: Crossing, block: Block | None) -> Place:
 
 
 def _fold(within: Within, a: float, b: float) -> Place:
-    """Where the tangent has no part along the parameter; it changes its sign between two places."""
+    """Place where the tangent's component along the parameter vanishes; it changes sign between two places."""
 
     def along(place: float) -> float:
         return float((within.at(place) if place else within.step.start).tangent[-1])
@@ -197,7 +196,7 @@ def _fold(within: Within, a: float, b: float) -> Place:
 
 
 def _branches_meet(step: Step[Anchor, OnCurve]) -> bool:
-    """True if the curve is not the only one through the end of a step."""
+    """True if other curves pass through the end of a step."""
     return bool(np.linalg.svd(step.matrix[:-1], compute_uv=False)[-1] <= _BRANCHING)
 
 
@@ -229,7 +228,7 @@ def _tests(nu: ComplexArray) -> Array:
 
 
 def _crossed_within(within: Within) -> bool:
-    """False if polynomials through the test functions at the places stay clear of zero."""
+    """True unless polynomials through the test functions at the places stay clear of zero."""
     low, size = within.low, within.step.size
     places = low + 0.5 * (1.0 + PLACES) * (size - low)
     places[DEGREE] = size
@@ -243,8 +242,8 @@ def _crossed_within(within: Within) -> bool:
 
 
 def _crossed_between_ends(within: Within, turned: bool) -> tuple[bool, Event | None]:
-    """True if the multipliers at both ends of a step tell that some have crossed the circle; and the event, where it is
-    but one."""
+    """True if the multipliers at both ends of a step show a crossing of the circle; and the event, if it is a single
+    one."""
     start, end = (np.linalg.eigvals(within.jacobian(place)) for place in (0.0, within.step.size))
     if within.step.start.leaving:
         start, end = (np.delete(nu, int(np.abs(nu - 1.0).argmin())) for nu in (start, end))
@@ -257,8 +256,8 @@ def _crossed_between_ends(within: Within, turned: bool) -> tuple[bool, Event | N
 
 
 def _root(within: Within, event: Event) -> Crossing | None:
-    """Where one multiplier, or one pair, crosses within a step; None if the test function does not tell, as where two
-    real ones cross as one."""
+    """Place where one multiplier, or one pair, crosses within a step; None if the test function leaves it undecided, as
+    for two real ones that cross together."""
 
     def multipliers(place: float) -> ComplexArray:
         return np.linalg.eigvals(within.jacobian(place)).astype(np.complex128)

@@ -1,4 +1,4 @@
-"""Descriptions of special points on a branch: what happens there, and how sure its place is."""
+"""Descriptions of special points on a branch: kind, place and error bound."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event
 
 Array = NDArray[np.float64]
 
-_CRITICAL = 1e-5  # distance from the circle within which a multiplier is the critical one of a located point
-_BESIDE = 1e-3  # of a step: how far beside a point rates of change are taken
+_CRITICAL = 1e-5  # distance from the circle within which a multiplier is critical at a located point
+_BESIDE = 1e-3  # distance from a point at which rates of change are computed, relative to the step
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where something happens within a step: what passes the circle, with the way along the step's first tangent as its
-    value, in which block of the return map; whether the curve turns back there, and whether another one meets it."""
+    """Place of an event within a step: the crossing, with the distance along the step's first tangent as its value, its
+    block of the return map, and flags for a curve that turns back and for another curve that meets it."""
 
     crossing: Crossing
     block: Block | None = None
@@ -41,7 +41,7 @@ class Place:
 
 
 def special_point(within: Within, place: Place) -> BranchPoint | None:
-    """The special point at a place within a step; None if no multiplier is critical there after all."""
+    """The special point at a place within a step; None without a critical multiplier there."""
     curve, crossing, block = within.curve, place.crossing, place.block
     start, low, high = within.step.start.last, within.low, within.step.size
 
@@ -82,12 +82,12 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
 
 
 def _orbit(within: Within, point: BranchPoint, place: Place) -> Orbit:
-    """The orbit with its error bounds, where it is a simple solution."""
+    """The orbit with its error bounds, if it is a simple solution."""
     curve, x = within.curve, point.orbit
     system = curve.system(point.value)
     section = curve.section_at(x, point.value, point.period)
     if place.block is not None and not place.block.trivial:
-        # Solved for where H - 1 is singular it may have strayed along a mode that has not its symmetry.
+        # Where H - 1 is singular the corrected orbit may have moved along a mode without its symmetry.
         trivial = (block for block in within.blocks if block is not None and block.trivial)
         x = sum((block.basis @ (block.dual @ x) for block in trivial), 0.0 * x)
     if not place.fold:
@@ -101,8 +101,8 @@ def _orbit(within: Within, point: BranchPoint, place: Place) -> Orbit:
 
 
 def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -> float:
-    """Bound on the error of the parameter: that of the place, times the parameter's rate of change; at a fold, where
-    the parameter rests, that of the orbit's equation."""
+    """Bound on the error of the parameter: that of the place times the parameter's rate of change; at a fold, where
+    that rate vanishes, from the orbit's equation."""
     curve, low, high, at = within.curve, within.low, within.step.size, within.at
     beside = _BESIDE * (high - low)
     middle = min(max(place.crossing.value, low + beside), high - beside)
@@ -116,7 +116,7 @@ def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -
 
 
 def _fold_error(curve: Curve, here: Step[Anchor, OnCurve], image: ReturnMap) -> float:
-    """left . (H - x) = 0 fixes the parameter at a fold to first order; x itself enters in second order only."""
+    """Error of the parameter at a fold, from left . (H - x) = 0: to first order x does not enter."""
     x = here.found.x
     sizes = curve.units(x.size)[:-1]
     matrix = here.matrix[:-1]
@@ -130,7 +130,7 @@ def _fold_error(curve: Curve, here: Step[Anchor, OnCurve], image: ReturnMap) -> 
 def _form(
     curve: Curve, point: BranchPoint, orbit: Orbit, critical: CriticalOrbit, uncertainty: float
 ) -> NormalForm | None:
-    """The normal form; None where the map cannot be evaluated as it would take."""
+    """The normal form; None where the map cannot be evaluated."""
     system = curve.system(point.value)
 
     def mapped(states: Array) -> Array:

@@ -20,15 +20,15 @@ from chilopod.stability.tracing.tracer import Parts
 Array = NDArray[np.float64]
 
 SAME_ORBIT = 1e-6
-"""Distance between states of one orbit, of the sizes of the states."""
+"""Distance between states of one orbit, relative to the sizes of the states."""
 
-_OFF = 1e-5  # of a step: an orbit that the cubic misses by more is solved for
-_LEAVING = 0.05  # of a step off a point where branches meet, where the search begins
-_SIDE = 1e-3  # of a step: how far beside a crossing the curve's sides are looked at
+_OFF = 1e-5  # error of the cubic, relative to the step, above which an orbit is corrected
+_LEAVING = 0.05  # distance from a branch point at which the search begins, relative to the step
+_SIDE = 1e-3  # distance from a crossing at which the curve's sides are compared, relative to the step
 
 
 class Within(Parts[Anchor, OnCurve, Returned]):
-    """Orbits within a step, each solved for once."""
+    """Orbits within a step, each corrected once."""
 
     def __init__(self, curve: Curve, step: Step[Anchor, OnCurve]) -> None:
         super().__init__(curve, step)
@@ -37,16 +37,16 @@ class Within(Parts[Anchor, OnCurve, Returned]):
 
     @functools.cached_property
     def blocks(self) -> Blocks:
-        """Blocks of the return map along the step, as the spatial symmetries of its last orbit make them."""
+        """Blocks of the return map along the step, from the spatial symmetries of its last orbit."""
         curve, last = self.curve, self.step.end.last
         section = curve.section_at(last.orbit, last.value, last.period)
         image = curve.image(last.orbit, last.value, section, with_error=True)
-        # On a branch orbits are not solved for to the last digit.
+        # On a branch orbits are not corrected to the last digit.
         orbit = Orbit(last.orbit, image, SAME_ORBIT * curve.units(last.orbit.size)[:-1])
         return orbit_blocks(curve.system(last.value), orbit)[0]
 
     def sides(self, place: float) -> tuple[Step[Anchor, OnCurve], Step[Anchor, OnCurve]]:
-        """Parts of the step that end a little before and a little after a place."""
+        """Parts of the step that end just before and just after a place."""
         beside = _SIDE * self.step.size
         return self.at(max(place - beside, self.low)), self.at(min(place + beside, self.step.size))
 
@@ -59,7 +59,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
 
     def near_jacobian(self, place: float) -> Array:
-        """The same, on the cubic through the ends of the step where that is close enough."""
+        """The same, on the cubic through the ends of the step if that is close enough."""
         step, start = self.step, self.step.start
         if place in (0.0, step.size):
             return self.jacobian(place)
@@ -71,7 +71,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
             off = np.append((image.state - x) / self.curve.units(x.size)[:-1], 0.0)
             if float(np.abs(np.linalg.solve(matrix, off)).max()) <= _OFF * step.size:
                 return image.jacobian
-        except (AnalysisError, np.linalg.LinAlgError):  # a return may magnify what the cubic misses
+        except (AnalysisError, np.linalg.LinAlgError):  # a return may magnify the error of the cubic
             pass
         exact = self.at(place)
         if not float(np.linalg.norm(exact.moved - moved)) <= AWAY * step.size:

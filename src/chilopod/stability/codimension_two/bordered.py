@@ -1,6 +1,6 @@
 """The equations of a curve of critical periodic orbits in two parameters.
 
-Unknown are the state x, the two parameters and, where a pair of multipliers is critical, its cosine kappa = cos theta.
+Unknowns are the state x, the two parameters and, for a critical pair of multipliers, its cosine kappa = cos theta.
 The equations are H(x) = x for the return map H and, for a multiplier nu = +1 or -1, g = 0 with g from
 
     [[H' - nu, b], [c^T, 0]] (v, g) = (0, 1),
@@ -8,11 +8,11 @@ The equations are H(x) = x for the return map H and, for a multiplier nu = +1 or
 which vanishes with det(H' - nu) but is as smooth as H' and well scaled (Govaerts, *Numerical Methods for Bifurcations
 of Dynamical Equilibria*, SIAM 2000, ch. 4). For a pair, H'^2 - 2 kappa H' + 1 is bordered twice and G = 0 is a matrix
 of shape (2, 2) (ch. 5; Kuznetsov, *Elements of Applied Bifurcation Theory*, section 10.3). On the critical plane
-H'^2 - 2 kappa H' + 1 = (trace - 2 kappa) H' + (1 - det), so G has but two independent entries, and these two factors
-are what is solved for: regular also where the pair meets at +1 or -1.
+H'^2 - 2 kappa H' + 1 = (trace - 2 kappa) H' + (1 - det), so G has only two independent entries, and these two factors
+are the equations: regular also where the pair meets at +1 or -1.
 
-Where the systems know their orbit, x is no unknown; where the orbit has a spatial symmetry, x varies among the states
-that have it. H - 1 is then regular also on a curve of pitchforks.
+If the systems know their orbit, x is not an unknown; if the orbit has a spatial symmetry, x varies among the states
+with that symmetry. H - 1 is then regular also on a curve of pitchforks.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ Array = NDArray[np.float64]
 Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
 
-_STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's method converges, not where to
-_STALLED = 3  # corrections that have not halved a small residual: Broyden's method may rest that long
+_STEP = 1e-6  # step of differences, in units of the frame: it affects only the speed of Newton's method
+_STALLED = 3  # corrections that did not halve a small residual, as Broyden's method may stall that long
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Place(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Frame(ReadOnlyArrays):
-    """Units and borders that the equations are written in; adapted from point to point of a curve.
+    """Units and borders of the equations; adapted from point to point of a curve.
 
-    With m directions that the orbit may move in (none if it is known) and k = 1 critical multiplier or k = 2:
+    With m directions of the orbit (0 if it is known) and k = 1 or 2 critical multipliers:
     """
 
     size: Array  # size of the states, shape (n,)
@@ -65,17 +65,17 @@ class Frame(ReadOnlyArrays):
     basis: Array  # orthonormal directions, in units of ``size``, shape (n, m)
     column: Array  # borders b and c, shape (n, k)
     row: Array
-    mixture: Array  # makes the k equations of the entries of G, shape (k, k * k)
-    section: Section | None  # section on which a return ends, for a system that does not depend on time
+    mixture: Array  # combines the entries of G to the k equations, shape (k, k * k)
+    section: Section | None  # section of returns, for a system that does not depend on time
 
     def between(self, start: Place, end: Place) -> Array:
-        """Coordinates of one place seen from another: state, parameters, and cosine where there is one."""
+        """Coordinates of one place relative to another: state, parameters and, for a pair, cosine."""
         moved = self.basis.T @ ((end.state - start.state) / self.size)
         turned = [end.cosine - start.cosine] if self.column.shape[1] == 2 else []
         return np.concatenate([moved, (end.values - start.values) / self.widths, turned])
 
     def moved(self, start: Place, step: Array) -> Place:
-        """The place that far from another; the inverse of :meth:`between`."""
+        """The place at a displacement from another; the inverse of :meth:`between`."""
         m = self.basis.shape[1]
         turned = float(step[m + 2]) if self.column.shape[1] == 2 else 0.0
         return Place(
@@ -85,14 +85,14 @@ class Frame(ReadOnlyArrays):
         )
 
     def carried(self, direction: Array, other: Frame) -> Array:
-        """A direction given by its coordinates in another frame of the same curve, in those of this one."""
+        """A direction in the coordinates of this frame, from those in another frame of the same curve."""
         m = other.basis.shape[1]
         state = other.size * (other.basis @ direction[:m]) / self.size
         return np.concatenate([self.basis.T @ state, direction[m:]])
 
     @property
     def parameters(self) -> slice:
-        """Where the parameters stand among the coordinates."""
+        """Indices of the parameters among the coordinates."""
         m = self.basis.shape[1]
         return slice(m, m + 2)
 
@@ -114,16 +114,16 @@ class Evaluated(ReadOnlyArrays):
 class Spot(ReadOnlyArrays):
     """A point of a curve from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
 
-    at: Evaluated  # the equations there, and the frame they are written in, adapted to this point
+    at: Evaluated  # equations there, in a frame adapted to this point
     frame: Frame
     matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
     tangent: Array  # unit tangent, shape (m + k + 1,)
     uncertainty: Array  # bounds on the errors of the left sides of the equations, shape (m + k,)
-    before: Before | None = None  # the point before it, seen from here
+    before: Before | None = None  # previous point in coordinates of this one
 
     @property
     def place(self) -> Place:
-        """Where it is."""
+        """Place of the point."""
         return self.at.place
 
     @property
@@ -133,20 +133,20 @@ class Spot(ReadOnlyArrays):
 
     @property
     def shift(self) -> Array:
-        """How far every coordinate may be off, at right angles to the curve, shape (m + k + 1,)."""
+        """Bounds on the errors of the coordinates, at right angles to the curve, shape (m + k + 1,)."""
         return np.asarray(np.abs(np.linalg.pinv(self.matrix[:-1])) @ self.uncertainty)
 
     def towards(self, sign: float) -> Spot:
-        """The same point, with its tangent if the sign is positive, else against it."""
+        """The same point, with its tangent multiplied by the sign."""
         tangent = sign * self.tangent
         return replace(self, tangent=tangent, matrix=np.vstack([self.matrix[:-1], tangent]))
 
 
 class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
-    """The curve along which a multiplier ``target``, +1 or -1, or a pair (0) is critical, of orbits that are no unknown
-    if they are ``known``. Widths of the box are the parameters' units."""
+    """The curve along which a multiplier ``target``, +1 or -1, or a pair (0) is critical; ``known`` orbits are not
+    unknowns. Widths of the box are the parameters' units."""
 
-    first: Spot  # of a curve that is followed
+    first: Spot  # first point of the curve
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
         self._family2 = family2
@@ -176,13 +176,13 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         except AnalysisError as error:
             if error.field != "step":
                 raise
-            allowed = "a point that was located in this family at `second`"
+            allowed = "a point located in this family at `second`"
             raise AnalysisError("the curve was not found", field="start", allowed=allowed) from error
         return self.spot(found.place, anchor.frame, None)
 
     def _nearest(self, anchor: Spot) -> Evaluated:
-        """The equations at the point of the curve nearest to a spot that is not on it; on an edge of the box if it is
-        not within."""
+        """The equations at the point of the curve nearest to a spot beside it; on an edge of the box if the point lies
+        outside."""
         try:
             return self.along(anchor, 0.0)
         except OutsideBoxError as error:
@@ -192,8 +192,8 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             return self.step(anchor, Guess(plane.target * row, anchor.matrix), plane).found
 
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
-        """Description of a point on the curve, in a frame of its own; its tangent goes the same way as the
-        one ``before``."""
+        """Description of a point on the curve, in a frame adapted to it; its tangent has the direction of the one
+        ``before``."""
         system = self.system(place.values)
         section = frame.section
         if section is not None:
@@ -208,7 +208,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return Spot(at, own, np.vstack([matrix, tangent]), tangent, self._uncertainty(at, own))
 
     def parameters(self, anchor: Spot) -> tuple[slice, Array]:
-        """Where the parameters stand among the coordinates, and their units."""
+        """Indices of the parameters among the coordinates, and their units."""
         return anchor.frame.parameters, anchor.frame.widths
 
     def residual(self, anchor: Spot, moved: Array, values: Array) -> tuple[Evaluated, Array]:
@@ -221,7 +221,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return float(np.abs(move).max())
 
     def met(self, anchor: Spot, found: Evaluated, off: float, stalled: int, singular: bool) -> bool:
-        """True if what is left to correct is round-off, or small and no longer falls."""
+        """True if the residual is round-off, or small and no longer falls."""
         return off <= ROUND_OFF or (off <= SETTLED and stalled >= _STALLED)
 
     def step(self, anchor: Spot, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Spot, Evaluated]:
@@ -231,11 +231,11 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return Step(anchor, solved.moved, solved.found, anchor.tangent, anchor.matrix, solved.corrections, missed)
 
     def along(self, spot: Spot, size: float) -> Evaluated:
-        """The equations at the point of the curve so far along the tangent of another one, which is near."""
+        """The equations at the point of the curve at a distance along the tangent of a near one."""
         return self.step(spot, Guess(size * spot.tangent, spot.matrix), Plane(spot.tangent, size)).found
 
     def arrived(self, step: Step[Spot, Evaluated]) -> Step[Spot, Evaluated]:
-        """A step with the point at its end, in a frame of its own."""
+        """A step with the point at its end, in a frame adapted to it."""
         start, frame = step.start, step.start.frame
         end = self.spot(step.found.place, frame, start.tangent)
         ahead = frame.carried(end.tangent, end.frame)
@@ -247,7 +247,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return replace(step, tangent=ahead, end=replace(end, before=before))
 
     def _onto(self, spot: Spot, direction: Array) -> Array:
-        """A direction with its state along the motion onto the section of a spot, if it has one."""
+        """A direction with its state projected along the motion onto the section of a spot, if it has one."""
         image, frame = spot.at.image, spot.frame
         if image.velocity is None or image.normal is None or not frame.basis.size:
             return direction
@@ -257,8 +257,8 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
 
     def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and the coordinates by which it is known again: the same orbit
-        may be met at another instant where the system does not depend on time."""
+        """Displacement of the first point, its tangent, and the coordinates that identify it: a system that does not
+        depend on time may return to the same orbit at another instant."""
         frame, first = anchor.frame, self.first
         seen = slice(0 if frame.section is None else frame.parameters.start, None)
         return frame.between(anchor.place, first.place), frame.carried(first.tangent, first.frame), seen
@@ -281,7 +281,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         size = sizes(system, place.state, image.period / image.returns)
         if self.known or place.state.any() or (isinstance(system, Scaled) and system.scale is not None):
             return size
-        # An orbit that rests at zero is as large as the parameters make it.
+        # The parameters set the size of an orbit that rests at zero.
         reach = 0.0
         for j in range(2):
             values = place.values.copy()
@@ -295,7 +295,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return _STEP if place.values[j] + _STEP * self.widths[j] <= self.box[j, 1] else -_STEP
 
     def _framed(self, system: SystemLike, place: Place, image: ReturnMap, size: Array, before: Frame | None) -> Frame:
-        """The frame at a place; its borders from those of the one before, so that they change continuously."""
+        """The frame at a place; its borders come from the previous frame, so that they change continuously."""
         n, k = size.size, 1 if self.target else 2
         basis = np.zeros((n, 0)) if self.known else symmetric_states(system, place.state, size)
         section = None
@@ -332,7 +332,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return Evaluated(place, image, jacobian, residual, right, left, float(np.linalg.norm(inverse, 2)))
 
     def _derivative(self, at: Evaluated, frame: Frame) -> Array:
-        """Derivative of the equations with respect to the coordinates, by differences but for what is known exactly."""
+        """Derivative of the equations with respect to the coordinates, exact or by differences."""
         m, k = frame.basis.shape[1], at.right.shape[1]
         columns = []
         for j in range(m + 2):
@@ -354,7 +354,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             own = np.abs(at.jacobian)
             wrong = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error
         rounding = 4.0 * np.finfo(float).eps
-        # The state returns with an error of which that of the derivative tells.
+        # The error of the derivative determines that of the returned state.
         returned = error.sum(axis=1) + rounding * np.abs(at.place.state) / size
         critical = np.abs(frame.mixture) @ (np.abs(at.left.T) @ wrong @ np.abs(at.right)).ravel()
         norms = np.linalg.norm(at.left) * np.linalg.norm(at.right) * np.linalg.norm(frame.mixture, 2)

@@ -1,5 +1,5 @@
-"""Curves of bifurcation points in two parameters, and their points of codimension two, where something else becomes
-critical as well (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.1 to 9.6)."""
+"""Curves of bifurcation points in two parameters, and their points of codimension two, where a second condition
+becomes critical (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.1 to 9.6)."""
 
 from __future__ import annotations
 
@@ -75,13 +75,13 @@ class Point2(ReadOnlyArrays):
     multiplier
         Critical multiplier of the return map.
     multipliers
-        All of them, by falling modulus.
+        All multipliers, by falling modulus.
     frequency
         Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
     coefficient, coefficient_error
-        Coefficient and coefficient error of the normal form, of the map that a :class:`BifurcationPoint` has it of (of
-        two periods at a period doubling): the quadratic one of a fold or a transcritical point, the cubic one of all
-        others; None where there is none or it was not asked for.
+        Coefficient and coefficient error of the normal form, for the map of a :class:`BifurcationPoint` (over two
+        periods at a period doubling): the quadratic one at a fold or a transcritical point, the cubic one at all
+        others; None if undefined or not computed.
     """
 
     values: Array
@@ -105,8 +105,8 @@ class SpecialPoint2(Point2):
         Kind of the point. The error of its ``values`` is also that of the test function over its rate of change along
         the curve.
     next_coefficient, next_coefficient_error
-        Next coefficient where that of the curve's normal form vanishes: the first one after it, of the same map and in
-        the same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate
+        Next coefficient where that of the curve's normal form vanishes, for the same map and amplitude, and a bound on
+        its error. That is c of a -> a + c a^3 at a cusp and a degenerate
         transcritical point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised
         period doubling; the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point.
         None elsewhere.
@@ -126,15 +126,15 @@ class Curve2(Result):
     kind
         Kind of the bifurcation along it.
     points
-        In order.
+        Points in order.
     special
         Points of codimension two, in order.
     endings
-        Reasons for which it ends, at its first point and at its last.
+        Reasons for the end at its first point and at its last.
     reasons
-        Details where it was lost, else empty: one for each end.
+        Details of a lost curve, else empty: one for each end.
     periods
-        Number of periods that its orbits take.
+        Number of the systems' periods in one period of its orbits.
     """
 
     kind: Kind
@@ -164,7 +164,7 @@ class Curve2(Result):
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the curve over both parameters, points of codimension two marked, on axes of matplotlib or on new
+        """Draw the curve over both parameters, with points of codimension two marked, on axes of matplotlib or on new
         ones."""
         axes = axes_for(axes)
         axes.plot(*self.values.T, label=self.kind.label)
@@ -173,8 +173,8 @@ class Curve2(Result):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """The points as a dataset over ``point``, in their order along the curve, those of codimension two among them;
-        ``special`` is empty at ordinary ones. Multipliers are those of the return map."""
+        """Dataset of the points over ``point``, in order along the curve, with those of codimension two; ``special`` is
+        empty at ordinary points. Multipliers belong to the return map."""
         points, scale = list(self.points), np.ptp(self.values, axis=0)
         scale[scale == 0.0] = 1.0
         for each in self.special:
@@ -190,18 +190,18 @@ class Curve2(Result):
 
 @dataclass(frozen=True)
 class Start2(ReadOnlyArrays):
-    """Where a curve starts that leaves a point of codimension two.
+    """Start of a curve that leaves a point of codimension two.
 
     Attributes
     ----------
     point
-        A bifurcation point on the curve, beside the one that is left.
+        Bifurcation point on the curve, beside the point of codimension two.
     second
-        The value of the second parameter there.
+        Value of the second parameter there.
     outward
-        Direction in which the curve leaves, shape (n + 2,): of the state, and of both parameters.
+        Direction in which the curve leaves, shape (n + 2,): state, then both parameters.
     periods
-        Number of periods that its orbits take. They need not have the systems' symmetry in time.
+        Number of the systems' periods in one period of its orbits, which need not have the symmetry in time.
     """
 
     point: BifurcationPoint

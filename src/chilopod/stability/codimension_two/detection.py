@@ -1,4 +1,4 @@
-"""How points of codimension two are found along a curve: each is a zero of a test function.
+"""Detection of points of codimension two along a curve, as zeros of test functions.
 
 Test functions after Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.1 and 10.3, and Kuznetsov and
 Meijer, SIAM J. Sci. Comput. 26, 2005.
@@ -35,18 +35,18 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _SAFETY = 1.5
-_BESIDE = 1e-3  # of a step: how far apart a test function is differentiated
-_NEARER = (-0.1, 0.1, -0.01, 0.01, -0.001, 0.001)  # of a step, beside where a test function was found to have no value
-_POLE = 0.1  # of its values at the ends of a step: where a test function changes sign and is larger, it has a pole
-_RESOLVED = 3.0  # times the error of a test function that it has to reach within a step to mean anything
-_COMPLEX = 1e-6  # imaginary part from which a pair counts as one
-_OVERLAP = 1e-5  # of the two critical eigenvectors, below which a multiplier is double
+_BESIDE = 1e-3  # step of the differences of a test function, relative to the curve's step
+_NEARER = (-0.1, 0.1, -0.01, 0.01, -0.001, 0.001)  # distances, in steps, from a place without a test function
+_POLE = 0.1  # value at a sign change, relative to those at the ends of a step, above which it is a pole
+_RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
+_COMPLEX = 1e-6  # least imaginary part of a pair
+_OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
 _EPSILON = float(np.finfo(float).eps)
 
 
 class Own(enum.Enum):
-    """Test functions of the critical multiplier itself: the coefficient of the normal form, and w . v, which is zero
-    where the multiplier is double."""
+    """Test functions of the critical multiplier: the coefficient of the normal form, and w . v, which is zero where the
+    multiplier is double."""
 
     COEFFICIENT = enum.auto()
     DOUBLE = enum.auto()
@@ -67,22 +67,22 @@ _COSINES = {
 
 
 class _NoValue(AnalysisError):
-    """A test function has no value at a place."""
+    """A test function is undefined at a place."""
 
 
 @dataclass(frozen=True)
 class Critical(ReadOnlyArrays):
     """A place of a curve with its multipliers."""
 
-    at: Evaluated  # the equations there and the frame they are written in
+    at: Evaluated  # equations there and their frame
     frame: Frame
-    shift: Array | None  # how far the coordinates may be off, if the image has error bounds; else None
+    shift: Array | None  # errors of the coordinates, if the image has error bounds; else None
     spectrum: Spectrum  # all multipliers of the return map
-    others: NDArray[np.intp]  # numbers of those that are not critical, shape (others,)
-    multiplier: complex  # the critical one: +1, -1, or on the unit circle with positive imaginary part
+    others: NDArray[np.intp]  # indices of the multipliers that are not critical, shape (others,)
+    multiplier: complex  # critical multiplier: +1, -1, or on the unit circle with positive imaginary part
     mode: ComplexArray  # unit right eigenvector and left one with left^H mode = 1, shape (n,)
     left: ComplexArray
-    overlap: float  # of the two, of unit length in units of the frame: 0 where the multiplier is double, NaN for a pair
+    overlap: float  # overlap of the two, each a unit vector in the frame: 0 for a double multiplier, NaN for a pair
 
     @property
     def error(self) -> Array:
@@ -92,7 +92,7 @@ class Critical(ReadOnlyArrays):
 
 
 def critical(target: int, at: Evaluated, frame: Frame, shift: Array | None = None) -> Critical:
-    """A place of a curve, the critical multipliers apart from the others."""
+    """A place of a curve, with the critical multipliers separated from the others."""
     spec = spectrum(at.image)
     if target:
         own = [int(np.abs(spec.values - target).argmin())]
@@ -126,8 +126,8 @@ class Station:
 
 
 class Detector:
-    """Test functions along a curve of bifurcations of some kind, that of the normal form among them if its coefficients
-    are asked for."""
+    """Test functions along a curve of bifurcations of some kind, with that of the normal form if coefficients are
+    requested."""
 
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
         self._curve, self._kind, self._coefficients = curve, kind, coefficients
@@ -149,7 +149,7 @@ class Detector:
             one, other = before[signal][0], after[signal][0]
             if not (one * other < 0.0 or (other == 0.0 and one != 0.0)):
                 continue
-            # What vanishes all along a curve changes its sign as well.
+            # A function that vanishes along the whole curve changes its sign as well.
             if any(abs(value) > _RESOLVED * error for value, error in (before[signal], after[signal])):
                 found += self._located(signal, parts)
         return [(spot, point) for _, spot, point in sorted(found, key=lambda each: each[0])]
@@ -169,7 +169,7 @@ class Detector:
         )
 
     def sampled(self, here: Critical) -> tuple[ReturnedStates, CriticalOrbit]:
-        """Return map and critical orbit that a normal form is computed from."""
+        """Return map and critical orbit of a normal form."""
         at, section = here.at, here.frame.section
         system = self._curve.system(at.place.values)
         orbit = CriticalOrbit(
@@ -183,7 +183,7 @@ class Detector:
         return None if np.isnan(amplitude) else quintic(*self.sampled(here), amplitude)
 
     def _decides(self, form: NormalForm) -> tuple[float, float]:
-        """The coefficient that decides what happens on a curve of this kind, and its error; NaN where there is none."""
+        """The decisive coefficient on a curve of this kind, and its error; NaN if undefined."""
         if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
             return np.nan, np.nan
         if self._kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
@@ -191,7 +191,7 @@ class Detector:
         return form.cubic, form.cubic_error
 
     def _measured(self, signal: Signal, here: Critical, form: NormalForm | None = None) -> tuple[float, float]:
-        """A test function and its error, which takes an image with error bounds, and that of the coordinates."""
+        """A test function and its error, which needs an image with error bounds, and errors of the coordinates."""
         if isinstance(signal, CodimensionTwo):
             return here.at.place.cosine - _COSINES[signal], 0.0 if here.shift is None else float(here.shift[-1])
         if signal is Own.DOUBLE:
@@ -200,7 +200,7 @@ class Detector:
             if not self._curve.target and abs(here.at.place.cosine) >= 1.0:
                 return np.nan, np.nan  # past the end of the curve: two real multipliers with product 1
             value, error = self._decides(self.form(here) if form is None else form)
-            # A fold's is positive for one sense of its mode; where the multiplier is double it has a pole.
+            # A fold's is positive for one sign of its mode, and has a pole where the multiplier is double.
             factor = here.overlap if self._curve.target else 1.0
             return value * factor, error * abs(factor)
         nu, errors = here.spectrum.values[here.others], here.spectrum.error[here.others]
@@ -213,8 +213,8 @@ class Detector:
     def _located(
         self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
     ) -> list[tuple[float, Spot, SpecialPoint2]]:
-        """The point where a test function vanishes within a step, with how far along it that is; none if it means
-        nothing."""
+        """The point where a test function vanishes within a step, and its distance along the step; None for a zero
+        without meaning."""
         curve, start, length = self._curve, parts.step.start, parts.step.size
         seen: dict[float, tuple[float, float]] = {}
 
@@ -240,7 +240,7 @@ class Detector:
         along = _along(test, parts, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
         bound = off + along + 4.0 * _EPSILON * np.abs(spot.values)
-        if kind is None or not (bound < np.ptp(curve.box, axis=1)).all():  # which tells nothing
+        if kind is None or not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
             return []
         point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
         if signal is Own.COEFFICIENT:
@@ -250,8 +250,8 @@ class Detector:
         return [(root, spot, point)]
 
     def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
-        """A point with the coefficient that does not vanish there, whose error has a share of its change to a place
-        ``beside``: the point itself may be as far off."""
+        """A point with its next coefficient, whose error includes part of the change to a place ``beside``, as the
+        point may be off by that distance."""
         terms, forms = [], [self.form(each) for each in (here, beside)]
         for each, form in zip((here, beside), forms, strict=True):
             value, error = form.cubic, form.cubic_error
@@ -264,7 +264,7 @@ class Detector:
         return replace(point, next_coefficient=value, next_coefficient_error=error) if np.isfinite(error) else point
 
     def _named(self, signal: Signal, here: Critical) -> CodimensionTwo | None:
-        """Kind of the point at a zero of a test function; None where it means nothing."""
+        """Kind of the point at a zero of a test function; None for a zero without meaning."""
         target = self._curve.target
         if isinstance(signal, CodimensionTwo):
             return signal
@@ -275,7 +275,7 @@ class Detector:
         nu = here.spectrum.values[here.others]
         if signal is Event.PAIR:
             complex_ones = np.abs(np.abs(nu) - 1.0)[np.abs(nu.imag) > _COMPLEX]
-            # Two real multipliers with product 1 are nothing.
+            # Two real multipliers with product 1 are not critical.
             reals = nu[np.abs(nu.imag) <= _COMPLEX].real
             products = np.abs(reals[:, None] * reals - 1.0)[np.triu_indices(reals.size, 1)]
             if not complex_ones.size or (products.size and products.min() < complex_ones.min()):
@@ -283,7 +283,7 @@ class Detector:
             return together(self._kind, Kind.NEIMARK_SACKER)
         sign = TARGETS[signal]
         if sign == target and abs(here.overlap) < _OVERLAP:
-            return None  # of a double multiplier the overlap tells
+            return None  # the overlap identifies a double multiplier
         mode = here.spectrum.right[:, here.others[int(np.abs(nu - sign).argmin())]]
         if reverses(self._curve.system(here.at.place.values), mode, here.frame.size):
             return together(self._kind, Kind.PITCHFORK)
@@ -304,12 +304,12 @@ def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.
 def _zero(
     test: Callable[[float], float], seen: dict[float, tuple[float, float]], length: float
 ) -> tuple[float, float, float] | None:
-    """Zero of a test function within a step, how far beside it the function is known, and how large it may be there;
-    None if there is none. ``seen``: its values and errors, NaN where it has none."""
+    """Zero of a test function within a step, distance to the nearest place where it is known, and its largest value
+    there; None without a zero. ``seen``: its values and errors, NaN where undefined."""
 
     def resolved(place: float) -> float:
         value = test(place)
-        # Of an image without bounds the error is none.
+        # An image without bounds has no error.
         return 0.0 if abs(value) <= seen[place][1] < np.inf else value
 
     try:
@@ -318,7 +318,7 @@ def _zero(
         root = brentq(resolved, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False)
         return float(root), _BESIDE * length, 0.0
     except _NoValue:
-        # A coefficient that is zero may be harder to find than those beside it, which then bracket it.
+        # A coefficient of zero may be harder to compute than those beside it, which then bracket it.
         (gap,) = (place for place, (value, _) in seen.items() if np.isnan(value))
     for share in _NEARER:
         if 0.0 < gap + share * length < length:
@@ -333,12 +333,12 @@ def _zero(
 
 
 def across(spot: Spot) -> Array:
-    """How far both parameters may be off, shape (2,), at right angles to the curve in the plane of the parameters."""
+    """Errors of both parameters, shape (2,), at right angles to the curve in the plane of the parameters."""
     frame = spot.frame
     response = np.linalg.pinv(spot.matrix[:-1])[frame.parameters]
     tangent = spot.tangent[frame.parameters]
     length = float(np.linalg.norm(tangent))
-    if length > np.sqrt(_EPSILON):  # else a cusp, of which no direction is along
+    if length > np.sqrt(_EPSILON):  # at a cusp the curve has no direction
         normal = np.array([-tangent[1], tangent[0]]) / length
         response = np.outer(normal, normal @ response)
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))
@@ -347,7 +347,7 @@ def across(spot: Spot) -> Array:
 def _along(
     test: Callable[[float], float], parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float
 ) -> Array:
-    """How far both parameters move, shape (2,), as far along the curve as a test function leaves open; from
+    """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open; from
     differences over h."""
     try:
         slope = abs(test(root + h) - test(root - h)) / (2.0 * h)

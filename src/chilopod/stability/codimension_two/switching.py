@@ -26,11 +26,11 @@ from chilopod.stability.problem.budget import Budget, SpentError
 
 Array = NDArray[np.float64]
 
-_BESIDE = 1e-3  # in units of the box and of the states: over which the cubic coefficient is differentiated
-_FARTHEST = 0.1  # of the same: how far along the curve a fold may be
-_HALVINGS = 12  # of the amplitude
-_BEFORE = 0.9  # of an amplitude, seen from which a curve goes outward
-_NEAR = 0.25  # of the amplitude and of the way from the point: how far off a fold may be predicted
+_BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
+_FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
+_HALVINGS = 12  # halvings of the amplitude
+_BEFORE = 0.9  # fraction of an amplitude from which the direction outward is taken
+_NEAR = 0.25  # largest error of a predicted fold, relative to the amplitude and its distance from the point
 
 _CURVES = {
     CodimensionTwo.GENERALISED_PERIOD_DOUBLING: Kind.PERIOD_DOUBLING,
@@ -38,7 +38,7 @@ _CURVES = {
 }
 _OTHERS = {
     CodimensionTwo.CUSP: "is a cusp: the curve of folds itself goes through it",
-    CodimensionTwo.CHENCINER: "is a Chenciner point: what leaves it are folds of tori, which are not followed",
+    CodimensionTwo.CHENCINER: "is a Chenciner point: folds of tori leave it, which cannot be followed",
 }
 
 
@@ -55,32 +55,32 @@ def switch2(
     Parameters
     ----------
     family2, between
-        As they were given to :func:`chilopod.stability.follow2`, which found the point.
+        Arguments of the :func:`chilopod.stability.follow2` that found the point.
     point
-        One of the ``special`` points of its curve: a generalised period doubling or a degenerate pitchfork.
+        Generalised period doubling or degenerate pitchfork, among the ``special`` points of its curve.
     budget, seconds
-        Number of return maps with derivatives, and time in s, that may be taken.
+        Largest number of return maps with derivatives, and time in s.
 
     Returns
     -------
-    Of a generalised period doubling one, at a fold of orbits of twice the period. Of a degenerate pitchfork two, at
-    folds of the orbits that branch off along the critical mode and against it.
+    A generalised period doubling has one start, at a fold of orbits of twice the period; a degenerate pitchfork has
+    two, at folds of the orbits that branch off along the critical mode and against it.
 
     Raises
     ------
     ParameterError
         If no curve of folds leaves a point of this kind.
     AnalysisError
-        If the coefficient of fifth order is zero within its error, or no fold is found where it says that there is one.
+        If the coefficient of fifth order is zero within its error, or no fold is found near its prediction.
     """
     box = checked_box(between)
     if not isinstance(point, SpecialPoint2):
         raise ParameterError(
-            "is no point of codimension two", field="point", value=point, allowed="one of `curve.special`"
+            "must be a point of codimension two", field="point", value=point, allowed="one of `curve.special`"
         )
     kind = _CURVES.get(point.kind)
     if kind is None:
-        why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, which no curve is known to leave here")
+        why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, from which no curve can be followed")
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     allowed = Budget(budget, seconds)
     periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
@@ -102,10 +102,10 @@ class _Unfolding:
     slope: float  # change of the cubic coefficient along the curve, by the length of ``spot.tangent``
     # Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
     response: Array
-    times: int  # number of returns that the coefficients are of
+    times: int  # number of returns in the map of the coefficients
 
     def fold(self, a: float) -> Place | None:
-        """Where a fold is predicted at an amplitude along the mode, negative against it; None if that is too far."""
+        """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
         spot, fifth = self.spot, self.fifth
         away = -2.0 * fifth.coefficient * a * a / self.slope
         across = fifth.coefficient * a**4 / self.times
@@ -122,7 +122,7 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
     targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
     target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
     equations = CriticalCurve(family2, target, knows_orbit(system), box, budget)
-    # A point on the edge of the box has another side too.
+    # For a point on the edge of the box the other side is used.
     equations.box = box + 2.0 * _FARTHEST * equations.widths[:, None] * [-1.0, 1.0]
     spot = equations.begin(Place(point.orbit, point.values, 0.0))
     detector = Detector(equations, kind, True)
@@ -130,7 +130,7 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
     beside = [critical(target, equations.along(spot, size), spot.frame) for size in (-_BESIDE, _BESIDE)]
     low, high = forms = [detector.form(each) for each in beside]
     if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
-        raise AnalysisError("the cubic coefficient is not seen to change along the curve", field="point")
+        raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
     fifth = detector.fifth(here, detector.form(here), *forms)
     if fifth is None:
         raise AnalysisError("no coefficient of fifth order was found", field="point")
@@ -143,8 +143,8 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
 
 
 def _across(spot: Spot, target: int) -> Array:
-    """``response`` of an unfolding, by the shortest way in the plane of the parameters; g changes by -(w . v) of what
-    the multiplier does."""
+    """``response`` of an unfolding, by the shortest way in the plane of the parameters; g changes by -(w . v) times the
+    change of the multiplier."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.at.left[:, 0] @ spot.at.right[:, 0])
     orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])
@@ -154,7 +154,7 @@ def _across(spot: Spot, target: int) -> Array:
 
 
 def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -> Start2:
-    """The fold at the largest amplitude at which it is found near where it was predicted."""
+    """The fold at the largest amplitude at which it is found near its prediction."""
     left, widths = there.at.left.real, there.spot.frame.widths
     cause: Exception | None = None
     for k in range(_HALVINGS):

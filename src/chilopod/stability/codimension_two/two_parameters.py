@@ -1,7 +1,7 @@
-"""Curves of bifurcation points in two parameters: where a bifurcation goes as a second parameter changes.
+"""Curves of bifurcation points in two parameters.
 
-The tracer follows them (see :mod:`chilopod.stability.tracing.tracer`) with the equations of :mod:`.bordered`, and on
-the way the points of codimension two are located (see :mod:`.detection`).
+The tracer (see :mod:`chilopod.stability.tracing.tracer`) follows them with the equations of :mod:`.bordered`, and
+points of codimension two are located within each step (see :mod:`.detection`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from chilopod.stability.tracing.tracer import trace
 Array = NDArray[np.float64]
 
 BUDGET = 20_000
-"""Return maps, with derivatives, that a curve may take by default."""
+"""Default budget of a curve, in return maps with derivatives."""
 
 _MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
 
@@ -59,25 +59,24 @@ def follow2(
     family2
         ``family2(p, q)`` is the system at values of both parameters.
     start
-        A point that :func:`chilopod.stability.locate` found in the family of p with q = ``second``; or one that
-        :func:`chilopod.stability.switch2` gives, from which the curve goes away from the point that it leaves, and
-        which knows its q.
+        Point from :func:`chilopod.stability.locate` in the family of p with q = ``second``; or start from
+        :func:`chilopod.stability.switch2`, which contains its q and leads away from the point of codimension two.
     between
-        Intervals of both parameters: the box in which the curve is followed; the family is asked for no values outside.
-        Their widths are the parameters' units.
+        Intervals of both parameters: the box of the curve; the family is called for values inside only. Their widths
+        are the parameters' units.
     second
-        The value of q at the start.
+        Value of q at the start.
     rising
-        True to start towards rising or falling q; None for both, which makes one curve of the two halves. It means
-        nothing for a curve that leaves another one.
+        True to start towards rising q, False towards falling q, None for both in one curve. Not used for a curve that
+        leaves another one.
     points
-        At most so many, in each direction.
+        Largest number of points in each direction.
     step, longest
         First and largest step along the curve, in units of the box and of the states.
     coefficients
-        True to compute normal forms, without which cusps and degenerate points are not found.
+        True to compute normal forms, which are needed to find cusps and degenerate points.
     budget, seconds
-        Number of return maps with derivatives (normal forms have a budget of their own), and time in s, after which the
+        Number of return maps with derivatives (normal forms are counted separately), and time in s, after which the
         curve ends.
     progress
         Called with the number of points and the newest one.
@@ -85,8 +84,8 @@ def follow2(
     Raises
     ------
     ParameterError
-        If an argument is out of range; for a pitchfork, transcritical or branch point, if nothing keeps it one as
-        both parameters change: neither a symmetry nor an orbit that the systems know; for a Krein collision.
+        If an argument is out of range; for a pitchfork, transcritical or branch point that neither a symmetry nor a
+        known orbit preserves as both parameters change; for a Krein collision.
     AnalysisError
         If no point of a curve is found at the start.
     """
@@ -99,12 +98,12 @@ def follow2(
         outward, periods, second = start.outward, start.periods, start.second
         family2, start = over_periods(family2, periods), start.point
     if not isinstance(start, BifurcationPoint):
-        raise ParameterError("is no located point", field="start", value=start, allowed="one that `locate` gives")
+        raise ParameterError("must be a located point", field="start", value=start, allowed="a point from `locate`")
     if second is None:
         raise ParameterError("must be given", field="second", allowed="the value of q at the start")
     values = np.array([start.value, second], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
-        raise ParameterError("does not hold the start", field="between", value=between, allowed=f"{values} within")
+        raise ParameterError("must hold the start", field="between", value=between, allowed=f"around {values}")
     target, known = _what(family2, start, second)
     curve = CriticalCurve(family2, target, known, box, Budget(budget, seconds))
     nu = complex(start.multiplier)
@@ -145,15 +144,15 @@ def checked_box(between: object) -> Array:
 
 
 def over_periods(family2: Family2, periods: int) -> Family2:
-    """The same systems for orbits that take several periods, or do not have their symmetry in time."""
+    """The same systems for orbits over several periods, or without their symmetry in time."""
     return lambda p, q: whole_period(family2(p, q), periods)
 
 
 def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
-    """The critical multiplier, 0 for a pair, and whether the orbit is no unknown."""
+    """The critical multiplier, 0 for a pair, and True if the orbit is known."""
     system = family2(start.value, second)
     if start.orbit.shape != (system.dimension,):
-        raise ParameterError("is of another system", field="start", value=start.orbit.shape)
+        raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
     if start.kind is Kind.KREIN_COLLISION:
         raise ParameterError("is a Krein collision, which is not followed", field="start", value=start.value)
     known = knows_orbit(system) and start.kind is not Kind.FOLD
@@ -164,15 +163,15 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
         return target, known
     if not reverses(system, start.mode, sizes(system, start.orbit, return_duration(system))):
         raise ParameterError(
-            f"is a {start.kind.label} that two parameters would unfold",
+            f"is a {start.kind.label} that the second parameter unfolds",
             field="start",
-            allowed="one that the systems' spatial_symmetry keeps, or systems that know their orbit",
+            allowed="a point that spatial_symmetry preserves, or systems with a known orbit",
         )
     return target, known
 
 
 class _Looked(NamedTuple):
-    """The station at the end of a step, or nothing new, and what happens within it."""
+    """The station at the end of a step, if any, and the events within the step."""
 
     station: Station | None
     special: tuple[SpecialPoint2, ...]
@@ -180,7 +179,7 @@ class _Looked(NamedTuple):
 
 @dataclass
 class _Half:
-    """A curve in one direction, without its start: what the tracer finds."""
+    """Results of the tracer in one direction, without the start."""
 
     curve: CriticalCurve
     detector: Detector
@@ -202,7 +201,7 @@ class _Half:
         return _Looked(None if ending is Ending.CLOSED else station, special), ending
 
     def keep(self, found: _Looked, count: int) -> None:
-        """Keep a step, with what happens within it."""
+        """Keep a step with its events."""
         self.special += found.special
         if found.station is not None:
             self.points.append(found.station.point)

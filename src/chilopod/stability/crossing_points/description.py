@@ -30,11 +30,11 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event
 ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
-_FEWEST_PARTS, _MOST_PARTS = 32, 2048  # of a return; the mean of a smooth periodic function converges geometrically
-_SETTLED = 1e-9  # change of the mean from half as many parts: its error is about the square of that
+_FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
+_SETTLED = 1e-9  # change of the mean from half as many parts; its error is about the square of that
 
 Formed = Callable[[CriticalOrbit, float], NormalForm | None]
-"""The normal form at a critical orbit, by the relative error of the return map; None where there is none to be had."""
+"""The normal form at a critical orbit, from the relative error of the return map; None if it cannot be computed."""
 
 
 def described(
@@ -48,12 +48,10 @@ def described(
     kind: Kind | None = None,
     with_normal_form: bool = True,
 ) -> BifurcationPoint:
-    """The bifurcation point at a ``place``, a value of the parameter with the bound of its error, to which round-off is
-    added.
+    """The bifurcation point at a ``place``: a value of the parameter with its error bound, to which round-off is added.
 
-    The critical multipliers are given of the whole return map, with their block where spatial symmetries split it, and
-    the kind of the point where it is known; ``formed`` computes normal forms where one multiplier, or one pair, is
-    critical.
+    The critical multipliers belong to the whole return map; their block is given if spatial symmetries split it, and
+    the kind of the point if known. ``formed`` computes the normal form for one critical multiplier or pair.
     """
     value, error_bound = place
     spec = spectrum(orbit.image)
@@ -66,7 +64,7 @@ def described(
     frequency, k = 0.0, orbit.image.returns
     if crossing.event is Event.PAIR:
         angle = float(np.angle(np.exp(1j * k * np.angle(nu))))
-        # Of a conjugate pair, the mode that turns with positive frequency.
+        # The mode of a conjugate pair with positive frequency.
         if angle < 0:
             nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
         frequency = angle / orbit.period
@@ -75,11 +73,11 @@ def described(
     simple = critical.size == (2 if crossing.event is Event.PAIR else 1)
     breaking = block is not None and not block.trivial
     form = None
-    # At +1 the kind itself is told by the normal form, or by a symmetry that is broken.
+    # At +1 the normal form, or a broken symmetry, determines the kind.
     asked = with_normal_form or (crossing.event is Event.PLUS and not breaking and kind is None)
     if simple and asked and not crossing.collision:
         form = formed(*_critical_orbit(orbit, crossing.event, nu, mode, left))
-    # From a Krein collision no orbits branch off, with whatever symmetries.
+    # No orbits branch off from a Krein collision, whatever the symmetries.
     branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
     symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
     kind = _kind(crossing, k, form, symmetry if breaking else None) if kind is None else kind
@@ -102,8 +100,8 @@ def described(
 
 
 def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
-    """Root of the mean square of a mode over a return, across the motion, which is the same from every state of the
-    orbit; 1 where the period is known, and with it what is time 0."""
+    """Root mean square of a mode over a return, across the motion, which does not depend on the choice of time 0; 1 for
+    a given period, which fixes time 0."""
     if not is_autonomous(system):
         return 1.0
     before, parts, duration = 0.0, _FEWEST_PARTS, orbit.period / orbit.image.returns
@@ -143,7 +141,7 @@ def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: Sym
         return Kind.PERIOD_DOUBLING if returns % 2 else Kind.PITCHFORK
     if broken is not None:
         return Kind.PITCHFORK if broken.quadratic == 0 else Kind.TRANSCRITICAL
-    # The orbit was sampled on both sides, so it does not end in a fold here.
+    # The orbit exists on both sides, so it does not end in a fold here.
     return kind_at_plus_one(form) if form is not None else Kind.BRANCH_POINT
 
 
@@ -155,8 +153,8 @@ def _modes(
     block: Block | None,
     symmetry: SymmetricCrossing | None,
 ) -> ComplexArray:
-    """Modes of several critical multipliers: along the axial branches where a symmetry makes them several, else as they
-    come, of real ones an orthonormal basis of their space."""
+    """Modes of several critical multipliers: along the axial branches if a symmetry makes them critical together, else
+    in any order; for real ones an orthonormal basis of their space."""
     if block is None or symmetry is None or not symmetry.branches or critical.size > 2 * block.dimension:
         vectors = spec.right[:, critical]
         if event is Event.PAIR:

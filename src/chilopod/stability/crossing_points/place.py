@@ -1,5 +1,5 @@
-"""Places at which multipliers cross, along a coordinate in which orbits are smooth: their error bounds, and at a
-multiplier +1 of the return map H, where H - 1 is singular, the place and the orbit by those beside it."""
+"""Places at which multipliers cross, along a coordinate in which orbits are smooth, with error bounds. At a
+multiplier +1 of the return map H, where H - 1 is singular, place and orbit are interpolated."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ Array = NDArray[np.float64]
 SAFETY = 1.5
 """Factor on the error of a multiplier, for that of its rate of change."""
 
-_TOUCH_STEP = 1e-3  # of the course: how far from a touch the multiplier is looked at
-_ASIDE = np.arange(1.0, 9.0) / 4.0  # of the reach: where a singular orbit is interpolated from, with room on one side
+_TOUCH_STEP = 1e-3  # distance from a touch at which the multiplier is computed, relative to the course
+_ASIDE = np.arange(1.0, 9.0) / 4.0  # nodes of the interpolation of a singular orbit on one side, in units of the reach
 _AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both sides
-_REACH, _LEAST_REACH = 0.02, 1e-5  # of the course
+_REACH, _LEAST_REACH = 0.02, 1e-5  # first and least reach, relative to the course
 _SHORTER = 0.25
-_AGREES = 1e-6  # of the reach, between two interpolations
-_AT_HOME = 0.01  # of the reach, from where the root finder saw the point
+_AGREES = 1e-6  # largest difference of two interpolations, relative to the reach
+_AT_HOME = 0.01  # largest distance from the root finder's place, relative to the reach
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -45,7 +45,7 @@ class Sample(ReadOnlyArrays):
 
     @property
     def off_plus_one(self) -> float:
-        """Distance of the return map's multipliers from +1, that along the motion left aside."""
+        """Distance of the return map's multipliers from +1, without the one along the motion."""
         return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
 
     @property
@@ -56,22 +56,22 @@ class Sample(ReadOnlyArrays):
         return nearest.real if nearest.imag == 0.0 else np.nan
 
     def passes(self, other: Sample) -> bool:
-        """True if the multiplier nearest +1 is on its other side in another sample."""
+        """True if the multiplier nearest +1 is on the other side of it in another sample."""
         return self.beside_plus_one * other.beside_plus_one < 0.0
 
 
 @dataclass(frozen=True)
 class Course:
-    """Orbits along a coordinate in which they are smooth: the parameter, or the way along a curve."""
+    """Orbits along a coordinate in which they are smooth: the parameter, or the arclength of a curve."""
 
     at: Callable[[Array], Sequence[Sample]]  # samples at places, their values; orbits may hold more than states
     low: float
     high: float
-    width: float  # of all that is looked at, which may be more than from low to high
-    beside: float  # distance from a place at which rates of change are taken
+    width: float  # width of the whole search, which may exceed that from low to high
+    beside: float  # distance from a place at which rates of change are computed
 
     def jacobians(self, place: float) -> tuple[Array, Array, float]:
-        """Derivatives of the return map to both sides of a place, and how far these are apart."""
+        """Derivatives of the return map on both sides of a place, and the distance of the sides."""
         a, b = max(place - self.beside, self.low), min(place + self.beside, self.high)
         before, after = self.at(np.array([a, b]))
         return before.image.jacobian, after.image.jacobian, b - a
@@ -81,15 +81,15 @@ def critical_multipliers(spec: Spectrum, crossing: Crossing) -> NDArray[np.intp]
     """Indices of the multipliers that are critical at a crossing, the nearest first."""
     if crossing.event is not Event.PAIR:
         return np.argsort(distances(spec.values, crossing.event), kind="stable")[: crossing.multiplicity]
-    # Of both of a pair, the one asked for first.
+    # The requested one of a pair comes first.
     nu = crossing.multiplier
     distance = np.minimum(np.abs(spec.values - nu), np.abs(spec.values - nu.conjugate()))
     return np.lexsort((np.abs(spec.values - nu), np.round(distance, 12)))[: crossing.multiplicity]
 
 
 def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
-    """Bound on the error of the place of a crossing on a course, from the return map there with its error bounds: that
-    of the critical multipliers over their rate of change."""
+    """Bound on the error of the place of a crossing on a course, from the return map there with its error bounds: the
+    error of the critical multipliers over their rate of change."""
     width = 0.5 * (crossing.bracket[1] - crossing.bracket[0])
     try:
         if crossing.collision:
@@ -107,7 +107,7 @@ def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
 
 
 def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
-    """d nu = left^H dH' right, which holds however close another multiplier is; of several, the slowest."""
+    """d nu = left^H dH' right, which holds also near other multipliers; the slowest of several."""
     before, after, apart = course.jacobians(crossing.value)
     between = spectrum(replace(image, jacobian=0.5 * (before + after), error=0.0))
     critical = critical_multipliers(between, crossing)
@@ -127,14 +127,14 @@ def _touch_error(course: Course, crossing: Crossing, uncertain: float) -> float:
     for each in course.at(np.clip(crossing.value + step * np.array([-1.0, 0.0, 1.0]), course.low, course.high)):
         values = np.linalg.eigvals(each.image.jacobian)
         away.append(float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])))
-    # The step is left out of the root: its square may be no number.
+    # The step stays outside the root, as its square may underflow.
     bend = abs(away[0] - 2.0 * away[1] + away[2])
     return SAFETY * step * float(np.sqrt(2.0 * uncertain / bend)) if bend > 0.0 else np.inf
 
 
 def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
-    """Error of the place where two multipliers meet. They move as a square root, but their product does not: det(H' -
-    nu), or the squared difference of nu + 1/nu of two pairs, by how uncertain and how steep it is."""
+    """Error of the place where two multipliers meet. They move as a square root, but their product is smooth: det(H' -
+    nu), or the squared difference of nu + 1/nu of two pairs, gives the error by its own over its slope."""
     matrix = image.jacobian
     error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
     here = _collision(matrix, crossing)
@@ -153,18 +153,18 @@ def _collision(matrix: Array, crossing: Crossing) -> float:
     sums = values + 1.0 / values
     critical = crossing.multiplier + 1.0 / crossing.multiplier
     a, *others = sums[np.argsort(np.abs(sums - critical))]
-    # Both of a pair have the same sum: the next pair is two further on.
+    # Both of a pair have the same sum, so the next pair is two places on.
     return float(((a - others[1]) ** 2).real)
 
 
 Bounded = Callable[[float, Array, Array, ReturnMap], Orbit]
-"""The orbit at a place, with error bounds, from an interpolated one, how far that may be off, and a return map near."""
+"""The orbit at a place, with error bounds, from an interpolated one with its error, and a return map nearby."""
 
 
 @dataclass(frozen=True)
 class Regular(ReadOnlyArrays):
-    """A singular orbit that was interpolated: its place with an error bound, what samples have as their ``orbit``
-    there, and the orbit itself."""
+    """An interpolated singular orbit: its place with an error bound, the ``orbit`` of a sample there, and the orbit
+    itself."""
 
     place: float
     error_bound: float
@@ -173,12 +173,12 @@ class Regular(ReadOnlyArrays):
 
 
 def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regular | None:
-    """Place and orbit at a multiplier +1 of an orbit that is solved for.
+    """Place and orbit at a multiplier +1 of a corrected orbit.
 
-    There H - 1 is singular, and Newton's method stops anywhere along the mode where the residual is round-off; so the
-    orbit and the determinant of H' - 1 are interpolated from places to both sides where that is not so, or to one side
-    at an end. They are taken closer together until interpolations of two orders agree. None where it is not singular,
-    or there is no room.
+    There H - 1 is singular, and Newton's method stops anywhere along the mode where the residual is round-off. So the
+    orbit and the determinant of H' - 1 are interpolated from regular places on both sides, or on one side at an end,
+    ever closer together until interpolations of two orders agree. None if the orbit is regular or the interval leaves
+    no room.
     """
     if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
@@ -186,7 +186,7 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     for nodes, reach in _nodes(course, crossing.value):
         found = _interpolated(course, crossing.value, nodes, reach)
         if found is not None:
-            # Where they do not agree, the root finder's value is not to be thrown away.
+            # Without agreement the root finder's value remains.
             far = 0.0 if found.converged else abs(found.place)
             tried.append((reach * (found.between + far), reach, found))
             if found.converged:
@@ -203,7 +203,7 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
 
 
 def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
-    """Nodes around a place, or on the side where there is more room, and the reach that they are parts of."""
+    """Nodes around a place, or on the side with more room, and their reach."""
     below, above = place - course.low, course.high - place
     aside = _ASIDE if above > below else -_ASIDE
     for nodes, room in ((_AROUND, min(below, above)), (aside, max(below, above) / _ASIDE[-1])):
@@ -214,19 +214,19 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
 
 
 class _Interpolation(NamedTuple):
-    """Place and orbit by polynomials through the determinant of H' - 1 and the orbit, in units of the reach from where
-    the multiplier was seen."""
+    """Place and orbit by polynomials through the determinant of H' - 1 and the orbit, in units of the reach from the
+    root finder's place."""
 
-    place: float  # of the zero of the determinant
-    between: float  # how far it is from that of the polynomial through all places but the outermost two
-    slope: float  # of the determinant
-    orbit: Array  # at the zero
+    place: float  # zero of the determinant
+    between: float  # its distance from the zero of the polynomial without the outermost two places
+    slope: float  # slope of the determinant
+    orbit: Array  # orbit at the zero
     orbit_error: Array
     beside: Sample
 
     @property
     def converged(self) -> bool:
-        """True if the polynomials agree, near where the root finder saw the point."""
+        """True if the polynomials agree, near the root finder's place."""
         return self.between <= _AGREES and abs(self.place) <= _AT_HOME
 
 
@@ -235,7 +235,7 @@ def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _
         beside = course.at(place + reach * nodes)
     except AnalysisError:
         return None
-    # A product over all multipliers stays smooth where the critical one meets another, however close by.
+    # The product over all multipliers stays smooth where the critical one meets another.
     values = np.array([(spectrum(each.image).values - 1.0).prod().real for each in beside])
     orbits = np.array([each.orbit for each in beside])
     inner = np.abs(nodes) < np.sort(np.abs(nodes))[-2]

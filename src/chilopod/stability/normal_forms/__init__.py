@@ -1,1 +1,1 @@
-"""Normal forms on centre manifolds, from evaluations of a return map alone."""
+"""Normal forms on centre manifolds, from evaluations of a return map."""

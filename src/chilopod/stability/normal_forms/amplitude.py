@@ -1,8 +1,7 @@
-"""The amplitude at which a return map shows most of its nonlinear terms, and the terms that it shows there.
+"""The best amplitude to sample the nonlinear terms of a return map, and the terms found there.
 
-The search compares the map only with itself: it goes down where the map is far from its linear part, up where nothing
-stands out of the noise, bends the curve it samples along the centre manifold, and then moves on while the error of the
-cubic coefficient falls.
+The search lowers the amplitude where the map is far from its linear part, raises it where the noise hides the nonlinear
+terms, bends the sampled curve along the centre manifold, and continues while the error of the cubic coefficient falls.
 """
 
 from __future__ import annotations
@@ -27,21 +26,21 @@ from chilopod.stability.normal_forms.center_manifold import (
 
 Array = NDArray[np.float64]
 
-_TRIALS = 40  # times that the map is sampled at an amplitude
-_SHARE = 0.03  # of the amplitude by which the map departs from its linear part, to look for
-_TOO_FAR = 0.3  # of the same, beyond which nothing is learnt
+_TRIALS = 40  # largest number of sampled amplitudes
+_SHARE = 0.03  # wanted departure of the map from its linear part, relative to the amplitude
+_TOO_FAR = 0.3  # largest useful departure
 _UP, _FIRST_DOWN = 30.0, 0.1  # longest step of the amplitude upward; step where the map cannot be evaluated
 _FAR_DOWN, _LEAST_DOWN = 1e-3, 0.3  # longest and shortest step downward where the map is far from linear
 _LOST = 1e-6  # relative departure from linearity that is too small to start from
-_BLURRED = 1e-3  # share of the amplitude that errors at the orbit itself may have
-_LONG_UP, _UPS = 1e3, 5  # step of the amplitude while a map seems linear, and how many make it so
-_CLOSE = 4.0  # ratio of amplitudes between which no more is tried
-_RESOLVED = 0.7  # factor of the amplitude that would be better, above which a series has fallen to the noise
-_DOWNS = 6  # times that one is made smaller for that: a map that is not smooth never has
-_BENDS = 3  # times that the curve is bent at one amplitude
-_ENOUGH = 3e-8  # relative error at which no other amplitude is tried
-_FULL = 8  # highest order to be seen beyond which a larger amplitude would rather lose
-_BETTER = 0.3  # of the error, to go on for
+_BLURRED = 1e-3  # largest error at the orbit itself, relative to the amplitude
+_LONG_UP, _UPS = 1e3, 5  # step of the amplitude while a map seems linear, and number of such steps
+_CLOSE = 4.0  # ratio of amplitudes that ends the search
+_RESOLVED = 0.7  # proposed factor of the amplitude above which a series has converged to the noise
+_DOWNS = 6  # largest number of steps down for convergence: the series of a map that is not smooth never converges
+_BENDS = 3  # largest number of bends of the curve at one amplitude
+_ENOUGH = 3e-8  # relative error that ends the search
+_FULL = 8  # highest visible order above which a larger amplitude would lose accuracy
+_BETTER = 0.3  # factor on the error that justifies a further step
 
 
 class NormalFormStatus(Labelled):
@@ -59,19 +58,19 @@ class Fit:
     """Terms of one return on the centre manifold."""
 
     status: NormalFormStatus  # FOUND or LINEAR
-    sampled: Sampled  # the map where it shows most
+    sampled: Sampled  # map at the best amplitude
     cubic: complex  # coefficient of the resonant cubic term
     cubic_error: float
 
 
 def fitted(mapped: ReturnedStates, at: CriticalOrbit, noise: float, resonance: int | None, radius: float) -> Fit | None:
-    """The terms at the amplitude, and with the bend of the curve, at which the cubic coefficient is best known.
+    """The terms at the amplitude, and with the bend of the curve, of the most accurate cubic coefficient.
 
-    The search begins at an amplitude; None if there is none that serves.
+    The search begins at an amplitude; None if no amplitude is suitable.
     """
     third: Powers = (3, 0) if at.real else (2, 1)
     manifold = Manifold(mapped, at, noise, 3, resonance)
-    low, high = 0.0, np.inf  # amplitudes at which nothing is seen, and that are too large
+    low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
     best = None
     best_error, status = np.inf, NormalFormStatus.LINEAR
     bends = ups = downs = turned = 0
@@ -121,7 +120,7 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, noise: float, resonance: i
 
 
 def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, high: float) -> float:
-    """How many times as large an amplitude may be, at least, before anything nonlinear shows."""
+    """Least factor on the amplitude at which nonlinear terms may become visible."""
     factor = 1.0
     reach = np.abs(at.jacobian)
     for _ in range(_UPS):
@@ -141,8 +140,8 @@ def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: 
 
 
 def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
-    """How far the projected map departs from its linear part, relative to the amplitude; by a term of which order
-    mostly; and whether that is more than noise."""
+    """Departure of the projected map from its linear part, relative to the amplitude; the order of its main term; and
+    True if it exceeds the noise."""
     share, order = 0.0, 2
     for one in found.harmonics:
         sizes = np.abs(one.coefficients[1:, -1])
@@ -150,7 +149,7 @@ def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
         if sizes[largest] > share:
             share, order = float(sizes[largest]), one.parity + 2 * (largest + 1)
     seen = share > 4.0 * float(found.noise[-1])
-    # A map that saturates is linear again far out, with another slope.
+    # A saturating map is linear again far out, with another slope.
     slope = abs(found.harmonics[1].coefficients[0, -1] - at.multiplier * found.radius)
     if slope > _TOO_FAR * found.radius:
         share, seen = max(share, float(slope)), True
@@ -158,7 +157,7 @@ def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
 
 
 def _highest(found: Sampled) -> int:
-    """The highest order that stands out of the noise in the projected map."""
+    """The highest order above the noise in the projected map."""
     return max(
         one.parity + 2 * int(np.flatnonzero(np.abs(one.coefficients[:, -1]) > found.noise[-1]).max(initial=0))
         for one in found.harmonics
@@ -166,7 +165,7 @@ def _highest(found: Sampled) -> int:
 
 
 def _toward(share: float, order: int) -> float:
-    """The factor of the amplitude at which a term of some order has the share that is looked for."""
+    """The factor of the amplitude at which a term of some order has the wanted size."""
     if share == 0.0:
         return _UP
     factor = float((_SHARE / share) ** (1.0 / (order - 1)))
@@ -174,7 +173,7 @@ def _toward(share: float, order: int) -> float:
 
 
 def _within(radius: float, low: float, high: float) -> float | None:
-    """An amplitude between two, by preference a given one; None where they are close together."""
+    """An amplitude between two, preferably a given one; None if they are close together."""
     if low < radius < high:
         return radius
     between = float(np.sqrt(low) * np.sqrt(high))

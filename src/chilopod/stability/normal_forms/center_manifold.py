@@ -1,12 +1,11 @@
-"""The return map on a curve, or a disc, in its critical eigenspace that is bent along the centre manifold.
+"""The return map on a curve, or a disc, in its critical eigenspace, bent along the centre manifold.
 
 The manifold is W(z) = x + z q + z^2 w20 + ... (and complex conjugates), with z real at a real multiplier. It is
 sampled on circles |z| = r, or at z = +-r; Fourier series in the angle and Chebyshev series in r give the Taylor
-coefficients of H(W(z)), and what these have in excess of W's own tells how W must bend (the homological equations of
-Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7, and of Kuznetsov and Meijer 2005, here solved on
-measured numbers).
+coefficients of H(W(z)), whose excess over W's own determines the bend of W (the homological equations of Kuznetsov,
+*Elements of Applied Bifurcation Theory*, section 8.7, and of Kuznetsov and Meijer 2005, here with measured numbers).
 
-Nothing here depends on the units of the states: every entry of a state is only ever compared with itself.
+Units of the states do not matter, as every entry of a state is compared with itself only.
 """
 
 from __future__ import annotations
@@ -31,22 +30,22 @@ Powers = tuple[int, int]
 """i and j of a monomial z^i conj(z)^j; j = 0 where z is real."""
 
 Curve = Mapping[Powers, ComplexArray]
-"""Coefficient of every monomial, shape (n,); of two that are conjugate only the one with i >= j."""
+"""Coefficient of every monomial, shape (n,); of two conjugate ones only the one with i >= j."""
 
 _ANGLES = 8
-_HIGHEST = 5.0  # power of a radius that has to be a number
-_DRAWS = 3  # curves that are off at random
+_HIGHEST = 5.0  # highest power of a radius that must not overflow
+_DRAWS = 3  # randomly disturbed curves
 _SURE = 2.0  # factor on the effect of the worst of them
-_WRONG = 0.3  # how far off they are, of what the states move
+_WRONG = 0.3  # size of their disturbance, relative to the motion of the states
 
 
 @dataclass(frozen=True)
 class CriticalOrbit(ReadOnlyArrays):
-    """A fixed point of a return map, and the multiplier that is critical there."""
+    """A fixed point of a return map, with its critical multiplier."""
 
     state: Array  # the fixed point, shape (n,)
     jacobian: Array  # Jacobian of the return map there, shape (n, n)
-    multiplier: complex  # nu: exactly +1, exactly -1, or the one of a complex pair whose mode is ``right``
+    multiplier: complex  # nu: exactly +1, exactly -1, or the one of a complex pair with the mode ``right``
     # Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
     right: ComplexArray
     left: ComplexArray
@@ -54,7 +53,7 @@ class CriticalOrbit(ReadOnlyArrays):
 
     @property
     def real(self) -> bool:
-        """True if the multiplier is."""
+        """True for a real multiplier."""
         return self.multiplier.imag == 0.0
 
 
@@ -65,11 +64,11 @@ class Sampled:
     # Harmonic h at index h, negative ones from the end, of the n states and, last, of left^H (H(W(z)) - x).
     harmonics: tuple[Series, ...]
     noise: Array  # bounds on the errors of the samples, shape (n + 1,)
-    blur: float  # error of the projection at x itself, from round-off and what is known of the map's
-    # Factor of the radius at which the series of the projection would fall to the noise that was to be expected.
+    blur: float  # error of the projection at x itself, from round-off and the map's error
+    # Factor of the radius at which the series of the projection would fall to the expected noise.
     shrink: float
-    falling: bool  # True if they still fall at their end; noise would not
-    size: Array  # largest distance from x, on the curve or of its image, of every state: shape (n,)
+    falling: bool  # True if the series still fall at their end, unlike noise
+    size: Array  # largest distance of every state from x, on the curve or its image, shape (n,)
     radius: float  # largest |z|
     outermost: ComplexArray  # harmonics of the projection at the largest of the :func:`radii`, shape (angles,)
 
@@ -87,7 +86,7 @@ class Sampled:
 
 
 def turns(at: CriticalOrbit) -> ComplexArray:
-    """Directions of z that are sampled: +-1 where it is real, else a circle."""
+    """Sampled directions of z: +-1 for a real one, else a circle."""
     count = 2 if at.real else _ANGLES
     result: ComplexArray = np.exp(2j * np.pi * np.arange(count) / count)
     return result
@@ -103,7 +102,7 @@ def displacements(at: CriticalOrbit, curve: Curve, z: ComplexArray) -> Array:
 
 
 def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array | None:
-    """H - x at x + ``displaced``, of the same shape; None where the map does not exist."""
+    """H - x at x + ``displaced``, of the same shape; None where the map is undefined."""
     flat = at.state + displaced.reshape(-1, at.state.size)
     try:
         result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - at.state
@@ -113,7 +112,7 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
 
 
 def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
-    """Errors of images of a size, shape (n,), and of their projection: shape (n + 1,)."""
+    """Errors of images of a size, shape (n,), and of their projection, shape (n + 1,)."""
     rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
     floor: Array = np.maximum(rounding, noise * reached)
     return np.append(floor, np.abs(at.left) @ floor)
@@ -124,8 +123,8 @@ def solve_homological(
 ) -> ComplexArray:
     """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both.
 
-    Where nu^i conj(nu)^j is critical itself (``resonant``: nu, or its conjugate at the resonance 1:3) the part along
-    that critical direction is left out.
+    If nu^i conj(nu)^j is critical (``resonant``: nu, or its conjugate at the resonance 1:3), the solution has no part
+    along that critical direction.
     """
     i, j = powers
     n = at.state.size
@@ -142,10 +141,10 @@ def solve_homological(
 class Manifold:
     """The centre manifold up to the order below that of a coefficient, improved on samples of the return map.
 
-    It has no part along q at resonant monomials. What it should be follows from H(W(z)) = W(g(z)), with the return map
+    It has no part along q at resonant monomials. It is determined by H(W(z)) = W(g(z)), with the return map
     H and the map g on the critical space (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.3 and 9.4;
-    Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007). The order of the coefficient is 3 or 5; the
-    resonance 3 is where the conjugate of the multiplier is its square.
+    Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007). The order of the coefficient is 3 or 5; at
+    the resonance 3 the conjugate of the multiplier is its square.
     """
 
     def __init__(
@@ -164,7 +163,7 @@ class Manifold:
         self.curve |= dict.fromkeys(self._resonant, nothing)
 
     def sample(self, radius: float) -> Sampled | None:
-        """The map on the manifold up to a radius; None where it does not exist."""
+        """The map on the manifold up to a radius; None where it is undefined."""
         at = self._at
         directions = turns(at)
         displaced = displacements(at, self.curve, radius * radii()[:, None] * directions)
@@ -183,7 +182,7 @@ class Manifold:
         blur, floor = (
             _expected_noise(at, reached, self._noise) for reached in (np.abs(at.state), np.abs(at.state) + size)
         )
-        # Noise of the samples is spread evenly over the coefficients of a cosine transform, smaller by this factor.
+        # A cosine transform spreads the noise of the samples evenly over the coefficients, smaller by this factor.
         seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
         shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
         falling = any(one.falling[-1] for one in found)
@@ -192,7 +191,7 @@ class Manifold:
         )
 
     def bend(self, found: Sampled) -> bool:
-        """Improve the manifold by what was sampled on it; whether that was called for."""
+        """Improve the manifold from samples on it; return True if it changed measurably."""
         bent = False
         for powers, (excess, error) in self._excess(found).items():
             if (np.abs(excess) > 2.0 * error).any():
@@ -202,8 +201,8 @@ class Manifold:
         return bent
 
     def coefficient(self, found: Sampled, powers: Powers) -> tuple[complex, float]:
-        """Coefficient of a resonant monomial of odd order, and a bound on its error, which knows that the sampled curve
-        is not quite the centre manifold: curves that are off by as much, with signs drawn at random, are sampled as
+        """Coefficient of a resonant monomial of odd order, and a bound on its error, which includes the difference of
+        the sampled curve from the centre manifold: curves disturbed as much, with random signs, are sampled as
         well."""
         at, (value, error) = self._at, found.term(powers)
         n = at.state.size
@@ -250,7 +249,7 @@ class Manifold:
 
 
 def _monomial(inner: ComplexArray, i: int, j: int) -> ComplexArray:
-    """Coefficients of g^i conj(g)^j below the order of ``inner``, which has those of g."""
+    """Coefficients of g^i conj(g)^j below the order of ``inner``, the coefficients of g."""
     result = np.zeros_like(inner)
     result[0, 0] = 1.0
     for factor in [inner] * i + [inner.conj().T] * j:

@@ -1,10 +1,10 @@
-"""Taylor coefficients of a sampled function, with errors that hold.
+"""Taylor coefficients of a sampled function, with error bounds.
 
-A function of the radius r is sampled at Chebyshev points of (0, s]; being even or odd, it is then known at those of
-[-s, s]. Its Chebyshev coefficients t_k fall geometrically down to the noise of the samples, so that the series itself
-shows how large that noise is, how much a truncation leaves out, and whether s was well chosen (Trefethen,
+An even or odd function of the radius r is sampled at Chebyshev points of (0, s], which gives its values at those of
+[-s, s]. Its Chebyshev coefficients t_k fall geometrically down to the noise of the samples, so the series itself
+shows the size of that noise, the truncation error, and the quality of s (Trefethen,
 *Approximation Theory and Approximation Practice*, chapters 3, 4 and 8). A Taylor coefficient is a sum over the t_k up
-to the degree at which noise and truncation together are least.
+to the degree with the least sum of noise and truncation.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 RADII = 8
-"""How many radii a function is sampled at."""
+"""Number of radii at which a function is sampled."""
 
-_SAFETY = 5.0  # the noise is judged from few samples, the truncation from the next two terms
+_SAFETY = 5.0  # factor on the noise, estimated from few samples, and the truncation, from the next two terms
 _FALL = 4.0
-_TAIL = 2  # of every parity so many last coefficients are taken for noise
+_TAIL = 2  # number of last coefficients of every parity that count as noise
 
 
 def radii() -> Array:
@@ -43,14 +43,14 @@ class Series(ReadOnlyArrays):
 
     @property
     def roughness(self) -> Array:
-        """Size of the last coefficients, shape (entries,): the noise of the samples, or what a series that has not
-        converged leaves out."""
+        """Size of the last coefficients, shape (entries,): the noise of the samples, or the truncation error of a
+        series that has not converged."""
         tail: Array = np.abs(self.coefficients[-_TAIL:]).max(axis=0)
         return tail
 
     @property
     def falling(self) -> NDArray[np.bool_]:
-        """True if the coefficients still fall at their end, shape (entries,): noise would not."""
+        """True if the coefficients still fall at their end, unlike noise, shape (entries,)."""
         before: Array = np.abs(self.coefficients[-2 * _TAIL : -_TAIL]).max(axis=0)
         return np.asarray(before > _FALL * self.roughness)
 
@@ -60,7 +60,7 @@ class Series(ReadOnlyArrays):
         weights, gains = _weights(order, self.parity)
         terms = weights[:, None] * self.coefficients
         sizes = np.abs(terms)
-        # What is beyond the next two coefficients only counts as far as it stands out of the noise.
+        # Coefficients after the next two count only above the noise.
         standing_out = np.maximum(sizes - 2.0 * np.abs(weights[:, None]) * self.roughness, 0.0)
         beyond = np.cumsum(standing_out[::-1], axis=0)[::-1]
         first = (order - self.parity) // 2
@@ -91,7 +91,7 @@ def _transform(parity: int) -> Array:
 
 @cache
 def _weights(order: int, parity: int) -> tuple[Array, Array]:
-    """Coefficient of r^order in every T_k, and how much the sum up to each k enlarges an error of the samples."""
+    """Coefficient of r^order in every T_k, and the factor of the sum up to each k on an error of the samples."""
     orders = np.arange(parity, 2 * RADII, 2)
     weights = np.array([chebyshev.cheb2poly(np.eye(2 * RADII)[k])[order] if k >= order else 0.0 for k in orders])
     gains = np.abs(np.cumsum(weights[:, None] * _transform(parity), axis=0)).sum(axis=1)

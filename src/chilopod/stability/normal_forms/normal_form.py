@@ -1,10 +1,9 @@
-"""Normal-form coefficients at a bifurcation, from evaluations of the return map alone.
+"""Normal-form coefficients at a bifurcation, from evaluations of the return map.
 
-Near the critical orbit the return map H is sampled along the critical mode, bent by its quadratic part that leaves the
-critical space; the terms of second and third order on the critical space are read off (Kuznetsov, *Elements of Applied
-Bifurcation Theory*, sections 5.4, 8.7 and 9.2). Nothing but H is needed: no derivative of the right-hand side by hand,
-no symbolic algebra. The amplitude at which H is sampled is found from H itself, by what its series look like: any
-units give the same digits.
+Near the critical orbit the return map H is sampled along the critical mode, bent by its quadratic part outside the
+critical space; this gives the terms of second and third order on the critical space (Kuznetsov, *Elements of Applied
+Bifurcation Theory*, sections 5.4, 8.7 and 9.2). Only H is needed: no derivatives of the right-hand side by hand and no
+symbolic algebra. The series of H determine the amplitude at which it is sampled, so any units give the same digits.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Retur
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-_START = 0.2  # of the scale of the states, where the search for the amplitude starts
+_START = 0.2  # first amplitude of the search, relative to the scale of the states
 
 
 @dataclass(frozen=True)
@@ -35,27 +34,27 @@ class NormalForm:
     ``quadratic`` is zero. Neimark-Sacker (state = 2 Re(a mode)): |a| -> |a| + cubic |a|^3,
     while the phase of a advances by that of the multiplier + rotation |a|^2.
 
-    A mode that is k times as long (because a unit is) has amplitudes that are 1/k of these, and so coefficients that
-    are k (quadratic) and k^2 times as large (cubic, rotation).
+    A mode k times as long (through a change of units) has amplitudes 1/k as large, so coefficients k times (quadratic)
+    and k^2 times as large (cubic, rotation).
 
     Attributes
     ----------
     status
-        True if the numbers mean anything. Where it is neither FOUND nor LINEAR they are NaN, their errors infinite;
-        except at the resonances 1:3 and 1:4, where they are those of Kuznetsov's normal form but decide nothing alone.
+        Status of the numbers. If it is neither FOUND nor LINEAR they are NaN with infinite errors, except at the
+        resonances 1:3 and 1:4, where they belong to Kuznetsov's normal form but decide nothing alone.
     quadratic, cubic
         Coefficients. A negative ``cubic`` bounds the growth: supercritical.
     rotation
-        rad per period; 0 unless the critical multipliers are complex.
+        Change of phase in rad per period; 0 unless the critical multipliers are complex.
     quadratic_error, cubic_error, rotation_error
-        Bounds on how far they may be off: noise of the map, truncation, and an orbit that is not exact.
+        Bounds on their errors: noise of the map, truncation, and error of the orbit.
     amplitude
         Largest amplitude at which the map was sampled for these numbers.
     resonance
-        k where the pair is exp(+-2 pi i / k) within its uncertainty, k = 1 ... 4; else None.
+        Number k, 1 to 4, if the pair is exp(+-2 pi i / k) within its uncertainty; else None.
     resonant, resonant_error
-        At 1:3 and 1:4: coefficient of conj(a)^2, or conj(a)^3, of one return; turning the mode by an angle turns it.
-    ratio
+        Coefficient of conj(a)^2 (1:3) or conj(a)^3 (1:4) of one return; it turns with the phase of the mode.
+        ratio
         At 1:4: A = -i C / |D| of Kuznetsov, section 9.5.3, with C and D the coefficients of a |a|^2 and conj(a)^3.
     """
 
@@ -87,13 +86,13 @@ def normal_form(
     Parameters
     ----------
     mapped, at
-        The return map, of states of shape (k, n) at once, and the critical orbit.
+        Return map of several states, shape (k, n), and the critical orbit.
     noise, uncertainty
-        Relative errors of the map, beside what is seen in the samples and round-off, and of its derivative.
+        Relative errors of the map, beside round-off and the noise of the samples, and of its derivative.
     scale
         Sizes of the states, shape (n,), where the search for an amplitude starts; by default the size of the orbit.
     orbit_error
-        Error of the orbit along the mode; by default what its residual and the noise allow, much beside a singular
+        Error of the orbit along the mode; by default from its residual and the noise, large near a singular
         H - 1.
     """
     values, errors = _uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
@@ -108,7 +107,7 @@ def normal_form(
         resonance = next(near, None)
     if resonance in (1, 2):
         return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=resonance)
-    # Far out, where nobody knows what is there, an overflow is an answer.
+    # An overflow far out is a valid result.
     with np.errstate(all="ignore"):
         fit = fitted(mapped, at, noise, resonance, _start(at, scale))
     if fit is None:
@@ -144,27 +143,27 @@ def _uncertainties(jacobian: Array, relative: float) -> tuple[NDArray[np.complex
     except np.linalg.LinAlgError:
         left = np.full(right.shape, np.inf)
     error = relative * np.linalg.norm(balanced)
-    # To first order each is off by its condition; but even those of a defective pair not by more than the square root.
+    # To first order the condition gives each error, but even for a defective pair it is at most the square root.
     condition = np.linalg.norm(right, axis=0) * np.linalg.norm(left, axis=0)
     return values.astype(np.complex128), np.minimum(error * condition, np.sqrt(error))
 
 
 def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
-    """An amplitude to start the search from; what comes out does not depend on it."""
+    """First amplitude of the search; the result does not depend on it."""
     mode = np.abs(at.right)
     if scale is not None:
         known = mode > 0.0
         return _START * float((np.abs(np.asarray(scale, dtype=np.float64))[known] / mode[known]).min())
     orbit = float(np.abs(at.state).max())
-    # Nothing is known of an orbit at the origin: the search has all the way to go then, up or down.
+    # An orbit at the origin gives no scale: the search may then take many steps up or down.
     return orbit / float(mode.max()) if orbit > 0.0 else _START
 
 
 def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
-    """How far along the mode an orbit may be off that returns as nearly as this one does, where H - 1 is singular.
+    """Error along the mode of an orbit with this residual, where H - 1 is singular.
 
-    Off by d from the symmetric orbit of a pitchfork it misses itself by at least cubic d^3, and looks as if there were
-    a quadratic term 3 cubic d; beside a transcritical point it misses by quadratic d^2.
+    At a distance d from the symmetric orbit of a pitchfork the residual is at least cubic d^3, with an apparent
+    quadratic term 3 cubic d; beside a transcritical point it is quadratic d^2.
     """
     image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
     if image is None:
@@ -174,14 +173,14 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic
     if missed == 0.0:
         return 0.0
     by_cubic = float(1.5 * np.cbrt(missed / cubic)) if cubic > 0.0 else np.inf
-    # A quadratic term that no pitchfork beside this orbit explains holds the orbit closer.
+    # A quadratic term that no near pitchfork explains bounds the error more closely.
     return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
 
 
 def _of_full_period(
     fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float, orbit_error: float | None
 ) -> NormalForm:
-    """From one return at a real multiplier to the map whose multiplier is +1."""
+    """Coefficients of the map with multiplier +1 from those of one return at a real multiplier."""
     quadratic, quadratic_error = fit.sampled.term((2, 0))
     cubic, cubic_error = fit.cubic.real, fit.cubic_error
     fourth, fourth_error = fit.sampled.term((4, 0))

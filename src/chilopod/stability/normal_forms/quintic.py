@@ -1,4 +1,4 @@
-"""The coefficient of fifth order: what decides where the cubic one vanishes."""
+"""The coefficient of fifth order, which decides where the cubic one vanishes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates
 
-_BENDS = 4  # one for every order of the manifold, and one to make sure
-_STEP = 1.5  # ratio of amplitudes that are tried one after another
-_TRIES = 8  # of them each way
-_WORSE = 2  # that are tried beyond the best one
+_BENDS = 4  # one for every order of the manifold, and one more
+_STEP = 1.5  # ratio of successive amplitudes
+_TRIES = 8  # largest number of amplitudes each way
+_WORSE = 2  # amplitudes tried beyond the best one
 
 Term = tuple[complex, float]
 """A coefficient and its error."""
@@ -21,8 +21,8 @@ Term = tuple[complex, float]
 class Quintic:
     """The map over the full period on the centre manifold, where its cubic coefficient vanishes."""
 
-    # Coefficient e of a -> a + e a^5 (a pair: |a| -> |a| + e |a|^5), of the map that the cubic coefficient of a
-    # :class:`~chilopod.stability.normal_forms.normal_form.NormalForm` is of, and a bound on its error.
+    # Coefficient e of a -> a + e a^5 (a pair: |a| -> |a| + e |a|^5), of the map of the cubic coefficient of a
+    # :class:`~chilopod.stability.normal_forms.normal_form.NormalForm`, and a bound on its error.
     coefficient: float
     error: float
     curve: Curve  # the centre manifold, up to fourth order
@@ -30,9 +30,9 @@ class Quintic:
 
 
 def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float, noise: float = 0.0) -> Quintic | None:
-    """The coefficient of fifth order at a critical orbit, from the amplitude at which its error is smallest, which is
-    sought from that of the normal form of third order on; None if the map exists at none. A multiplier +1 is that of a
-    pitchfork: a symmetry keeps terms of even order away."""
+    """The coefficient of fifth order at a critical orbit, from the amplitude with the smallest error; the search starts
+    at that of the normal form of third order. None if the map is undefined at all amplitudes. A multiplier +1 belongs
+    to a pitchfork, whose symmetry excludes terms of even order."""
     best: Quintic | None = None
     manifold = Manifold(mapped, at, noise, 5)
     curve: Curve = manifold.curve
@@ -63,7 +63,7 @@ def _measured(manifold: Manifold, at: CriticalOrbit, radius: float) -> Quintic |
 
 
 def _of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[float, float]:
-    """From the terms of one return to the coefficient of fifth order over a full period, or over two."""
+    """Coefficient of fifth order over a full period, or over two, from the terms of one return."""
     (c, c_error), (e, e_error) = third, fifth
     cubic, cubic_error, value, error, times = c.real, c_error, e.real, e_error, at.returns
     if not at.real:
@@ -77,7 +77,7 @@ def _of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[float,
         error = 2.0 * error + 3.0 * (2.0 * abs(cubic) + cubic_error) * cubic_error
         cubic, cubic_error = -2.0 * cubic, 2.0 * cubic_error
         times = times // 2 if times % 2 == 0 else times
-    # a -> a + c a^3 + e a^5 so many times.
+    # a -> a + c a^3 + e a^5, iterated.
     pairs = 1.5 * times * (times - 1)
     error = times * error + pairs * (2.0 * abs(cubic) + cubic_error) * cubic_error
     return times * value + pairs * cubic * cubic, error

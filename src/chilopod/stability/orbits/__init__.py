@@ -1,1 +1,1 @@
-"""Periodic orbits as equations, and where their solution starts."""
+"""Equations of periodic orbits, and guesses of their solutions."""

@@ -1,4 +1,4 @@
-"""Guesses of periodic orbits: whole ones, and where Newton's method starts from once it has failed at a state."""
+"""Guesses of periodic orbits: whole ones, and further starts of Newton's method after a failure."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
 
-_OF_GUESS = 16  # nodes of an orbit that was given
+_OF_GUESS = 16  # nodes of a guess that is a whole orbit
 _FEWEST_ROWS = 5
 _FEWEST_NODES = 3
 _SAME_PERIOD = 1e-6
-_ONWARD = 0.382  # of the guessed return, where a guess is of no use
+_ONWARD = 0.382  # distance along the motion of the next guess, relative to the guessed return
 _LONGEST_SETTLING = 300  # returns
-_MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
-_COMES_BACK = 0.1  # of its size
-_STILL = 1e-3  # of how much the others move
+_MARCHED, _MARCHES = 48, 8  # steps per guessed period, and guessed periods, within which a motion must return
+_COMES_BACK = 0.1  # distance of a return, relative to the size of the motion
+_STILL = 1e-3  # motion of a state, relative to the others, that counts as rest
 
 
 def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
-    """Nodes of a guess that is a whole orbit, in the forms that :func:`~chilopod.stability.find_orbit` takes; None for
-    one that is a single state."""
+    """Nodes of a guess that is a whole orbit, in the forms of :func:`~chilopod.stability.find_orbit`; None for a single
+    state."""
     if hasattr(guess, "coords") and "time" in guess.coords:
         guess = guess.coords["time"].values, guess.values
     n, whole = system.dimension, return_duration(system) * returns_per_period(system)
@@ -47,18 +47,18 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     if len(states) < _FEWEST_ROWS:
         raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
     if not (np.diff(times) > 0.0).all():
-        raise ParameterError("has times that do not rise", field="orbit")
+        raise ParameterError("must have rising times", field="orbit")
     lasts = float(times[-1] - times[0])
     if not is_autonomous(system) and not abs(lasts - whole) <= _SAME_PERIOD * whole:
-        raise ParameterError("is not of one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
+        raise ParameterError("must cover one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
     duration = lasts / returns_per_period(system)
     return Nodes(CubicSpline(times - times[0], states)(np.arange(_OF_GUESS) * duration / _OF_GUESS), duration)
 
 
 def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
-    """Where to start from once Newton's method has failed at a guessed state, and whether to step carefully: the guess
-    itself first, where the period belongs to the orbit, since of an orbit with a strongly stable direction only guesses
-    on its stable manifold come back to a section."""
+    """Further starts after Newton's method has failed at a guessed state, each with a flag for careful steps. The first
+    is the guess itself if the period belongs to the orbit, since an orbit with a strongly stable direction is reached
+    from a section only by guesses on its stable manifold."""
     if is_autonomous(system):
         yield Nodes(x[None], return_duration(system)), True
     for start in (_magnified, _onward, _settled):
@@ -77,8 +77,8 @@ def _magnified(system: SystemLike, x: Array) -> list[Nodes]:
 
 
 def _onward(system: SystemLike, x: Array) -> list[Nodes]:
-    """A state further along the motion, where every state may be time 0: in the guess itself something may just have
-    happened, such as an impact, and a motion that ends there ends before it or after it by round-off."""
+    """A state further along the motion, if every state may be time 0: the guess may lie at an event, such as an impact,
+    and round-off decides whether a motion that ends there is before or after it."""
     if not is_autonomous(system):
         return []
     duration = return_duration(system)
@@ -89,7 +89,7 @@ def _onward(system: SystemLike, x: Array) -> list[Nodes]:
 
 
 def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:
-    """States on the orbit that attracts the motion from a state, if one does."""
+    """States on an attracting orbit of the motion from a state, if any."""
     if is_autonomous(system):
         yield from _settled_autonomous(system, x)
         return
@@ -105,7 +105,7 @@ def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:
 
 
 def _settled_autonomous(system: Autonomous, x: Array) -> list[Nodes]:
-    """As :func:`_settled`, with a new guess of the period: when the motion first comes close to where it was."""
+    """As :func:`_settled`, with a new guess of the period: the first close return of the motion."""
     step = system.guess_period / _MARCHED
     try:
         for _ in range(_LONGEST_SETTLING // 4):
@@ -118,7 +118,7 @@ def _settled_autonomous(system: Autonomous, x: Array) -> list[Nodes]:
     states = np.array(path)
     if not np.isfinite(states).all():
         return []
-    # A state that hardly moves, for its size, tells nothing.
+    # A state that hardly moves, relative to its size, gives no information.
     size = sizes(system, x, system.guess_period)
     moves = np.ptp(states, axis=0) / size
     size = size * np.maximum(moves, _STILL * moves.max())

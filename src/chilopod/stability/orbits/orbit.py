@@ -44,17 +44,17 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
-_RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
-_RETURNED = 1e-12  # of a known orbit: it is exact
-_SINGULAR = 1e-13  # singular values of H - 1 that count as zero, the largest being one
-_KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
-_SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
-_MOST_PARTS = 8  # of a return: a guess of the period may be so many times too long
-_CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that closes so nearly is solved for once more
-_COARSE = 1e-11  # of the sizes of the states: such an error is estimated by two computations too
-_CHANCE = 1e-13  # of the sizes of the states: two computations may agree by chance
-_SYMMETRIC = 1e-12  # of the sizes of the states: a symmetry that holds so closely is one of the orbit's
-_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+_RESTS = 1e-8  # motion, relative to the sizes at the guess, that counts as rest
+_RETURNED = 1e-12  # relative residual of a known orbit that is exact
+_SINGULAR = 1e-13  # singular value of H - 1, relative to the largest, that counts as zero
+_KNOWN = 1e-4  # largest relative residual of a known orbit, which is then corrected
+_SETTLING = 100  # cost of settling in return maps, without derivatives
+_MOST_PARTS = 8  # largest ratio of the guessed period to the orbit's
+_CLOSES = 1e-8  # residual, relative to motion and sizes of the states, of an early return that is then corrected
+_COARSE = 1e-11  # error, relative to the sizes of the states, from which a second computation estimates it too
+_CHANCE = 1e-13  # difference, relative to the sizes of the states, of two computations that may agree by chance
+_SYMMETRIC = 1e-12  # residual, relative to the sizes of the states, of a symmetry of the orbit
+_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,11 @@ class Orbit(Shown, ReadOnlyArrays):
     Attributes
     ----------
     state
-        At time 0, shape (n,).
+        State at time 0, shape (n,).
     image
-        The return map there.
+        Return map at that state.
     error
-        Bound on the error of ``state``, shape (n,); zero where it is known exactly, NaN if it was not asked for.
+        Bound on the error of ``state``, shape (n,); zero if it is exact, NaN if not computed.
     """
 
     state: Array
@@ -77,12 +77,12 @@ class Orbit(Shown, ReadOnlyArrays):
 
     @property
     def period(self) -> float:
-        """The full period."""
+        """Full period."""
         return self.image.period
 
     @property
     def section(self) -> Section | None:
-        """The section that ``image`` returns to, where the system does not depend on time."""
+        """Section of ``image``, if the system does not depend on time."""
         if self.image.normal is None:
             return None
         return Section(self.state, self.image.normal, self.image.period / self.image.returns)
@@ -96,11 +96,11 @@ class Orbit(Shown, ReadOnlyArrays):
 
 
 def known_state(system: SystemLike) -> Array:
-    """The state on its orbit that a system knows of itself; an AnalysisError if it knows none."""
+    """The system's own state on its orbit; an AnalysisError if it has none."""
     orbit = known_orbit(system)
     if orbit is None:
         raise AnalysisError(
-            "this system does not know its periodic orbit", field="orbit", allowed="a first guess of it"
+            "this system has no known periodic orbit", field="orbit", allowed="a first guess of the orbit"
         )
     return np.asarray(orbit, dtype=np.float64)
 
@@ -116,41 +116,40 @@ def find_orbit(
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
-    Of a system that does not depend on time it has its own, shortest period also where the guess is nearer to up to
-    eight times that: if the motion closes earlier, the orbit is solved for once more over that time. (An orbit of twice
-    the period that branches off at a period doubling closes no earlier.)
+    For a system that does not depend on time the result has the shortest period, even if the guess is nearer to up to
+    eight times that: if the motion closes earlier, the orbit is corrected again over that time. (An orbit of twice the
+    period that branches off at a period doubling does not close earlier.)
 
-    Where it does not converge from the guess, it is tried from a state further along the motion if every state may be
-    time 0, and then the motion is given time to settle on an orbit that attracts it.
+    If Newton's method fails at the guess, it is tried from a state further along the motion, provided that every state
+    may be time 0, and then after the motion has settled on an attracting orbit.
 
     Parameters
     ----------
     system
-        The system; one that knows its orbit needs no guess.
+        System; one that knows its orbit needs no guess.
     guess
-        A state at time 0 near the orbit, shape (n,); or a whole orbit near it, solved by multiple shooting: states at
-        even times over one period, shape (times, n), or times and states, shapes (times,) and (times, n), as a tuple or
-        an ``xarray.DataArray`` over ``time``. It then takes the period that the guess has.
+        State at time 0 near the orbit, shape (n,); or a whole orbit near it, for multiple shooting: states at even
+        times over one period, shape (times, n), or times and states, shapes (times,) and (times, n), as a tuple or an
+        ``xarray.DataArray`` over ``time``. The result then has the period of the guess.
     with_error
         True to bound errors.
     section
-        Section of a system that does not depend on time: where its orbit is looked for. By default across the motion in
-        the guess; the orbit that is found has the section across its own motion.
+        Section of the search, if the system does not depend on time; by default across the motion at the guess. The
+        result has the section across its own motion.
     settle
-        True to let the motion settle where Newton's method fails: up to 330 returns, or 83 guessed periods.
+        True to let the motion settle if Newton's method fails: up to 330 returns, or 83 guessed periods.
     budget
-        Return maps that may be evaluated, which are taken from it: up to 60 for every start of Newton's method, and 100
-        for letting the motion settle.
+        Budget of return maps: up to 60 are taken for every start of Newton's method, and 100 for settling.
     shortest
-        True to look for the shortest period, where no section tells how long a return takes.
+        True to find the shortest period, if no section is given.
 
     Raises
     ------
     AnalysisError
-        If neither helps.
+        If no start converges.
     """
     if not hasattr(system, "flow"):
-        raise ParameterError("is no system", field="system", value=system, allowed="what `from_rhs` gives")
+        raise ParameterError("must be a system", field="system", value=system, allowed="a system from `from_rhs`")
     if guess is None:
         return from_known(system, known_state(system), with_error, budget=budget)
     whole = whole_orbit(guess, system)
@@ -177,8 +176,8 @@ def find_orbit(
 
 
 def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
-    """As :func:`find_orbit`, of a large system: the return map on the orbit without its derivative as a matrix, and the
-    sizes of the states, shape (n,). Where the method for these fails, :func:`find_orbit` is asked."""
+    """As :func:`find_orbit`, for a large system: the return map on the orbit without its derivative as a matrix, and
+    the sizes of the states, shape (n,). If that method fails, :func:`find_orbit` takes over."""
     x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
     exact = guess is None and not is_autonomous(system)
     try:
@@ -195,7 +194,7 @@ def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> t
 
 
 def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget | None) -> Orbit:
-    """The same orbit over its shortest period, where every instant may be time 0."""
+    """The same orbit over its shortest period, if every instant may be time 0."""
     if not is_autonomous(system):
         return orbit
     duration = orbit.period / orbit.image.returns
@@ -210,8 +209,8 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
 
 
 def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
-    """How many times a return closes within its time, where every instant may be time 0; with the sizes of the states
-    for that time."""
+    """Number of times that a return closes within its duration, if every instant may be time 0; with the sizes of the
+    states for the shorter time."""
     if not is_autonomous(system):
         return 1
     counts = np.arange(_MOST_PARTS, 1, -1)
@@ -219,7 +218,7 @@ def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
     for time in duration / counts:
         states.append(carried(system, states[-1][None], 0.0, time - passed)[0])
         passed = time
-    # Over several rounds a sixteenth of the time may be half of one, where a state is zero again.
+    # Over several rounds a sixteenth of the time may be half a round, where a state is zero again.
     size = np.maximum(size, np.abs(states).max(axis=0))
     near = _CLOSES * min(1.0, _relative(np.asarray(system.velocity(np.array(x))) * duration, size))
     away = (np.abs(turned(system, np.array(states[1:])) - x) / size).max(axis=1)
@@ -234,13 +233,13 @@ def from_known(
     image: ReturnMap | None = None,
     budget: Budget | None = None,
 ) -> Orbit:
-    """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
-    The return map there may have been computed already."""
+    """The orbit through the system's own state on it, corrected if that is not exact.
+    The return map there may be given."""
     if is_autonomous(system):
         return find_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
-    # No state is smaller than its value, unless the system says so itself.
+    # No size is smaller than the state's value, unless the system gives the sizes.
     if not moved.any() or (given_scale(system) is None and (moved <= _RETURNED * np.abs(x)).all()):
         return Orbit(x, image, np.zeros(x.size))
     size = sizes(system, x, image.period / image.returns)
@@ -250,9 +249,9 @@ def from_known(
     if off <= _KNOWN:
         return _solved(system, Nodes(x[None], return_duration(system)), with_error, budget)
     raise AnalysisError(
-        f"is no periodic orbit: one return later the state is {float(moved.max()):.1e} away",
+        f"must be a periodic orbit: one return moves the state by {float(moved.max()):.1e}",
         field="orbit",
-        allowed="a state on the orbit at time 0, or as a first guess, which is then improved",
+        allowed="a state on the orbit at time 0, or a first guess, which is then improved",
     )
 
 
@@ -268,7 +267,7 @@ def _solved(
     section: Section | None = None,
     careful: bool = False,
 ) -> Orbit:
-    """The orbit near some nodes, of which the first one stays on the section: by default across the motion there."""
+    """The orbit near some nodes, the first on the section: by default across the motion there."""
     x, duration = start.states[0], start.duration
     size = sizes(system, x, duration)
     section = section or section_at(system, x, size, duration)
@@ -276,7 +275,7 @@ def _solved(
         with contextlib.suppress(AnalysisError):
             closed, _ = closed_orbit(system, x, section, budget=budget)
             return _found(system, closed.point, closed.duration, size, with_error)
-    if len(start.states) > 1:  # which tell the sizes better than the first one
+    if len(start.states) > 1:  # all nodes give better sizes than the first one
         largest = np.abs(start.states).max(axis=0)
         size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
     found = shot(
@@ -291,10 +290,10 @@ def _solved(
 
 
 def _found(system: SystemLike, x: Array, duration: float, size: Array, with_error: bool) -> Orbit:
-    """The orbit through a state that is on it, with the section across its own motion; ``size`` is of the states."""
+    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states."""
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
         raise AnalysisError(
-            "the motion rests in an equilibrium near the guess",
+            "the corrector found an equilibrium near the guess",
             field="orbit",
             allowed="a guess closer to an orbit",
         )
@@ -305,9 +304,9 @@ def _found(system: SystemLike, x: Array, duration: float, size: Array, with_erro
 
 
 def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
-    """Basis of the states with the spatial symmetries of one, shape (n, k); None if it has none.
+    """Basis of the states with the spatial symmetries of a state, shape (n, k); None if it has none.
 
-    Among these H - 1 is regular also where a mode that breaks them is critical.
+    In this space H - 1 is regular also where a symmetry-breaking mode is critical.
     """
     if system.symmetry is not None or not spatial_symmetries(system):
         return None
@@ -316,8 +315,8 @@ def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
 
 
 def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None = None) -> Orbit:
-    """The orbit through a state that is on it, shape (n,), with the section across its motion and with error bounds;
-    ``image`` is the return map there or near, ``error`` a bound on that of the state, shape (n,), if it is known."""
+    """The orbit through a state on it, shape (n,), with the section across its motion and with error bounds; ``image``
+    is the return map there or nearby, ``error`` a bound on the state's error, shape (n,), if known."""
     return _bounded(system, x, image.period / image.returns, error)
 
 
@@ -330,17 +329,17 @@ def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None 
     image = return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
     if error is None:
-        # The state is as uncertain as the flow, of which the derivative's error tells, or where that is coarse two
-        # computations, times what H - 1 makes of it.
+        # The state's error is that of the flow, from the derivative's error or, where that is coarse, from two
+        # computations, multiplied by the inverse of H - 1.
         flow = _matrix(image.error, size) @ size
-        stiff = is_stiff(system, x, duration)  # the derivative may be nothing, and err by nothing
+        stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():
             twice = REPEATED * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
             flow = flow + twice if stiff else np.minimum(flow, twice)
         wrong = np.abs(image.state - x) + flow
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
-    # The derivative is that of a state so far off: along the direction in which the orbit is least sure.
+    # The derivative belongs to a state with this error: along the orbit's least certain direction.
     weakest = size * np.linalg.svd(scaled)[2][-1]
     beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
     bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / _BESIDE)
@@ -348,7 +347,7 @@ def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None 
 
 
 def _in_parts(system: SystemLike, x: Array, duration: float) -> Array:
-    """Where a state returns to, by other steps than those of the flow over the whole return."""
+    """Return of a state, by other steps than those of the flow over the whole return."""
     for part, following in itertools.pairwise((*CUTS, 1.0)):
         x = carried(system, x[None], part * duration, following * duration)[0]
     return np.asarray(turned(system, x[None])[0])

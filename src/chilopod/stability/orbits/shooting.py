@@ -1,7 +1,7 @@
 """The equations of a periodic orbit: states at instants that divide a return evenly, each carried to the next one.
 
-One node is single shooting. Over a whole return a motion may magnify a deviation by thousands, and a correction that is
-as far off is none; over a part of it a deviation grows by a root of that. The linear equations are condensed to the
+One node is single shooting. Over a whole return a motion may magnify a deviation by thousands, which makes corrections
+useless; over a part of it a deviation grows only by a root of that. The linear equations are condensed to the
 first state, the time of a return and the parameter (Ascher, Mattheij & Russell, *Numerical Solution of Boundary Value
 Problems*, section 4.3), the time to that at which the return ends on the section.
 """
@@ -25,19 +25,19 @@ from chilopod.stability.problem.returns import Section, carried, checked_flow, c
 
 Array = NDArray[np.float64]
 
-_EVALUATIONS, FEW_ROUNDS = 60, 12  # where corrections are damped, and on a curve, whose points are near
-_LONGEST = 4.0  # times the time of a return that was guessed
-_STRAYS = 20  # evaluations where the motion does not come back to the section
-_SHORTEST = 2.0**-6  # of a correction
-_DIFFERENCE = 1e-7  # of the parameter's scale
-_QUICKEST = 0.3  # of the time of a return: its largest correction
-_FARTHEST, _FARTHER = 10.0, 2.0  # of the sizes of the states: the largest correction, and how much it grows by the next
-_NEAR = 1e-2  # of the sizes of the states: a motion that closes so nearly comes back to a section
-_CAREFUL = 0.3  # likewise, where the motion does not come back to the section
-_CUTOFF, _SINGULAR, _FAMILY = 1e-15, 1e-13, 1e-8  # singular values that count as zero, the largest being one
+_EVALUATIONS, FEW_ROUNDS = 60, 12  # largest numbers of damped corrections, and of those on a curve, with near points
+_LONGEST = 4.0  # longest return, relative to the guess
+_STRAYS = 20  # largest number of evaluations while the motion does not return to the section
+_SHORTEST = 2.0**-6  # smallest fraction of a correction
+_DIFFERENCE = 1e-7  # step of differences, relative to the parameter's scale
+_QUICKEST = 0.3  # largest correction of the time of a return, relative to it
+_FARTHEST, _FARTHER = 10.0, 2.0  # largest correction, relative to the sizes of the states, and its growth per round
+_NEAR = 1e-2  # residual, relative to the sizes of the states, below which a motion returns to a section
+_CAREFUL = 0.3  # largest correction, relative to the sizes of the states, without a return to the section
+_CUTOFF, _SINGULAR, _FAMILY = 1e-15, 1e-13, 1e-8  # singular values, relative to the largest, that count as zero
 _MAGNIFIED = 1e9  # correction over residual beyond which the equations may be singular
-_NOTHING = 1e-13  # of the sizes of the states: a state that small may be zero
-_GROWTH = 4.0  # of a deviation from one node to the next, about
+_NOTHING = 1e-13  # state, relative to its size, that may be zero
+_GROWTH = 4.0  # approximate growth of a deviation from one node to the next
 _MOST = 32
 
 
@@ -53,10 +53,10 @@ class Nodes(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Closed(ReadOnlyArrays):
-    """An orbit that was solved for: its nodes, the sizes of the states, shape (n,), and where the last node returns to.
+    """A corrected orbit: its nodes, the sizes of the states, shape (n,), and the return of the last node.
 
-    The derivatives of a return, with respect to the state, shape (n, n), and to the parameter, shape (n,), are without
-    the change of its time: products of those between nodes, which no rounding of a whole return disturbs.
+    The derivatives of a return, with respect to the state, shape (n, n), and to the parameter, shape (n,), exclude the
+    change of its time: they are products of those between nodes, without the rounding of a whole return.
     """
 
     nodes: Nodes
@@ -68,8 +68,8 @@ class Closed(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Free:
-    """The parameter as an unknown, in units of ``scale``, with the equation that it takes: ``row . moved = target`` for
-    the displacement of first state and parameter from ``start``, shape (n+1,), in units."""
+    """The parameter as an unknown, in units of ``scale``, with its equation ``row . moved = target`` for the
+    displacement of first state and parameter from ``start``, shape (n+1,), in units."""
 
     row: Array
     target: float
@@ -78,7 +78,7 @@ class Free:
 
 
 def node_count(jacobian: Array, sizes: Array) -> int:
-    """Number of nodes over which deviations grow little, from the derivative of a return."""
+    """Number of nodes with little growth of deviations in between, from the derivative of a return."""
     growth = float(np.linalg.norm(jacobian * sizes / sizes[:, None], 2))
     return int(np.clip(np.ceil(np.log(max(growth, 1.0)) / np.log(_GROWTH)), 1, _MOST))
 
@@ -106,20 +106,20 @@ def shot(
     Parameters
     ----------
     system_at, start
-        The system at a value of the parameter, and the guess.
+        System at a value of the parameter, and guess.
     sizes
         Sizes of the states, shape (n,); they grow with the states while the parameter is given.
     section
-        Section that holds the first state, of a system without a period of its own; else None.
+        Section of the first state, for a system without a period of its own; else None.
     free
-        Equation for the parameter; None where it is given.
-    shared
-        Basis of the states among which the first one is corrected, shape (n, k); None for all.
-    budget
-        Budget that every evaluation takes a return from.
-    careful
-        True to take short steps and any time of a return until the motion about closes: a single node's motion need not
-        come back to the section then.
+        Equation for the parameter; None for a given one.
+        shared
+        Basis of the space of the first state's corrections, shape (n, k); None for all.
+        budget
+        Budget, from which every evaluation takes a return.
+        careful
+        True to take short steps and a free return time until the motion nearly closes; a single node's motion then need
+        not return to the section.
     """
     equations = _Equations(
         _Problem(system_at, free, shared, budget, careful), start, _Frame(sizes, sizes, section, careful)
@@ -130,7 +130,7 @@ def shot(
     cutoff = _CUTOFF if free is not None else _SINGULAR if len(start.states) == 1 else _FAMILY
     for _ in range(_EVALUATIONS if free is None else FEW_ROUNDS):
         if correction is None:
-            # Halved steps may lead to where the motion jumps, and the residual falls as they do.
+            # Halved steps may approach a jump of the motion, and the residual falls with them.
             if rule.met(equations.residual, best if whole else np.inf):
                 return (equations if free is not None else equations.cleared()).closed()
             if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
@@ -146,7 +146,7 @@ def shot(
         elif part > _SHORTEST:
             part *= 0.5
         elif cutoff == _SINGULAR:
-            # It followed round-off, along a family of orbits: without that direction it converges.
+            # The steps followed round-off along a family of orbits: without that direction they converge.
             cutoff, part = _FAMILY, 1.0
             correction = equations.correction(equations, cutoff)
         else:
@@ -160,7 +160,7 @@ def shot(
 
 @dataclass(frozen=True)
 class _Problem:
-    """Arguments of :func:`shot` that hold for all corrections."""
+    """Arguments of :func:`shot` for all corrections."""
 
     system_at: Callable[[float], SystemLike]
     free: Free | None
@@ -169,13 +169,13 @@ class _Problem:
     careful: bool
 
     def beside(self, value: float) -> tuple[SystemLike, float] | None:
-        """The system at a value of the parameter beside another one, and how far; None where the parameter is given."""
+        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
         if self.free is None:
             return None
         step = _DIFFERENCE * self.free.scale
         try:
             return self.system_at(value + step), step
-        except AnalysisError:  # the end of what there is
+        except AnalysisError:  # the family ends here
             return self.system_at(value - step), -step
 
 
@@ -188,8 +188,8 @@ class _Correction(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """Frame of a correction: sizes of the states, and of those where it may lead, shape (n,) both, the section that
-    holds the first one, and whether the motion does not come back to it."""
+    """Frame of a correction: sizes of the states, before and after it, shape (n,) both, the section of the first one,
+    and a flag for a motion that does not return to it."""
 
     sizes: Array
     reach: Array
@@ -247,7 +247,7 @@ class _Equations:
             try:
                 self._ends[i], self._factors[i] = checked_flow(system, x, a, b)
                 if beside is not None:
-                    with np.errstate(all="ignore"):  # what is not finite is refused later
+                    with np.errstate(all="ignore"):  # values that are not finite are refused later
                         self._by_value[i] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
             except AnalysisError as error:
                 if m == 1 or isinstance(error, SpentError):
@@ -255,8 +255,8 @@ class _Equations:
                 raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
 
     def _to_section(self, system: Autonomous, frame: _Frame) -> _Frame:
-        """Carry a single node to where its motion is back at the section; where it does not come back, over the time
-        that was guessed, with a section of its own."""
+        """Carry a single node until its motion returns to the section; if it does not, over the guessed time, with a
+        new section."""
         x, duration = self.nodes.states[0], self.nodes.duration
         assert frame.section is not None
         if not frame.astray:
@@ -290,11 +290,11 @@ class _Equations:
         return Closed(self.nodes, self._frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
 
     def correction(self, other: _Equations, cutoff: float) -> _Correction:
-        """Correction that these linear equations make of what is off here or at other nodes."""
+        """Correction by these linear equations for the residual here or at other nodes."""
         section, free, sizes = self._frame.section, self._problem.free, self._frame.sizes
         n, totals = sizes.size, self._totals(other._off)
         last, time = totals[-1], np.zeros(n + 3)
-        if section is not None:  # the time at which the return ends on it
+        if section is not None:  # the time of the return to it
             speed = float(section.normal @ last[:, n])
             if speed == 0.0:
                 raise AnalysisError("the motion does not cross the section", field="orbit")
@@ -310,13 +310,13 @@ class _Equations:
         move = _solution(matrix, right, cutoff, self._problem.shared, sizes)
         value = 0.0 if free is None else float(move[n]) * free.scale
         every = np.concatenate([sizes * move[:n], [0.0, value, 1.0]])
-        if not self._returned:  # else it is solved for at the next node
+        if not self._returned:  # else the next node determines it
             every[n] = time @ every
         return _Correction(np.array([total @ every for total in totals[:-1]]), float(every[n]), value)
 
     def after(self, correction: _Correction, part: float) -> _Equations | None:
-        """The equations after that part of a correction, or less of it where states or the time would change much; None
-        where the motion ends before, while the parameter is given."""
+        """The equations after that part of a correction, or less if states or the time would change much; None if the
+        motion ends before, for a given parameter."""
         here = self.nodes
         part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
         frame = self._frame
@@ -329,7 +329,7 @@ class _Equations:
             here.duration + part * correction.duration,
             here.value + part * correction.value,
         )
-        # All may only be getting larger.
+        # The states may just be growing.
         astray, reach = frame.astray and self.residual > _NEAR, frame.reach * (1.0 if frame.astray else _FARTHER)
         try:
             return _Equations(self._problem, there, frame._replace(reach=reach, astray=astray))
@@ -339,9 +339,9 @@ class _Equations:
             return None
 
     def is_nearer(self, there: _Equations, correction: _Correction, part: float, cutoff: float, best: float) -> bool:
-        """True if other equations, after part of a correction, are off by half as much, or have less to correct by the
-        linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3); astray, where steps are
-        short, if they are not off by much more than the best ones."""
+        """True if other equations, after part of a correction, have half the residual, or a smaller correction by the
+        linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3); without a return, where
+        steps are short, if their residual is not much larger than the best."""
         if self.astray:
             return there.residual <= 2.0 * best
         if float(np.abs(there._off / self._frame.sizes).max()) <= 0.5 * self.residual:
@@ -354,8 +354,8 @@ class _Equations:
         return max(states, abs(correction.duration) / self.nodes.duration)
 
     def cleared(self) -> _Equations:
-        """The orbit with the states of its first node that are only just not zero at zero, if it is an orbit still:
-        what is left of a guess would pass for the size of the orbit."""
+        """The orbit with the negligible states of its first node set to zero, if it remains an orbit: a rest of the
+        guess would count as the size of the orbit."""
         x = self.nodes.states[0]
         small = (x != 0.0) & (np.abs(x) <= _NOTHING * self._frame.sizes)
         if not small.any():
@@ -366,8 +366,8 @@ class _Equations:
 
 
 def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, sizes: Array) -> Array:
-    """Solution of linear equations in units, among the ``shared`` states if there are such; the shortest where orbits
-    come in families."""
+    """Solution of linear equations in units, within the ``shared`` states if given; the shortest one for families of
+    orbits."""
     if shared is not None:
         basis = np.linalg.qr(shared / sizes[:, None])[0]
         return np.asarray(basis @ _solution(basis.T @ matrix @ basis, basis.T @ right, cutoff, None, sizes))

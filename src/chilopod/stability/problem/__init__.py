@@ -1,1 +1,1 @@
-"""A system as the analyses see it: capabilities, return map, sizes of its states, and the budget of a search."""
+"""Interface of systems to the analyses: capabilities, return map, sizes of the states, and the budget of a search."""

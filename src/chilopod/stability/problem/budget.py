@@ -1,4 +1,4 @@
-"""Limits of a search, and what becomes of exceptions of a user's functions."""
+"""Limits of a search, and conversion of exceptions of a user's functions."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ __all__ = ["Budget", "SpentError", "UserCode", "UserError"]
 
 
 class UserCode:
-    """Context of a call of a user's function at a value of the parameter: whatever it raises becomes a
-    :class:`UserError`, an AnalysisError of one line as where a family has no orbit."""
+    """Context of a call of a user's function at a value of the parameter: any exception becomes a
+    :class:`UserError`, an AnalysisError of one line."""
 
     def __init__(self, field: str, value: object) -> None:
         self._field, self._value = field, value
@@ -30,19 +30,19 @@ class UserError(AnalysisError):
 
 
 class Budget(Deadline):
-    """Flows over a return, and time, that a search may still take.
+    """Remaining flows over a return, and time, of a search.
 
     Attributes
     ----------
     left
-        Number of flows; never below zero.
+        Remaining number of flows; never below zero.
 
     Parameters
     ----------
     allowed
         Number of flows.
     seconds
-        Time from now on, s; within its context also that of a flow under way.
+        Time from now, s; within its context it also ends a running flow.
     """
 
     def __init__(self, allowed: float, seconds: float = math.inf) -> None:
@@ -55,15 +55,15 @@ class Budget(Deadline):
         return self.left <= 0 or self.late
 
     def take(self, count: int = 1) -> None:
-        """Count some flows that are about to be computed.
+        """Count flows before they are computed.
 
         Raises
         ------
         SpentError
-            If there is none left.
+            If too few are left.
         """
         if self.left <= 0:
-            raise SpentError("as many flows as were allowed are spent", field="budget")
+            raise SpentError("the budget of flows is spent", field="budget")
         if self.late:
             raise over()
         self.left = max(self.left - count, 0)

@@ -1,10 +1,9 @@
-"""Interfaces that the analyses need of a periodic system, and those that they use where a system has them.
+"""Required and optional interfaces of a periodic system.
 
-Every capability is a protocol: a system has it by having its methods. The analyses ask ``isinstance``, or, of
-protocols with one member, the functions at the end of this module. A member that is None counts as missing, so a class
-may leave to its instances whether they have it (:class:`chilopod.stability.PeriodicSystem` does). Methods and
-properties have to be found on the system or its class: from Python 3.12 on, ``isinstance`` does not see what a
-``__getattr__`` makes up.
+Every capability is a protocol: a system implements it through its methods. The analyses test it by ``isinstance``, or
+by the functions at the end of this module for protocols with one member. A member that is None counts as missing, so
+instances of one class may differ (as those of :class:`chilopod.stability.PeriodicSystem`). Methods and properties must
+exist on the system or its class: from Python 3.12 on, ``isinstance`` ignores the results of ``__getattr__``.
 
 Throughout, n is the number of states; times are in the unit of the system's period, states in its own units; a
 derivative has the derivative of state i with respect to state j at the start in row i, column j.
@@ -25,9 +24,9 @@ Array = NDArray[np.float64]
 
 @runtime_checkable
 class SystemLike(Protocol):
-    """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow: what every analysis needs.
+    """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow, which every analysis needs.
 
-    One that does not depend on time has no period of its own: see :class:`Autonomous`.
+    A system that does not depend on time has no period of its own: see :class:`Autonomous`.
     """
 
     @property
@@ -37,7 +36,7 @@ class SystemLike(Protocol):
 
     @property
     def period(self) -> float | None:
-        """T; None where the system does not depend on time and the period belongs to the orbit."""
+        """Period T; None if the system does not depend on time and the period belongs to the orbit."""
         ...
 
     @property
@@ -57,21 +56,21 @@ Family = Callable[[float], SystemLike]
 
 @runtime_checkable
 class Autonomous(SystemLike, Protocol):
-    """Does not depend on time: the period of an orbit is an unknown, and every instant may be time 0."""
+    """Systems that do not depend on time: the period of an orbit is an unknown, and every instant may be time 0."""
 
     @property
     def guess_period(self) -> float:
-        """About how long an orbit takes."""
+        """Approximate period of an orbit."""
         ...
 
     def velocity(self, x: Array, /) -> Array:
-        """dx/dt in state x, shape (n,)."""
+        """dx/dt at state x, shape (n,)."""
         ...
 
 
 @runtime_checkable
 class ExpandsVelocity(Autonomous, Protocol):
-    """Knows its right-hand side f with all derivatives; of other systems they are taken by differences."""
+    """Systems that know their right-hand side f with all derivatives; else differences are used."""
 
     def velocity_series(self, curves: Array, /) -> Array:
         """Taylor coefficients in s of f(x(s)), shape (curves, orders, n), along curves x(s) = c0 + c1 s + ... with
@@ -81,7 +80,7 @@ class ExpandsVelocity(Autonomous, Protocol):
 
 @runtime_checkable
 class CyclicallySymmetric(Protocol):
-    """Has a symmetry of another order than 2, such as the shift along a ring of oscillators."""
+    """Systems with a symmetry of another order than 2, such as the shift along a ring of oscillators."""
 
     @property
     def symmetry_order(self) -> int:
@@ -91,27 +90,27 @@ class CyclicallySymmetric(Protocol):
 
 @runtime_checkable
 class Scaled(Protocol):
-    """Says what a large change of every state is, in its own unit; of other systems the orbit tells."""
+    """Systems that define a large change of every state, in its own unit; else the orbit determines it."""
 
     @property
     def scale(self) -> Array | None:
-        """Positive, shape (n,); or None."""
+        """Positive sizes of the states, shape (n,); or None."""
         ...
 
 
 @runtime_checkable
 class KnowsOrbit(Protocol):
-    """Knows its periodic orbit, so that nobody has to guess and search."""
+    """Systems that know their periodic orbit, so that no guess is needed."""
 
     @property
     def orbit(self) -> Array | None:
-        """State on the orbit at time 0, shape (n,); or None. It is improved where it does not return to round-off."""
+        """State on the orbit at time 0, shape (n,); or None. It is corrected if it does not return to round-off."""
         ...
 
 
 @runtime_checkable
 class SpatiallySymmetric(Protocol):
-    """Has symmetries that hold at every instant, such as a reflection: a pitchfork is then known as one."""
+    """Systems with symmetries that hold at every instant, such as a reflection, which identify pitchforks."""
 
     @property
     def spatial_symmetry(self) -> Array | None:
@@ -122,7 +121,7 @@ class SpatiallySymmetric(Protocol):
 
 @runtime_checkable
 class FlowsWithError(Protocol):
-    """Bounds the error of its flow; of other systems the error is estimated by a second computation."""
+    """Systems that bound the error of their flow; else a second computation estimates it."""
 
     def flow_with_error(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array, float | Array]:
         """As :meth:`SystemLike.flow`, and a bound on the absolute error of the derivative: of every entry, shape
@@ -132,7 +131,7 @@ class FlowsWithError(Protocol):
 
 @runtime_checkable
 class FlowsStates(Protocol):
-    """Carries many states at once; other systems are asked for one flow after another."""
+    """Systems that carry many states together; else each flow is computed separately."""
 
     def flow_states(self, states: Array, t0: float, t1: float, /) -> Array:
         """States at t1 of those at t0, shape (states, n) both, without derivatives."""
@@ -141,7 +140,7 @@ class FlowsStates(Protocol):
 
 @runtime_checkable
 class FlowsTangents(SystemLike, Protocol):
-    """Carries some directions instead of the full derivative, of which a large system needs no more."""
+    """Systems that carry some directions instead of the full derivative, which suffices for large systems."""
 
     def flow_tangents(self, x: Array, directions: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
         """State at t1, shape (n,), and its derivative with respect to the state x at t0, times the directions, shape
@@ -151,7 +150,7 @@ class FlowsTangents(SystemLike, Protocol):
 
 @runtime_checkable
 class FlowsEach(Protocol):
-    """Carries every state by a system of its own: derivatives by a parameter then cost next to nothing."""
+    """Systems that carry each state by another system, for derivatives by a parameter at almost no cost."""
 
     def flow_each(self, systems: Sequence[Self], states: Array, t0: float, t1: float, /) -> Array:
         """States at t1, each carried by the system in its place, shape (systems, n) as at t0, without derivatives."""
@@ -160,7 +159,7 @@ class FlowsEach(Protocol):
 
 @runtime_checkable
 class FlowsMany(KnowsOrbit, Protocol):
-    """Computes derivatives along the known orbits of many systems of its class at once, for sweeps."""
+    """Systems that compute derivatives along the known orbits of many systems of their class together, for sweeps."""
 
     def can_flow_with(self, other: Self, /) -> bool:
         """True if :meth:`flow_many` may take the other system along with this one."""
@@ -174,10 +173,10 @@ class FlowsMany(KnowsOrbit, Protocol):
 
 @runtime_checkable
 class FlowsFrames(SystemLike, Protocol):
-    """Knows how fast directions decay of which nothing is left within a step of its integration."""
+    """Systems that resolve the decay of directions that vanish within a step of the integration."""
 
     def is_stiff(self, x: Array, t0: float, t1: float, /) -> bool:
-        """True if the derivative of the flow from state x at t0 to t1 has nothing to say of such directions."""
+        """True if the derivative of the flow from state x at t0 to t1 does not resolve such directions."""
         ...
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float, /) -> Stretched:
@@ -190,7 +189,7 @@ def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
     return system.period is None and isinstance(system, Autonomous)
 
 
-# Of protocols with one method ``isinstance`` would ask no more than these, and takes twenty times as long.
+# For protocols with one method these functions equal ``isinstance`` and are twenty times as fast.
 
 
 def flows_with_error(system: SystemLike) -> TypeGuard[FlowsWithError]:
@@ -204,12 +203,12 @@ def expands_velocity(system: SystemLike) -> TypeGuard[ExpandsVelocity]:
 
 
 def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[FlowsFrames]:
-    """True if a return from state x at time 0 contracts some directions beyond what its derivative retains."""
+    """True if a return from state x at time 0 contracts some directions more than its derivative resolves."""
     return getattr(system, "flow_frame", None) is not None and system.is_stiff(x, 0.0, duration)  # type: ignore[attr-defined]
 
 
 def flows_states(system: SystemLike) -> TypeGuard[FlowsStates]:
-    """True if a system carries many states at once."""
+    """True if a system carries many states together."""
     return getattr(system, "flow_states", None) is not None
 
 
@@ -219,17 +218,17 @@ def flows_tangents(system: SystemLike) -> TypeGuard[FlowsTangents]:
 
 
 def known_orbit(system: SystemLike) -> Array | None:
-    """The state on its orbit that a system knows of itself (see :class:`KnowsOrbit`), None if it knows none."""
+    """The system's own state on its orbit (see :class:`KnowsOrbit`), or None."""
     return getattr(system, "orbit", None)
 
 
 def given_scale(system: SystemLike) -> Array | None:
-    """The sizes of its states that a system gives (see :class:`Scaled`), None if it gives none."""
+    """The system's own sizes of its states (see :class:`Scaled`), or None."""
     return getattr(system, "scale", None)
 
 
 def spatial_symmetries(system: SystemLike) -> tuple[Array, ...]:
-    """Generators of the spatial symmetries of a system (see :class:`SpatiallySymmetric`); none if it has none."""
+    """Generators of the spatial symmetries of a system (see :class:`SpatiallySymmetric`); may be empty."""
     given = getattr(system, "spatial_symmetry", None)
     if given is None:
         return ()
@@ -237,7 +236,7 @@ def spatial_symmetries(system: SystemLike) -> tuple[Array, ...]:
 
 
 def returns_per_period(system: SystemLike) -> int:
-    """How many applications of the return map make one period: the order of the symmetry, 1 without one."""
+    """Number of returns in one period: the order of the symmetry, 1 without one."""
     if system.symmetry is None:
         return 1
     return int(getattr(system, "symmetry_order", 2))

@@ -16,7 +16,7 @@ from chilopod.stability.problem.system import PeriodicSystem
 Array = NDArray[np.float64]
 
 _SHAKE = 2.0**-52
-_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
+_OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _ROUNDING = 8.0 * float(np.finfo(float).eps)
 _LARGEST = 100_000
 
@@ -29,12 +29,12 @@ def from_map(
     spatial_symmetry: ArrayLike | None = None,
     scale: ArrayLike | None = None,
 ) -> PeriodicSystem:
-    """Build a :class:`PeriodicSystem` of period 1 from a map, whose image is taken at every whole time.
+    """Build a :class:`PeriodicSystem` of period 1 from a map, which is applied at every whole time.
 
     Parameters
     ----------
     image
-        ``image(x)`` -> state after one iteration, shape (n,), and its derivative with respect to x, shape (n, n).
+        Function ``image(x)`` -> state after one iteration, shape (n,), and its derivative by x, shape (n, n).
     dimension
         Number of states n.
     orbit, spatial_symmetry, scale
@@ -43,7 +43,7 @@ def from_map(
     Raises
     ------
     ParameterError
-        If ``image`` is no function, or returns arrays of another shape.
+        If ``image`` is not a function, or returns arrays of another shape.
     """
     if not callable(image):
         raise ParameterError("must be a function", field="image", value=image, allowed="image(x)")
@@ -55,7 +55,7 @@ def from_map(
             pair: Any = image(x)
             if not (isinstance(pair, tuple | list) and len(pair) == 2):
                 raise ParameterError(
-                    "returns no pair", field="image", value=type(pair).__name__, allowed="(state, derivative)"
+                    "must return a pair", field="image", value=type(pair).__name__, allowed="(state, derivative)"
                 )
             x, factor = numbers(pair[0], (n,), "image"), numbers(pair[1], (n, n), "image")
             derivative, reach = factor @ derivative, np.abs(factor) @ reach

@@ -1,8 +1,8 @@
-"""The return map of a system: what all analyses study, since its fixed points are the periodic orbits.
+"""The return map of a system, whose fixed points are the periodic orbits.
 
-Where the period T is known it is H = S flow(T/k), S the symmetry of order k if there is one. Where the system does not
-depend on time, H carries a state to where its motion, turned by S, next crosses a section, a hyperplane: a Poincare
-map, kept in the coordinates of the states (Parker & Chua, *Practical Numerical Algorithms for Chaotic Systems*, 1989,
+For a known period T it is H = S flow(T/k), with S the symmetry of order k, if any. If the system does not depend on
+time, H carries a state to the next crossing of its motion, turned by S, with a section, a hyperplane: a Poincare map
+in the coordinates of the states (Parker & Chua, *Practical Numerical Algorithms for Chaotic Systems*, 1989,
 ch. 2). Its derivative then maps the direction of the motion to zero, exactly, in place of the trivial multiplier 1.
 """
 
@@ -32,16 +32,16 @@ from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
 
-_APPROACHES = (1.0 / 16.0, 0.4)  # of a return: from there on, the crossing of the section is solved for
-_FARTHEST = 0.8  # of a return: a crossing that much later is another one
+_APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from which the crossing is corrected
+_FARTHEST = 0.8  # delay, in returns, that makes it another crossing
 _CROSSING_ROUNDS = 30
 
 CUTS = (0.0, 0.0477, 0.382)
-"""Fractions of an interval that is taken in parts: near the start as well, or the steps up to the cut would be the
-same, errors included."""
+"""Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
+errors."""
 
 REPEATED = 10.0
-"""Factor on the difference of two computations with steps of their own, for a bound on the error of one of them."""
+"""Factor on the difference of two computations with different steps for a bound on the error of one."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ class Section(ReadOnlyArrays):
     Attributes
     ----------
     point
-        A state on it, shape (n,).
+        State on the section, shape (n,).
     normal
-        normal . (x - point) = 0 on the section, shape (n,).
+        Normal vector, with normal . (x - point) = 0 on the section, shape (n,).
     duration
-        About how long a return to it takes.
+        Approximate duration of a return.
     """
 
     point: Array
@@ -74,14 +74,14 @@ class ReturnMap(ReadOnlyArrays):
     jacobian
         dH/dx, shape (n, n).
     error
-        Bound on the error of every entry of ``jacobian``, shape (n, n), or one number for all; NaN if it was not asked
-        for.
+        Bound on the error of every entry of ``jacobian``, shape (n, n), or one number for all; NaN if not
+        computed.
     returns
         Number of returns in the full period.
     period
-        The full period.
+        Full period.
     velocity
-        dx/dt at H(x), shape (n,), where the system does not depend on time; else None.
+        Velocity dx/dt at H(x), shape (n,), if the system does not depend on time; else None.
     normal
         Normal of the section, likewise.
     """
@@ -96,7 +96,7 @@ class ReturnMap(ReadOnlyArrays):
 
 
 class _WholePeriod:
-    """A system as it is, but for its symmetry in time and its known orbit, over some periods."""
+    """A system without its symmetry in time and its known orbit, over some periods."""
 
     symmetry = None
 
@@ -117,7 +117,7 @@ class _WholePeriod:
 
 
 def whole_period(system: SystemLike, periods: int = 1) -> SystemLike:
-    """The same system for the analysis of orbits that do not have its symmetry in time, or take several periods."""
+    """The same system for orbits without its symmetry in time, or over several periods."""
     return _WholePeriod(system, periods)
 
 
@@ -125,14 +125,14 @@ def section_at(
     system: SystemLike, x: Array, scale: Array | None = None, duration: float | None = None
 ) -> Section | None:
     """The section through a state, shape (n,), across its motion, at right angles in units of the states' sizes; None
-    where the period is known. By default a return takes as long as the system guesses."""
+    if the period is known. The default duration of a return is the system's guess."""
     if not is_autonomous(system):
         return None
     velocity = _velocity(system, x)
     if duration is None:
         duration = return_duration(system)
     if not velocity.any():
-        raise AnalysisError("is an equilibrium: the motion rests in it", field="orbit", allowed="a state on an orbit")
+        raise AnalysisError("is an equilibrium", field="orbit", allowed="a state on an orbit")
     if scale is None:
         scale = sizes(system, x, duration)
     normal = velocity / scale**2
@@ -140,7 +140,7 @@ def section_at(
 
 
 def return_duration(system: SystemLike) -> float:
-    """How long a return takes; about, where the period belongs to the orbit."""
+    """Duration of a return; approximate if the period belongs to the orbit."""
     whole = system.guess_period if is_autonomous(system) else _period(system)
     return whole / returns_per_period(system)
 
@@ -153,9 +153,9 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 
 def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float | Array]:
-    """The flow with an error bound; where the system gives none, one is estimated by taking the interval in parts: a
-    step-controlled integrator makes independent errors in the two computations, and one of fixed steps should bring its
-    own bound."""
+    """The flow with an error bound, the system's own or an estimate from a computation in parts: a step-controlled
+    integrator makes independent errors in the two computations, and one with fixed steps should provide its own
+    bound."""
     if flows_with_error(system):
         return system.flow_with_error(x, t0, t1)
     state, derivative = system.flow(x, t0, t1)
@@ -176,7 +176,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
 
 def checked_flow(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
     """The flow and its derivative, of the right shapes."""
-    state, derivative = system.flow(np.array(x), t0, t1)  # a system may write into what it is given
+    state, derivative = system.flow(np.array(x), t0, t1)  # a system may write into its argument
     _check_shapes(state, derivative, x.size)
     return state, derivative
 
@@ -189,12 +189,12 @@ def _check_shapes(state: Array, derivative: Array, n: int) -> None:
 
 
 def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, section: Section | None = None) -> ReturnMap:
-    """The return map H and its derivative at a state, shape (n,), with a bound on the error if wanted, which may cost a
+    """The return map H and its derivative at a state, shape (n,), with an optional bound on the error, which may cost a
     second computation.
 
-    Of a system that does not depend on time a return ends on the section: by default that across the motion in ``x``.
+    If the system does not depend on time, a return ends on the section: by default across the motion at ``x``.
     """
-    x = np.array(x, dtype=np.float64)  # a system may write into what it is given
+    x = np.array(x, dtype=np.float64)  # a system may write into its argument
     n = system.dimension
     if x.shape != (n,):
         raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
@@ -253,7 +253,7 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
 
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:
-    """How long a motion takes from a state, shape (n,), to where it is back at the section."""
+    """Duration of a motion from a state, shape (n,), back to the section."""
     nothing = np.broadcast_to(0.0, (x.size, x.size))
     start, rest, _ = crossing(system, x, section, lambda x, t0, t1: (carried(system, x[None], t0, t1)[0], nothing))
     return start + rest
@@ -262,7 +262,7 @@ def return_time(system: Autonomous, x: Array, section: Section) -> float:
 def crossing(
     system: Autonomous, x: Array, section: Section, flow: Callable[[Array, float, float], tuple[Array, Array]]
 ) -> tuple[float, float, tuple[Array, Array]]:
-    """When a motion is back at the section: a time shortly before, the rest of it, and the flow up to that time."""
+    """Time of a motion's return to the section: a time shortly before, the rest, and the flow up to that time."""
     for approach in _APPROACHES:
         start = (1.0 - approach) * section.duration
         before, derivative = flow(x, 0.0, start)
@@ -274,13 +274,13 @@ def crossing(
     raise AnalysisError(
         f"the motion does not come back to where it started after about {section.duration:.6g}",
         field="orbit",
-        allowed="a guess closer to an orbit, and of its period",
+        allowed="a guess closer to an orbit and its period",
     )
 
 
 def _time_to_section(system: Autonomous, before: Array, section: Section, rest: float) -> float | None:
-    """How long a state that has almost returned still takes to the section, by Newton's method; None if it does not
-    get there, or has passed it."""
+    """Remaining time of a state near its return to the section, by Newton's method; None if it does not arrive, or has
+    passed it."""
     best = np.inf
     for _ in range(_CROSSING_ROUNDS):
         state = turned(system, carried(system, before[None], 0.0, rest))[0]
@@ -299,7 +299,7 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
 
 
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
-    """States at t1 of those at t0, shape (states, n) both, in the cheapest way that a system has."""
+    """States at t1 of those at t0, shape (states, n) both, by the cheapest capability of the system."""
     if flows_states(system):
         return np.asarray(system.flow_states(states, t0, t1))
     if flows_tangents(system):
@@ -308,13 +308,13 @@ def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
 
 
 def turned(system: SystemLike, states: Array) -> Array:
-    """S of states, shape (states, n), where the system has that symmetry; else as they are."""
+    """S of states, shape (states, n); the states themselves without that symmetry."""
     return states if system.symmetry is None else np.asarray(states @ system.symmetry.T)
 
 
 def returned_states(system: SystemLike, states: Array, section: Section | None = None) -> Array:
-    """H of many states at once, shape (states, n) both; with the section where the system does not depend on time."""
-    states = np.array(states)  # a system may write into what it is given
+    """H of many states, shape (states, n) both; on the section if the system does not depend on time."""
+    states = np.array(states)  # a system may write into its argument
     if section is None:
         return turned(system, carried(system, states, 0.0, return_duration(system)))
     assert is_autonomous(system)
@@ -332,7 +332,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
 
 
 def return_maps(systems: Sequence[SystemLike], orbits: Sequence[Array]) -> list[ReturnMap]:
-    """The return maps of many systems at states on their orbits, with errors, together where they can."""
+    """The return maps of many systems at states on their orbits, with errors, together if possible."""
     first = systems[0]
     if len(systems) > 1 and isinstance(first, FlowsMany):
         alike = [system for system in systems if isinstance(system, type(first)) and first.can_flow_with(system)]

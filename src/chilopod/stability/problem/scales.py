@@ -1,4 +1,4 @@
-"""The size of every state, told by the orbit and by how the states drive each other: never by the number one."""
+"""Sizes of the states, from the orbit and the couplings of the states."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from chilopod.stability.problem.capabilities import SystemLike, given_scale
 
 Array = NDArray[np.float64]
 
-_PART = 1.0 / 16.0  # of a return
+_PART = 1.0 / 16.0  # part of a return
 _SWEEPS = 3
 
 
@@ -19,10 +19,10 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     """Large size of every state, shape (n,): from the system, or from a state on the orbit and the flow over
     a part of the return.
 
-    A state has the size of its value, or of what the others, disturbed by their own sizes, make of it within a part of
-    the return, whichever is larger: one that passes through zero just here, or rests there, is as large as its
-    coupling makes it. (At the end of the return what is strongly damped would have forgotten the others.) So states in
-    other units have sizes in these units. Of an orbit that is zero throughout, only the ratios mean anything.
+    The size of a state is the larger of its value and its change within a part of the return when the others are
+    disturbed by their own sizes, so the coupling gives the size of a state that passes through zero or rests there. (At
+    the end of the return strongly damped states would not depend on the others.) So states in other units have sizes in
+    these units. For an orbit that is zero throughout, only the ratios have a meaning.
     """
     given = given_scale(system)
     if given is not None:
@@ -32,7 +32,7 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
         raise AnalysisError("the flow is not finite over one return", field="flow")
     size = np.maximum(np.abs(x), np.abs(later))
     if not size.any():
-        if not (derivative - np.diag(np.diag(derivative))).any():  # a map, which has no parts
+        if not (derivative - np.diag(np.diag(derivative))).any():  # a map has no parts
             derivative = system.flow(np.array(x), 0.0, duration)[1]
             if not np.isfinite(derivative).all():
                 raise AnalysisError("the flow is not finite over one return", field="flow")

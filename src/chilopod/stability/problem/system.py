@@ -1,4 +1,4 @@
-"""A periodic system of one's own."""
+"""User-defined periodic systems."""
 
 from __future__ import annotations
 
@@ -21,15 +21,13 @@ Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
 
 _HIGHEST_ORDER = 1000
-_SAME = 1e-8  # of the size of a matrix
-_ROUND_OFF = (
-    1e-7  # of the largest entry, in units that balance the matrix: with the above, a few units in the last place
-)
+_SAME = 1e-8  # difference of equal matrices, relative to their size
+_ROUND_OFF = 1e-7  # relative to the largest entry, in units that balance the matrix: with the above, some last digits
 
 
 @dataclass(frozen=True)
 class PeriodicSystem(ReadOnlyArrays):
-    """A periodic system of one's own, from anything that has a flow.
+    """A periodic system defined by its flow.
 
     To start from a right-hand side, see :func:`chilopod.stability.from_rhs`.
 
@@ -38,10 +36,10 @@ class PeriodicSystem(ReadOnlyArrays):
     dimension
         Number of states n.
     period
-        T, positive; None where the system does not depend on time and the period belongs to the orbit: ``velocity``
-        and ``guess_period`` are then needed.
-    flow
-        ``flow(x, t0, t1) -> (x1, dx1/dx)``.
+        Positive period T; None if the system does not depend on time and the period belongs to the orbit:
+        ``velocity`` and ``guess_period`` are then needed.
+        flow
+        Function ``flow(x, t0, t1) -> (x1, dx1/dx)``.
     symmetry
         Optional S, shape (n, n), of finite order k (S applied k times is 1), with S f(t, x) = f(t + T/k, S x): then the
         orbits with S x(T/k) = x(0) are fixed points of the return map H = S flow(T/k), whose multipliers nu give those
@@ -50,14 +48,14 @@ class PeriodicSystem(ReadOnlyArrays):
         Optional P, shape (n, n), of finite order, with P f(t, x) = f(t, P x), such as a reflection; or several, which
         generate a finite group.
     orbit
-        A state at time 0 on the periodic orbit, if it is known. It is improved where it does not return exactly.
+        State at time 0 on the periodic orbit, if known. It is corrected if it does not return exactly.
     scale
-        Sizes of a large change of every state, shape (n,), where the orbit should not tell it.
+        Size of a large change of every state, shape (n,), instead of the orbit's.
     velocity
-        ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
+        Function ``velocity(x)`` -> dx/dt, shape (n,), for a system that does not depend on time.
     guess_period
-        About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
-        nearer to a multiple of it.
+        Approximate period of such a system's orbits; an orbit gets its shortest period even if the guess is nearer to
+        a multiple of it.
     flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff, velocity_series
         See :mod:`chilopod.stability.problem.capabilities`.
     concurrent
@@ -133,26 +131,26 @@ class PeriodicSystem(ReadOnlyArrays):
         for matrix in matrices:
             if _order(matrix) == 0:
                 raise ParameterError(
-                    "is of no finite order: applied again and again it never gives every state back",
+                    "must have a finite order: a power that is the identity",
                     field=name,
-                    allowed=f"up to {_HIGHEST_ORDER} times",
+                    allowed=f"an order up to {_HIGHEST_ORDER}",
                 )
         return matrices
 
 
 def _order(matrix: Array) -> int:
-    return _order_of(matrix.tobytes(), len(matrix))  # families ask for the same one at every value
+    return _order_of(matrix.tobytes(), len(matrix))  # families use the same matrix at every value
 
 
 @functools.lru_cache(maxsize=256)
 def _order_of(entries: bytes, n: int) -> int:
-    """The smallest k > 0 with matrix^k = 1; 0 if there is none."""
+    """The smallest k > 0 with matrix^k = 1; 0 for infinite order."""
     matrix = np.frombuffer(entries).reshape(n, n)
     if not np.isfinite(matrix).all():
         return 0
     one = np.eye(len(matrix))
-    # Entries between states of different units are large and small in pairs, so the bound is entry by entry; those that
-    # are nothing but round-off of the others (the cosine of a right angle) count as zero.
+    # Entries between states of different units are large and small in pairs, so the bound is entry by entry; those
+    # that are round-off of the others (the cosine of a right angle) count as zero.
     sizes = np.abs(matrix)
     units = numerical_balance(matrix)
     balanced = float((sizes * units / units[:, None]).max())

@@ -1,4 +1,4 @@
-"""Extent of an orbit within an interval of the parameter, and what it begins and ends in."""
+"""Extent of an orbit within an interval of the parameter, with its ends."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from chilopod.stability.problem.capabilities import SystemLike
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.samples import FIRST_STEPS, NEAR_FOLD, Samples
 
-_BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
+_BEFORE = 1e-6  # distance from a fold at which the search for crossings ends, relative to the interval
 _TRIES = 2  # starts of curves round a fold
 _CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
-_COMES, _FARTHER = 1e-5, 100.0  # of the interval before a fold, and times that: where the multiplier is looked at
-_MERGING = 1e-4  # of the interval, before the orbit meets another one: multipliers are within their errors there
-_BETWEEN_POWERS = 0.75  # of one half and one
-_AT_REST = 0.03  # of the motion of the first orbit
-_PARTS = 5  # of a return, to see how far the motion goes
+_COMES, _FARTHER = 1e-5, 100.0  # distance from a fold, relative to the interval, and factor of a second one
+_MERGING = 1e-4  # distance from a meeting of orbits, relative to the interval, at which multipliers are uncertain
+_BETWEEN_POWERS = 0.75  # mean of the powers one half and one
+_AT_REST = 0.03  # motion, relative to the first orbit's, that counts as rest
+_PARTS = 5  # parts of a return at which the extent of the motion is sampled
 
 
 @dataclass(frozen=True)
 class Extent:
-    """Part of the interval in which an orbit exists, and can be told from others."""
+    """Part of the interval in which an orbit exists, apart from others."""
 
     start: float
     end: float
-    folds: tuple[Fold, ...] = ()  # in which the orbit begins and ends, if it does
-    ending: str = ""  # a sentence where it ends otherwise before the end of the interval
+    folds: tuple[Fold, ...] = ()  # folds at the ends of the orbit
+    ending: str = ""  # sentence on another end before that of the interval
     shrinks: bool = False  # it ends in an equilibrium
     beside: float = 0.0  # distance of a fold from start and end
 
     def explains(self, value: float) -> bool:
-        """True if a value is so near what the orbit begins or ends in that a multiplier +1 is what comes of that."""
+        """True if a value is so near an end of the orbit that a multiplier +1 belongs to that end."""
         ends = [fold.value for fold in self.folds] + [self.end] * self.shrinks
         return any(abs(value - end) <= 2.0 * self.beside for end in ends)
 
 
 def extent(samples: Samples) -> Extent:
-    """Extent of the orbit that some samples are on."""
+    """Extent of the orbit through some samples."""
     path, high = samples.path, samples.high
     if samples.known:
         return Extent(samples.low, high)
@@ -67,21 +67,21 @@ def extent(samples: Samples) -> Extent:
         ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
         end = last.value
         if samples.merges:
-            ending = f"the orbit meets another one near {end:.9g}, which goes on alone: a pitchfork of that one"
+            ending = f"the orbit meets another one near {end:.9g}, which continues alone: a pitchfork of that one"
             end = max(start, end - _MERGING * samples.width)
         return Extent(start, end, folds, ending, beside=beside)
-    # In the fold itself multipliers move as a root of the distance, which no search sees through.
+    # Near the fold multipliers move as a root of the distance, which a search cannot resolve.
     end = max(first.value, min(last.value, fold.value - beside))
     return Extent(start, end, folds + (fold,) * (fold.value <= high + fold.error_bound), beside=beside)
 
 
 def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising: bool) -> Fold | None:
-    """The fold that a sample is next to or in, from the nearest of the others that is clear of it."""
+    """The fold next to a sample, from the nearest of the others that is clear of it."""
     off = np.array([each.off_plus_one for each in [sample, *others]])
     clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
     for each in [[sample, *others][i] for i in clear[:_TRIES]]:
         fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising)
-        # Right beside it a step may land on another curve, which has a fold of its own.
+        # Close to it a step may land on another curve with another fold.
         if (
             fold is not None
             and _next_to(samples, sample, fold, rising)
@@ -92,32 +92,32 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
 
 
 def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
-    """True if a fold is just past a sample at either end, on the same orbit; others may be anywhere."""
+    """True if a fold is just past a sample at either end, on the same orbit."""
     further = fold.value - sample.value if rising else sample.value - fold.value
     return (
         bool(np.isfinite(fold.error_bound))
-        # In a fold Newton's method also finds orbits that are none any more.
+        # In a fold Newton's method may converge to states that are not orbits.
         and -max(fold.error_bound, _BEFORE * samples.width) <= further <= samples.width / FIRST_STEPS
         and not samples.jumped(fold.image.state, sample.orbit)
     )
 
 
 def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
-    """True if the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch only
-    passes it comes evenly."""
+    """True if the multiplier approaches +1 as the root of the distance, as in a fold; a crossing branch makes it
+    linear."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
     try:
         beside = samples.at(fold.value + (-away if rising else away))
     except AnalysisError:
-        return True  # nothing speaks against it
+        return True  # no evidence against it
     off = [each.off_plus_one for each in beside]
     return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
 
 
 def _at_rest(samples: Samples, last: Sample) -> bool:
-    """True if hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like a
-    fold is the same orbit again, half a period later."""
+    """True if the motion nearly vanishes at the end of an orbit: an apparent fold is then the same orbit again, half a
+    period later."""
     if samples.family.timed:
         return False
     first = _moved(samples, samples.family(samples.low), samples.first.image)

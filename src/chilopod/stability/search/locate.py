@@ -31,10 +31,10 @@ from chilopod.stability.unit_circle.spectra import Event, Matrices
 
 Array = NDArray[np.float64]
 
-_DESCRIBING = 400  # return maps to solve for the orbits beside a point
-_FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
+_DESCRIBING = 400  # budget of return maps for the orbits beside a point
+_FOLLOWED = 10.0  # factor on the error of the first orbit for that of followed ones
 _LEAST_ERROR = 1e-15
-_BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are taken
+_BESIDE = 1e-6  # distance from a crossing at which rates of change are computed, relative to the interval
 
 
 def locate(
@@ -47,28 +47,27 @@ def locate(
 ) -> Located:
     """Find every bifurcation of a periodic orbit in an interval of a parameter.
 
-    Spatial symmetries that leave the orbit as it is split the return map into blocks, each of which is searched by
-    itself.
+    Spatial symmetries of the orbit split the return map into blocks, each of which is searched
+    separately.
 
     Parameters
     ----------
     family
         ``family(value)`` is the system at a value of the parameter.
     between
-        The interval, ``low < high``.
-    orbit
-        A guess of a state on the orbit at time 0 for ``low``, shape (n,); the orbit is then followed through the
-        interval. Not needed where the systems know their orbit.
+        Interval ``low < high``.
+        orbit
+        Guess of a state on the orbit at time 0 for ``low``, shape (n,); the orbit is then followed through the
+        interval. Not needed if the systems know their orbit.
     normal_form
         True to compute coefficients and verdicts as well.
     budget
-        Orbits that may be computed to follow the first one through the interval, and once more for the search; either
-        ends as well when twice as many return maps were evaluated, by Newton's method too and for orbits that are not
-        there. What comes on top has bounds of its own: the first orbit, where the motion is given time to settle, and
-        every point that is found, 400 return maps and its normal form.
+        Number of orbits to follow the first one through the interval, and again for the search; twice as many return
+        maps also end either, including those of Newton's method and of failed attempts. Separate limits hold for the
+        first orbit, whose motion may settle, and for every point found: 400 return maps and its normal form.
     seconds
-        Time, s, after which the search ends with what it has. The first orbit and a flow that is under way are within
-        it, compiling is not; what has been found is described within 0.7 s more.
+        Time, s, after which the search ends with its results so far. It includes the first orbit and running flows,
+        but not compilation; the description of found points may take 0.7 s more.
 
     Returns
     -------
@@ -79,8 +78,8 @@ def locate(
     ParameterError
         If the interval is empty, reversed or not finite.
     AnalysisError
-        If there is no orbit at the lower end of the interval, or ``family`` raises an exception there. At any other
-        value that is as if there were no orbit, and a remark.
+        If no orbit is found at the lower end of the interval, or ``family`` raises an exception there. At any other
+        value an exception counts as a missing orbit and gives a remark.
     """
     low, high = checked_interval(between)
     samples = Samples(family, orbit, low, high, budget, seconds)
@@ -108,7 +107,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     """The crossings in every block of the return map."""
     try:
         blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
-        # Of the first orbit hardly a trace may be left after a return; of those that are followed from it is more.
+        # The first orbit may contract strongly within a return, and followed ones less.
         uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
     except SpentError as error:
         return [(None, Crossings((), SearchStatus.BUDGET, (error.problem,), 0))]
@@ -120,7 +119,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
             errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
         elif blocks == (None,):
             errors = np.array([samples.error(each, uncertain) for each in found])
-        else:  # a mode that breaks a symmetry leaves the orbit as sure as it is
+        else:  # a symmetry-breaking mode does not affect the orbit's accuracy
             errors = np.full(len(found), uncertain)
         return np.stack([each.image.jacobian for each in found]), errors
 
@@ -132,20 +131,20 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
 
 
 def _touches(samples: Samples, crossing: Crossing) -> bool:
-    """True if one multiplier, or one pair, comes to the circle within the interval and goes back."""
+    """True if one multiplier, or one pair, touches the circle within the interval and goes back."""
     simple = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1)
     return simple and crossing.change == 0 and not crossing.collision and samples.low < crossing.value < samples.high
 
 
 def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> Found:
-    """Description of a crossing of an orbit that is known, or followed."""
+    """Description of a crossing of a known or followed orbit."""
     touch = _touches(samples, crossing)
 
     def bounded_at(value: float, state: Array, error: Array, image: ReturnMap) -> Orbit:
         return bounded(samples.family(value), state, image, error=error)
 
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
-    # A mode that breaks a symmetry is no part of the orbit, which is regular among those that have it.
+    # A symmetry-breaking mode is not part of the orbit, which is regular among symmetric states.
     trivial = block is None or block.trivial
     regular = past_singular(course, crossing, bounded_at) if trivial and not samples.known else None
     if regular is None:
@@ -153,7 +152,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         bound = place_error(course, crossing, orbit.image)
     else:
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit
-    # Where an orbit is lost the point may be the fold that it ends in.
+    # Where an orbit is lost the point may be its fold.
     lost = samples.end < samples.high and value + bound >= samples.end
     point = described(
         samples.family(value),
@@ -166,7 +165,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         with_normal_form=with_normal_form and not touch,
     )
     if not point.error_bound < samples.width:
-        raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")
+        raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
     if touch:
         value_text = bounded_text(point.value, point.error_bound)
         return f"at {value_text} a multiplier only touches the unit circle and goes back: nothing changes"
@@ -208,9 +207,9 @@ def _formed(samples: Samples, value: float, orbit: Orbit) -> Formed:
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:
-    """Error of the derivative, of its largest entry or of what that is at least, the states being in units that balance
-    it."""
-    # An entry that is nothing but round-off says nothing of the units.
+    """Error of the derivative, relative to its largest entry or a lower bound of that, in units that balance
+    the states."""
+    # An entry of round-off gives no information on the units.
     units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
     largest = max(at_least, float(np.abs(image.jacobian * units / units[:, None]).max()))
     if not largest > 0.0:

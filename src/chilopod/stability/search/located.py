@@ -1,4 +1,4 @@
-"""Result of a search for bifurcations, and the search itself: from orbits along a parameter to points."""
+"""Result of a search for bifurcations, and the search from orbits along a parameter to points."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 Found = BifurcationPoint | str
 """A point, or a remark."""
 
-_GRACE = 0.7  # s, to describe what was found when the time is over
+_GRACE = 0.7  # s, for the description of found points after the time limit
 
 
 @dataclass(frozen=True)
 class Located(Result, Sequence[BifurcationPoint]):
-    """Bifurcations as a sequence of points by rising parameter, and how the search for them ended.
+    """Bifurcations as a sequence of points by rising parameter, with the status of the search.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Located(Result, Sequence[BifurcationPoint]):
         return [f"Located: {many}, {self.status.label}: {self.status.sentence}", *table, *said(self.remarks)]
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw which kind of bifurcation is where, over the parameter, on axes of matplotlib or on new ones."""
+        """Draw the kinds of bifurcations over the parameter, on axes of matplotlib or on new ones."""
         axes = axes_for(axes)
         for point in self.points:
             axes.plot([point.value], [point.kind.label], "o", color="C0")
@@ -85,7 +85,7 @@ class Located(Result, Sequence[BifurcationPoint]):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """The points as a dataset over ``point``. The multiplier is the critical one of the return map."""
+        """Dataset of the points over ``point``. The multiplier is the critical one of the return map."""
         names = ("value", "error_bound", "kind", "criticality", "coefficient", "coefficient_error")
         more = ("multiplier", "multiplicity", "frequency", "period", "orbit", "mode")
         said, status = "; ".join(self.remarks), self.status.label
@@ -99,11 +99,11 @@ def located(
     fold: Callable[[Fold], Found],
     returns: int,
 ) -> Located:
-    """Find and describe what happens along the samples of a family.
+    """Find and describe the bifurcations along the samples of a family.
 
     ``crossings(start, end)`` searches every block of the return map; ``described(crossing, block)`` gives the point,
-    remarks, or both, and may take so many return maps; ``fold(fold)`` a point or a remark for a fold that the orbit
-    begins or ends in.
+    remarks, or both, within a number of return maps; ``fold(fold)`` a point or a remark for a fold at an end of the
+    orbit.
     """
     with samples.budget:
         here = extent(samples)
@@ -125,7 +125,7 @@ def located(
                     results += described(crossing, block)
             except AnalysisError as error:
                 status = status.worst(SearchStatus.INCOMPLETE)
-                results.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
+                results.append(f"the crossing at {crossing.value:.9g} could not be described: {error}")
     results += [fold(each) for each in here.folds]
     if samples.family.remarks:
         status = status.worst(SearchStatus.INCOMPLETE)

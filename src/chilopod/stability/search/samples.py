@@ -1,4 +1,4 @@
-"""A family of systems sampled along its parameter: orbits that are known, or followed from a first guess."""
+"""A family of systems sampled along its parameter: known orbits, or orbits followed from a first guess."""
 
 from __future__ import annotations
 
@@ -22,36 +22,36 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 FIRST_STEPS = 8
-"""Steps in which an orbit is followed through the interval, if it takes no shorter ones."""
+"""Number of steps of a followed orbit through the interval, without shortened ones."""
 
 NEAR_FOLD = 0.02
-"""Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
+"""Distance of a multiplier from +1 within which the search may not resolve a fold."""
 
-_KEPT = 64  # systems: around a point the same one is asked for again and again
-_SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
+_KEPT = 64  # cached systems: those around a point are used repeatedly
+_SHORTEST = 2.0**-10  # shortest step of a followed orbit, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
-_DEAREST = 8.0  # return maps for an orbit
-_ATTEMPTS = 24  # steps to a value from the sample beside it: ten halvings, and on from there
-_SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
-_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
-_FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
-_SAME = 1e-7  # of the sizes: orbits that are nearer to what was foreseen are solved for no better
-_HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and what each leaves of its orbits' distance
-_HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
-_APART = 0.1  # of the distance of two samples: how far from these another one tells of the curve through them
-_BEHIND = 4  # samples by which the next one is foreseen
-_BENT = 0.3  # of the distance of two orbits: how far from the straight line the one between them may be
-_TOUCHING = 0.25  # of a multiplier's distance from +1: straight lines that meet nearer to it may touch it
-_TELLING = 1.0 / 128.0  # of the interval: a step in which a multiplier that turns back at +1 is seen to do so
-_MERGED = 1e-5  # of the interval: a gap in which they still do
-_JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
+_DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
+_ATTEMPTS = 24  # largest number of steps to a value from the sample beside it: ten halvings, then more
+_SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as accurate as the flow
+_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
+_FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
+_SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
+_HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
+_HALFWAY = 0.25  # largest distance of an orbit halfway from the mean of its neighbours, relative to their distance
+_APART = 0.1  # least distance of a third sample on the curve through two, relative to theirs
+_BEHIND = 4  # number of samples of a prediction
+_BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
+_TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
+_TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
+_MERGED = 1e-5  # gap, relative to the interval, in which they still do
+_JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 
 
 class AskedFamily:
-    """The systems of a family, which have to be of one kind."""
+    """The systems of a family, which must be of one kind."""
 
     def __init__(self, family: Family) -> None:
-        self.dimension = 0  # as long as no system is known
+        self.dimension = 0  # 0 until a system is known
         self.timed = True  # they depend on time
         self._family = family
         self._systems: dict[float, SystemLike] = {}
@@ -77,7 +77,7 @@ class AskedFamily:
 
     @contextlib.contextmanager
     def asking(self, value: float) -> Iterator[None]:
-        """Context of calls of the user's functions: exceptions of theirs mean that there is no system."""
+        """Context of calls of the user's functions: an exception means that the system does not exist."""
         try:
             with UserCode("family", value):
                 yield
@@ -91,7 +91,7 @@ class AskedFamily:
 
     @property
     def remarks(self) -> list[str]:
-        """Values at which there was no system, and why, a sentence each."""
+        """Remarks on values without a system, with the reason, a sentence each."""
         return [
             said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
             for said, values in self._refused.values()
@@ -104,9 +104,9 @@ class AskedFamily:
 class Samples:
     """Samples of a family between two values of its parameter, each computed once.
 
-    From a guess at the lower end, None if the systems know their orbits, the orbit is followed to the upper end. That
-    may take ``budget`` orbits and twice as many return maps, as many return maps again for what lies in between, and
-    ``seconds``.
+    From a guess at the lower end (None if the systems know their orbits) the orbit is followed to the upper end, within
+    ``budget`` orbits, twice as many return maps, and ``seconds``; as many return maps again serve the samples in
+    between.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class Samples:
         self.low, self.high, self.width = low, high, high - low
         self.known = guess is None  # the systems know their orbits
         self.spent = False  # the path ends because the budget was spent
-        self.merges = False  # the path ends where the orbit meets another one, which goes on alone
+        self.merges = False  # the path ends where the orbit meets another one, which continues alone
         self.count = self._counted = 0  # orbits computed
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
@@ -138,12 +138,12 @@ class Samples:
         self.allow(self._allowed)
 
     def at(self, values: Array) -> list[Sample]:
-        """Samples at some values within the interval, together where the systems allow it; AnalysisError if there is
-        none at one of them, when those at the others are kept."""
+        """Samples at some values within the interval, together if the systems allow it; AnalysisError if one is
+        missing, while the others are kept."""
         wanted = [float(value) for value in values]
         missing = sorted(set(wanted) - self._by_value.keys())
         if len(missing) > 1 and self._exact:
-            _found(lambda: self._keep_known(missing))  # where one fails, each is asked for alone
+            _found(lambda: self._keep_known(missing))  # after a failure each is computed alone
         for value in missing:
             if value in self._by_value or value in self._missing:
                 continue
@@ -162,21 +162,21 @@ class Samples:
         return [self._by_value[value] for value in wanted]
 
     def allow(self, returns: int) -> None:
-        """From now on, at most so many return maps."""
+        """Set the limit of further return maps."""
         self._allowed, self._counted = returns, self.count
         self.budget.left = returns
 
     def affordable(self) -> int:
-        """Number of orbits that there may still be, at the price of those since :meth:`allow`."""
+        """Number of further orbits, at the mean cost of those since :meth:`allow`."""
         if self.budget.late:
             return 0
         price = (self._allowed - self.budget.left) / max(self.count - self._counted, 1)
-        # Those that were not found say nothing of the next ones.
+        # Failed orbits do not predict the cost of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
     def error(self, sample: Sample, of_flow: float) -> float:
-        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow and of its
-        derivative, ``of_flow``, and what comes of the orbit's own, which is the flow's times what H - 1 makes of it."""
+        """Relative error of the derivative at a sample of a followed orbit: that of the flow and its derivative,
+        ``of_flow``, and that due to the orbit's error, the flow's times the inverse of H - 1."""
         scaled = sample.image.jacobian * self.size / self.size[:, None]
         _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
         if values[-1] > _SURE:
@@ -187,18 +187,18 @@ class Samples:
             beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[-1], False, section)
             change = (beside.jacobian - sample.image.jacobian) * self.size / self.size[:, None]
             self._bends[sample.value] = float(np.linalg.norm(change)) / _BESIDE
-        # Where H - 1 vanishes along a direction, what is left there is of third order at most in all but odd cases.
+        # Where H - 1 vanishes along a direction, the rest is of third order, except in special cases.
         off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
         return min(1.0, of_flow + self._bends[sample.value] * off)
 
     def of_flow(self) -> ReturnMap:
         """The return map at the first orbit, with the error of the flow alone."""
         if _sample(self.low, self.first).off_plus_one > NEAR_FOLD:
-            return self.first.image  # the orbit is as good as the flow
+            return self.first.image  # the orbit is as accurate as the flow
         return return_map(self.family(self.low), self.first.state, True, self.first.section)
 
     def jumped(self, orbit: Array, guess: Array) -> bool:
-        """True if an orbit is so far from what was foreseen that it must be another one."""
+        """True if an orbit is so far from its prediction that it must be another one."""
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
 
     def _keep(self, sample: Sample) -> None:
@@ -218,7 +218,7 @@ class Samples:
             self._keep(_sample(value, from_known(system, state, image=image, budget=self.budget)))
 
     def _of_itself(self, value: float) -> Sample:
-        """A sample of a system that tells a state on its orbit, or near it, or from the orbit beside."""
+        """A sample of a system, from its own state on the orbit or near it, or from the neighbouring orbit."""
         system = self.family(value)
 
         def own(settle: bool) -> Sample:
@@ -232,7 +232,7 @@ class Samples:
         return found or own(True)
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
-        """A sample near a state, of about the period of a sample beside."""
+        """A sample near a state, with about the period of a neighbouring sample."""
         system = self.family(value)
         with self.family.asking(value):
             section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
@@ -240,7 +240,7 @@ class Samples:
             return _sample(value, orbit)
 
     def _between(self, value: float) -> Sample:
-        """A sample between two that are there, from their orbits."""
+        """A sample between two others, from their orbits."""
         around = self._around(min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1))
         try:
             found = self._sampled(value, self._foreseen(around, value), around[0])
@@ -258,17 +258,17 @@ class Samples:
             raise
 
     def _around(self, right: int) -> list[Sample]:
-        """Two samples that follow each other, the second of which is number ``right``, and one beyond either."""
+        """Two neighbouring samples, the second with the number ``right``, and one beyond either."""
         a, b = self._values[right - 1 : right + 1]
-        # Not so close to the two that a polynomial through them would be told by round-off.
+        # Far enough from the two that round-off does not spoil a polynomial through them.
         before = bisect.bisect_right(self._values, a - _APART * (b - a))
         after = bisect.bisect_left(self._values, b + _APART * (b - a))
         beyond = self._values[max(before - 1, 0) : before] + self._values[after : after + 1]
         return [self._by_value[v] for v in (a, b, *beyond)]
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
-        """The orbit at a value by the polynomial through samples; by the straight line through the first two where
-        that is very different, or the states are anywhere on their orbits."""
+        """The orbit at a value by the polynomial through samples; by the straight line through the first two if that
+        differs much, or time 0 is arbitrary on the orbits."""
         if not self.family.timed:
             samples = samples[:2]
         if len(samples) == 1:
@@ -284,7 +284,7 @@ class Samples:
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
     def _followed(self) -> list[Sample]:
-        """Samples by which the orbit is followed from the lower end."""
+        """Samples of the followed orbit from the lower end."""
         path = [self._by_value[self.low]]
         for value in np.linspace(self.low, self.high, FIRST_STEPS + 1)[1:].tolist():
             reached = self._follow(path, value)
@@ -297,8 +297,8 @@ class Samples:
         return path
 
     def _to_merging(self, path: list[Sample]) -> list[Sample]:
-        """The path up to where the orbit meets another one at a pitchfork, and what is followed is that one: a
-        multiplier comes to +1 from one side, and goes back to it from there."""
+        """The path up to a pitchfork where the orbit meets another one, which the corrector then follows: a multiplier
+        comes to +1 from one side and leaves it to the same side."""
         for i in range(1, len(path) - 2):
             behind, ahead, beyond = path[: i + 1], path[i + 1], path[i + 2]
             while _touches(behind[-2], behind[-1], ahead, beyond):
@@ -318,8 +318,8 @@ class Samples:
         return path
 
     def _follow(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
-        """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
-        far. They end early where the orbit does, the budget, or the attempts."""
+        """Samples from the last one to ``value``, by smaller steps where Newton's method fails. They end early with
+        the orbit, the budget, or the attempts."""
         path, target = list(behind), value
         smallest = _SHORTEST * abs(value - path[-1].value)
         while path[-1].value != value:
@@ -329,7 +329,7 @@ class Samples:
             last, guess = path[-1], self._foreseen(path[: -_BEHIND - 1 : -1], target)
             try:
                 found = self._sampled(target, guess, last)
-                # A large jump means that Newton's method has found another orbit.
+                # A large jump shows that Newton's method has found another orbit.
                 other = self.jumped(found.orbit, guess) or not self._connected(last, guess, found)
                 other = other or self._turns_back(path[-2:], found)
             except SpentError:
@@ -364,11 +364,11 @@ class Samples:
         return bool(heads and abs(rates[2]) > abs(rates[1]))
 
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
-        """True if an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
-        between them, in a fold at the square root of a half; to another orbit it is a jump at any place."""
+        """True if an orbit that was not predicted is on the branch of the last one: then another lies about halfway
+        between them, in a fold at the square root of a half; towards another branch a jump remains."""
         change = found.orbit - last.orbit
         size = self.size * float((np.abs(change) / self.size).max())
-        # Where a multiplier passes +1 another orbit may be as near as anything.
+        # Where a multiplier passes +1 another orbit may be arbitrarily near.
         passes = found.passes(last)
         if passes and not self._goes_through(last, found):
             return False
@@ -384,7 +384,7 @@ class Samples:
     def _goes_through(self, left: Sample, right: Sample) -> bool:
         """True if one orbit has a multiplier that passes +1 between two samples: then samples come together there.
 
-        Two orbits that pass each other at a distance have multipliers on either side, and none comes together.
+        Two orbits that pass each other at a distance have multipliers on different sides, and samples stay apart.
         """
         apart = np.inf
         for _ in range(_HALVED):
@@ -395,7 +395,7 @@ class Samples:
                 middle = self._sampled(0.5 * (left.value + right.value), 0.5 * (left.orbit + right.orbit), left)
             except SpentError:
                 raise
-            except AnalysisError:  # where it passes, H - 1 is singular
+            except AnalysisError:  # H - 1 is singular at the passage
                 return bool(np.isfinite(before))
             left, right = (left, middle) if middle.passes(left) else (middle, right)
         return True
@@ -406,7 +406,7 @@ def _sample(value: float, orbit: Orbit) -> Sample:
 
 
 def _found(compute: Callable[[], T]) -> T | None:
-    """Result of a function; None where there is nothing."""
+    """Result of a function; None after an AnalysisError."""
     try:
         return compute()
     except SpentError:
@@ -416,7 +416,7 @@ def _found(compute: Callable[[], T]) -> T | None:
 
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
-    """True if a multiplier on one side of +1 heads for it from both sides of the gap between two of four samples."""
+    """True if a multiplier on one side of +1 approaches it from both sides of the gap between two of four samples."""
     places = np.array([each.value for each in (first, left, right, last)])
     off = np.array([each.beside_plus_one for each in (first, left, right, last)])
     if not np.isfinite(off).all() or (np.sign(off) != np.sign(off[1])).any():

@@ -1,1 +1,1 @@
-"""Eigenvalues of return maps, bounds on their errors, and products of matrices split to their own scales."""
+"""Eigenvalues of return maps, bounds on their errors, and products of matrices split by scale."""

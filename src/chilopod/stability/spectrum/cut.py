@@ -1,4 +1,4 @@
-"""A return cut into parts, between sections across the motion where a system does not depend on time."""
+"""A return cut into parts, between sections across the motion if a system does not depend on time."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from chilopod.stability.spectrum.eigenvalues import normal_basis
 Array = NDArray[np.float64]
 
 _WORST_CONDITION = 1e6
-_FEWEST, _MOST = 8, 32768  # parts of moderate condition
+_FEWEST, _MOST = 8, 32768  # numbers of parts of moderate condition
 _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, above which the flow has no parts
 
 
 @dataclass(frozen=True)
 class Cut:
-    """A return in parts, with orthonormal bases at the borders: of the planes across the motion where the system does
-    not depend on time, else of the whole space."""
+    """A return in parts, with orthonormal bases at the borders: of the planes across the motion if the system does not
+    depend on time, else of the whole space."""
 
-    times: Array  # at the borders, shape (parts + 1,)
-    states: Array  # there, shape (parts + 1, n)
+    times: Array  # times of the borders, shape (parts + 1,)
+    states: Array  # states there, shape (parts + 1, n)
     units: Array  # sizes of the states, shape (n,)
-    sections: Sequence[Array]  # the bases, in units
+    sections: Sequence[Array]  # bases, in units
     factors: Sequence[Array]  # derivatives of the flow over the parts in these, the last one with the symmetry in time
     errors: Sequence[Array]  # bounds on the errors of their entries
 
@@ -61,8 +61,8 @@ def equal_cut(system: SystemLike, x: Array, image: ReturnMap, count: int) -> Cut
 def moderate_cut(system: SystemLike, x: Array, image: ReturnMap) -> Cut:
     """A return from a state on the orbit in parts of moderate condition.
 
-    The parts that contract too strongly are halved, and only these: of a relaxation oscillation a few short ones. The
-    return of a map, which has no parts, is taken as a whole.
+    Only parts that contract too strongly are halved, which gives a relaxation oscillation a few short ones. The return
+    of a map, which has no parts, stays whole.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap) -> Cut:
 
 
 def turn_in_units(system: SystemLike, units: Array) -> Array:
-    """The symmetry in time in units, shape (n, n); the unit matrix where there is none."""
+    """The symmetry in time in units, shape (n, n); the unit matrix without one."""
     return np.eye(units.size) if system.symmetry is None else system.symmetry * units / units[:, None]
 
 
@@ -95,7 +95,7 @@ def section_basis(system: SystemLike, state: Array, units: Array) -> Array:
 
 
 def _units(system: SystemLike, x: Array, image: ReturnMap) -> Array:
-    # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
+    # The derivative on a section may be only round-off; an orbit that moves gives the sizes.
     if is_autonomous(system):
         return sizes(system, x, image.period / image.returns)
     return numerical_balance(image.jacobian)
@@ -115,7 +115,7 @@ def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) 
 
 
 def _of_moderate_condition(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> list[_Part]:
-    """Parts of a return, those that contract too strongly cut in halves until they do not."""
+    """Parts of a return; those that contract too strongly are halved repeatedly."""
     done: list[_Part] = []
     left, asked = parts[::-1], len(parts)
     while left:

@@ -33,10 +33,10 @@ class Spectrum(ReadOnlyArrays):
 
 
 def spectrum(image: ReturnMap) -> Spectrum:
-    """Eigenvalues of a return map with their condition; without the zero that stands for the motion itself."""
+    """Eigenvalues of a return map with their condition, without the zero of the direction of motion."""
     into, out_of = _across(image)
     jacobian = out_of @ image.jacobian @ into
-    # In units in which all entries are alike the errors of the eigenvalue solver are small against every one of them.
+    # In units that make all entries similar, the errors of the eigenvalue solver are small relative to each.
     units = numerical_balance(jacobian)
     scaled = jacobian * units / units[:, None]
     values, right = np.linalg.eig(scaled)
@@ -44,14 +44,14 @@ def spectrum(image: ReturnMap) -> Spectrum:
     values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
     try:
         left = np.linalg.inv(right).conj().T
-    except np.linalg.LinAlgError:  # a defective matrix: no bound to be had from conditions
+    except np.linalg.LinAlgError:  # a defective matrix: conditions give no bound
         left = np.full_like(right, np.nan)
     # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
     error = 4.0 * _EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
     right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
     norms = np.linalg.norm(right, axis=0)
     right, left = right / norms, left * norms
-    # d nu = left^H E right, of which a bound of every entry of E tells the most.
+    # d nu = left^H E right, bounded from every entry of E.
     wrong = np.broadcast_to(image.error, image.jacobian.shape)
     error += (np.abs(left) * (wrong @ np.abs(right))).sum(axis=0)
     error = np.where(np.isfinite(error), error, np.inf)
@@ -61,7 +61,7 @@ def spectrum(image: ReturnMap) -> Spectrum:
 
 
 def return_multipliers(image: ReturnMap) -> ComplexArray:
-    """Eigenvalues of a return map by falling modulus, without the zero that stands for the motion itself."""
+    """Eigenvalues of a return map by falling modulus, without the zero of the direction of motion."""
     into, out_of = _across(image)
     values = np.linalg.eigvals(out_of @ image.jacobian @ into).astype(np.complex128)
     return values[np.lexsort((-values.imag, -np.abs(values)))]
@@ -69,7 +69,7 @@ def return_multipliers(image: ReturnMap) -> ComplexArray:
 
 def _across(image: ReturnMap) -> tuple[Array, Array]:
     """Coordinates on the section of a return map: (n, n-1) from them, and (n-1, n) to them along the motion; two unit
-    matrices where there is no section."""
+    matrices without a section."""
     n = image.state.size
     if image.velocity is None or image.normal is None:
         return np.eye(n), np.eye(n)

@@ -1,8 +1,8 @@
-"""Errors of eigenvalues and of what is made of them.
+"""Errors of eigenvalues and of results from them.
 
-Where first-order bounds do not hold, a matrix is changed at random by what its entries may be wrong by, and a result is
-taken to be off by ``SAFETY`` times the largest move that is seen. This is right for simple and for defective
-eigenvalues alike, whose errors no condition number tells. A draw moves a result along its gradient in a random
+Where first-order bounds do not hold, a matrix is changed at random within the errors of its entries, and the error of a
+result is ``SAFETY`` times its largest observed change. This holds for simple and for defective eigenvalues, for which
+a condition number gives no error. A draw moves a result along its gradient in a random
 direction, which in one case of twelve is less than a tenth of the root mean square over all directions (Kenney and
 Laub, *SIAM J. Sci. Comput.* 15, 36, 1994); all of ``DRAWS`` are so small in one case of 600 million.
 """
@@ -16,21 +16,21 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 SAFETY, DRAWS = 10.0, 8
-"""Factor on the largest move seen under random changes, and the number of these."""
+"""Factor on the largest change of a result under random changes, and their number."""
 
 FIRST_ORDER = 1e-6
 """Error, relative to the largest eigenvalue, up to which first-order bounds hold."""
 
 VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
-"""Words for what :func:`stable_within` finds."""
+"""Words for the results of :func:`stable_within`."""
 
 _EPSILON = float(np.finfo(float).eps)
 
 
 def stable_within(values: ComplexArray, bound: float, bounds: Array | float | None = None) -> bool | None:
-    """Stability by multipliers, shape (n,), with a bound on the error of all that are not small, or bounds one by one:
-    True if all lie inside the unit circle by more than it, False if one lies outside by more than its own, None if the
-    errors leave it undecided."""
+    """Stability by multipliers, shape (n,), with a bound on the error of all that are not small, or one each: True
+    if all lie inside the unit circle by more than their bounds, False if one lies outside by more, None if the errors
+    leave it undecided."""
     modulus = np.abs(values)
     if (modulus < 1.0 - bound).all():
         return True

@@ -1,7 +1,7 @@
-"""Eigenvalues and eigenvectors of a product of matrices, each to its own scale.
+"""Eigenvalues and eigenvectors of a product of matrices, each relative to its own scale.
 
-The product of many factors that contract some directions enormously holds only the slow directions; the fast ones
-drown in round-off. Subspace iteration forward through the factors gives the nested spaces of the slowest directions,
+A product of many factors that contract some directions enormously resolves only the slow directions; the fast ones
+vanish in round-off. Subspace iteration forward through the factors gives the nested spaces of the slowest directions,
 iteration backward through the inverses those of the fastest, and their intersections split the space into groups of
 like size (the Oseledets splitting of a periodic cocycle). The product restricted to a group is small and well scaled.
 """
@@ -19,9 +19,9 @@ from chilopod.stability.spectrum.errors import DRAWS, SAFETY
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_GAP = 1.0  # in ln|eigenvalue|, at least, between groups
+_GAP = 1.0  # least gap of ln|eigenvalue| between groups
 _PASSES = 40  # through the product: a gap of 1 leaves exp(-40) of the neighbouring group
-_AVERAGED = 20  # the last passes, over which the growth is averaged
+_AVERAGED = 20  # number of last passes over which the growth is averaged
 _AT_REST = 1e-8  # motion of a basis in a pass that has converged
 
 
@@ -29,10 +29,10 @@ def split_product(
     factors: Sequence[Array], errors: Sequence[Array] | None = None
 ) -> tuple[ComplexArray, ComplexArray, Array]:
     """Logarithms ln|eigenvalue| + i angle of the eigenvalues of ``factors[-1] @ ... @ factors[0]`` by falling modulus,
-    shape (n,), its unit eigenvectors as columns, and bounds on how far the logarithms move when the entries of the
-    factors are off by their errors, to first order between groups.
+    shape (n,), its unit eigenvectors as columns, and bounds on the change of the logarithms when the entries of the
+    factors change by their errors, to first order between groups.
 
-    Each factor has to be invertible and of moderate condition; AnalysisError where one has no finite inverse.
+    Each factor must be invertible and of moderate condition; AnalysisError if one has no finite inverse.
     """
     n = factors[0].shape[0]
     errors = [np.zeros((n, n)) for _ in factors] if errors is None else errors
@@ -50,7 +50,7 @@ def split_product(
     fast, _, fast_motion = _iterate(inverses, n)
     # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
     fast = [fast[0], *reversed(fast[1:])]
-    # Eigenvalues of one modulus in slanted directions can feign a gap for a while; their spaces do not come to rest.
+    # Eigenvalues of one modulus in slanted directions can show a false gap for a while; their spaces do not converge.
     borders = [
         0,
         *(
@@ -66,7 +66,7 @@ def split_product(
     ]
     logarithms, vectors = [], []
     for bases in groups:
-        # From one known basis to the next: carried along, a fast direction would be swamped by the round-off of the
+        # From one known basis to the next: a fast direction carried along would be lost in the round-off of the
         # slow ones.
         following = [*bases[1:], bases[0]]
         values, columns = _eigen([after.T @ f @ base for f, base, after in zip(factors, bases, following, strict=True)])
@@ -78,9 +78,9 @@ def split_product(
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
-    """The same for the ``count`` directions that grow most, of factors that may make nothing of the others.
+    """The same for the ``count`` directions that grow most, of factors that may map the others to zero.
 
-    These have to be separated from the others by a gap, and the factors to be of moderate condition on them.
+    A gap must separate these from the others, and the factors must be of moderate condition on them.
     """
     bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]
     following = [*bases[1:], bases[0]]
@@ -90,7 +90,7 @@ def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, C
 
 
 def _inverses(factors: Sequence[Array]) -> list[Array] | None:
-    """Inverses of square matrices; None if one has none that is finite."""
+    """Inverses of square matrices; None if one is not finite."""
     try:
         inverses: list[Array] = [np.linalg.inv(factor).astype(np.float64, copy=False) for factor in factors]
     except np.linalg.LinAlgError:
@@ -100,8 +100,8 @@ def _inverses(factors: Sequence[Array]) -> list[Array] | None:
 
 def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Array]:
     """Bases whose first j columns span the j directions that grow most, one before every factor; the stretch of each
-    column by every factor of the last passes, shape (k, n), zero where a factor makes nothing of it; and how much the
-    space of the first j still moves in a pass."""
+    column by every factor of the last passes, shape (k, n), zero where a factor maps it to zero; and the change of the
+    space of the first j in a pass."""
     basis = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
     bases: list[Array] = []
     stretches: list[Array] = []
@@ -117,7 +117,7 @@ def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Arra
 
 
 def intersection(one: Array, other: Array, dimension: int) -> Array:
-    """Orthonormal basis of the intersection of two column spaces that is known to have the given dimension."""
+    """Orthonormal basis of the intersection of two column spaces, of the given dimension."""
     left = np.linalg.svd(one.T @ other)[0]
     return one @ left[:, :dimension]
 
@@ -137,8 +137,8 @@ def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
 def _moved(
     factors: Sequence[Array], errors: Sequence[Array], groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]
 ) -> Array:
-    """How far logarithms move when factors are off by their errors, group by group: the farthest of some draws of signs
-    (what the factors add may cancel in one of them), with room for more."""
+    """Change of the logarithms when factors change by their errors, group by group: the largest over random signs (in
+    one draw the contributions may cancel), with a safety factor."""
     nodes = [np.hstack(bases) for bases in zip(*groups, strict=True)]
     sizes = np.cumsum([0, *(len(values) for values in known)])
     moved = np.zeros(sizes[-1])

@@ -1,8 +1,8 @@
-"""Eigenvalues of the derivative of a return where some directions decay beyond all resolution.
+"""Eigenvalues of the derivative of a return with directions that decay beyond all resolution.
 
-Of a direction that decays by e^-1000 within a step of an implicit method, the derivative of the flow retains nothing,
-nor does it have to for the multipliers. Its exponent is the mean of the rates at which an orthonormal frame is
-stretched that the flow carries along, the first k columns on the space of the k slowest directions for every k (Dieci,
+The derivative of the flow does not resolve a direction that decays by e^-1000 within a step of an implicit method, and
+the multipliers do not need it. Its exponent is the mean stretching rate of an orthonormal frame that the flow
+carries, whose first k columns span the space of the k slowest directions for every k (Dieci,
 Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
 """
 
@@ -25,30 +25,30 @@ ComplexArray = NDArray[np.complex128]
 _DRAWS = 3  # each costs as much as the result
 _PARTS = 64
 _PASSES = 12
-_DEEPEST = -7.0  # logarithm of the stretch within a part from which on a direction is left to the frame
-_SETTLED = 1e-9  # change of a logarithm from one pass to the next, of its size
-_UNSURE = 1e-6  # of a logarithm
-_GAP = 1.0  # between the logarithms of directions that are told apart
-_TURNED = 0.1  # cosine of an angle beyond which the sign of a direction is lost
-_SAME = 1e-8  # of the logarithms in a part: two computations agree
-_NOISE = 1e-12  # of the largest of them, likewise
-_HALVINGS = 200  # in a pass, of parts where they do not
+_DEEPEST = -7.0  # logarithm of the stretch within a part below which the frame replaces the derivative
+_SETTLED = 1e-9  # relative change of a logarithm from one pass to the next
+_UNSURE = 1e-6  # largest relative error of a logarithm
+_GAP = 1.0  # least gap between the logarithms of separate directions
+_TURNED = 0.1  # cosine of the angle at which the sign of a direction is lost
+_SAME = 1e-8  # relative difference of the logarithms of two computations in a part that agree
+_NOISE = 1e-12  # the same relative to the largest logarithm
+_HALVINGS = 200  # halvings of other parts in a pass
 _SHORTENINGS = 100
-_LEFT, _APART = 1e-12, 1e-4  # stretch over a short time that is above round-off, and that tells directions apart
+_LEFT, _APART = 1e-12, 1e-4  # stretches over a short time above round-off, and that separate directions
 
 
 def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
-    """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and how far the
-    logarithms move with the errors.
+    """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and the errors of the
+    logarithms.
 
-    Directions that the derivative of the flow resolves are split by it; the others, which have to be real and of
-    different sizes, have the stretch of the frame and its sign. The fastest has all digits, by Liouville's formula; two
-    and more of them share an error, and are refused where it is beyond 1e-6 of either.
+    Directions that the derivative of the flow resolves are split by it; the others, which must be real and of different
+    sizes, have the stretch of the frame and its sign. The fastest has all digits, by Liouville's formula; several share
+    an error, which must not exceed 1e-6 of either.
 
     Raises
     ------
     AnalysisError
-        If they are not.
+        If the error is larger.
     """
     cut = equal_cut(system, x, image, _PARTS)
     frame, logarithms, signs, unsure = _carried(system, cut)
@@ -57,7 +57,7 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
     slow = int(deep[0]) if deep.size else n
     apart = np.diff(total, prepend=np.inf)[slow:] < -_GAP
     if not (apart.all() and (unsure[slow:] <= _UNSURE * np.abs(total[slow:])).all() and signs[slow:].all()):
-        raise AnalysisError("several directions decay too fast to be told apart", field="flow")
+        raise AnalysisError("several directions decay too fast to be separated", field="flow")
     values: list[ComplexArray] = []
     modes: list[ComplexArray] = []
     moved = unsure.copy()
@@ -74,15 +74,15 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
 
 
 def _carried(system: FlowsFrames, cut: Cut) -> tuple[Array, Array, Array, Array]:
-    """The frame at time 0 on the section, the logarithms of its stretch in every part, the signs it returns with (0 if
-    they were lost), and how unsure the sums of the logarithms are."""
+    """The frame at time 0 on the section, the logarithms of its stretch in every part, its signs on return (0 if lost),
+    and the errors of the sums of the logarithms."""
     units, n = cut.units, cut.units.size
     along = 1 if is_autonomous(system) else 0
     frame = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
     before = np.full(n - along, np.inf)
     for turn in range(_PASSES):
         start = frame = _behind_motion(system, frame, cut.states[0], units)
-        left = _HALVINGS if turn else 0  # the first only turns the frame to where it belongs
+        left = _HALVINGS if turn else 0  # the first pass only turns the frame into place
         logarithms, others, turned = np.zeros((_PARTS, n)), np.zeros(n), np.ones(n)
         for k in range(_PARTS):
             t0, t1 = float(cut.times[k]), float(cut.times[k + 1])
@@ -108,10 +108,10 @@ def _carried(system: FlowsFrames, cut: Cut) -> tuple[Array, Array, Array, Array]
 def _stretched(
     system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, most: int
 ) -> tuple[Stretched, int]:
-    """A frame over a part, and how often the part was halved, at most ``most`` times.
+    """A frame over a part, and the number of halvings of the part, at most ``most``.
 
-    It is where two computations differ: where a direction turns from a fast decay to a slow one, steps have to be short
-    for it, which they are after a start.
+    A part is halved if two computations differ: a direction that turns from a fast decay to a slow one needs short
+    steps, as after a start.
     """
     n = units.size
     sums, turned, halved = np.zeros((2, n)), np.ones(n), 0
@@ -120,7 +120,7 @@ def _stretched(
         part = system.flow_frame(state, units, _behind_motion(system, frame, state, units), t0, ends[-1])
         both = np.stack([part.stretch, part.other])
         if is_autonomous(system):
-            # The stretch of the motion is known; the rest of that of the plane of the first two belongs to the second.
+            # The stretch of the motion is known; the second has the rest of the stretch of the first two's plane.
             speeds = [float(np.linalg.norm(np.asarray(system.velocity(x)) / units)) for x in (state, part.state)]
             known = np.log(speeds[1] / speeds[0])
             both[:, 1:2] += both[:, :1] - known
@@ -136,7 +136,7 @@ def _stretched(
 
 
 def _behind_motion(system: SystemLike, frame: Array, state: Array, units: Array) -> Array:
-    """The frame with the motion as its first direction where a system does not depend on time."""
+    """The frame with the motion as its first direction if a system does not depend on time."""
     if not is_autonomous(system):
         return frame
     velocity = np.asarray(system.velocity(state)) / units
@@ -153,7 +153,7 @@ def _orthonormal(matrix: Array) -> tuple[Array, Array]:
 def _fastest(system: SystemLike, cut: Cut, k: int) -> Array:
     """Orthonormal basis of the directions at time 0 that decay faster than the first k, on the section.
 
-    Those which the flow contracts most, over a time so short that they are above round-off still.
+    They are contracted most by the flow, over a time so short that they are still above round-off.
     """
     if k == 0:
         return np.eye(cut.sections[0].shape[1])

@@ -1,1 +1,1 @@
-"""Finite groups of symmetries, what they make of a return map, and of what happens there."""
+"""Finite groups of symmetries, and their effect on return maps and bifurcations."""

@@ -1,7 +1,7 @@
-"""Bifurcations where a multiplier becomes critical in a block of a symmetry group.
+"""Bifurcations with a critical multiplier in a block of a symmetry group.
 
-The block says which multipliers are critical together, which terms the normal form has, and at +1 and -1 along which
-lines new orbits branch off: those fixed by an axial isotropy subgroup (equivariant branching lemma; Golubitsky, Stewart
+The block determines the multipliers that are critical together, the terms of the normal form and, at +1 and -1, the
+lines of new orbits: those fixed by an axial isotropy subgroup (equivariant branching lemma; Golubitsky, Stewart
 & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer 1988, theorem XIII.3.3; for period doublings of
 maps Chossat & Golubitsky, SIAM J. Math. Anal. 19 (1988) 1259).
 """
@@ -21,9 +21,9 @@ from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 
-_ALIGNED = 1e-9  # below one by less than this, a cosine is one: an angle of 4e-5 (two elements differ by 6e-4 or more)
-_NULL = 1e-8  # eigenvalues of elements that differ by less are one; 1 - cos(2 pi / 10 000) is 2e-7
-_MOST_SPACES = 500  # fixed-point spaces looked at, conjugate ones counted once
+_ALIGNED = 1e-9  # difference from one of a cosine that counts as one: an angle of 4e-5 (elements differ by 6e-4)
+_NULL = 1e-8  # difference of equal eigenvalues of elements; 1 - cos(2 pi / 10 000) is 2e-7
+_MOST_SPACES = 500  # largest number of fixed-point spaces, counting conjugate ones once
 _MOST_ENTRIES = 2**23  # numbers in the projectors to the fixed-point spaces of single elements: 64 MiB
 
 
@@ -66,14 +66,14 @@ class AxialBranch(ReadOnlyArrays):
     Attributes
     ----------
     direction
-        Unit vector w on which the irreducible representation acts, shape (d,). The new orbits leave along
-        ``block.mode(a, w)``, a being the critical eigenvector of the reduced matrix.
+        Unit vector w of the irreducible representation, shape (d,). The new orbits leave along
+        ``block.mode(a, w)``, with a the critical eigenvector of the reduced matrix.
     isotropy
-        Numbers of the elements with rho(P) w = w, at -1 also with rho(P) w = -w, shape (k,): what the new orbits keep,
-        at -1 together with a shift by one return.
+        Indices of the elements with rho(P) w = w, at -1 also with rho(P) w = -w, shape (k,): the symmetries of the new
+        orbits, at -1 together with a shift by one return.
     reversed
-        True if an element, or at -1 the shift by one return, takes w to -w: both halves of the branch are then the same
-        orbits, seen differently.
+        True if an element, or at -1 the shift by one return, maps w to -w: both halves of the branch are then images
+        of each other.
     """
 
     direction: Array
@@ -93,9 +93,9 @@ class SymmetricCrossing:
         Number of linearly independent quadratic maps that commute with the representation (with its negatives too at
         -1; with phase shifts too at a pair): terms of the normal form.
     branches
-        The axial ones, those that keep most elements first; none are looked for at a pair.
+        Axial branches, those with the most symmetries first; not computed for a pair.
     complete
-        True if these are all of them: the search ends after a budget.
+        True if these are all; the search has a budget.
     """
 
     kind: SymmetricKind
@@ -105,12 +105,12 @@ class SymmetricCrossing:
 
 
 def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> SymmetricCrossing:
-    """Crossing of the unit circle by a simple eigenvalue of a block's reduced matrix. Where the number of returns in a
-    period is even, -1 breaks the symmetry in time: the new orbits have the same period, not twice of it."""
-    # At -1 all is odd by the shift by one return.
+    """Crossing of the unit circle by a simple eigenvalue of a block's reduced matrix. With an even number of returns in
+    a period, -1 breaks the symmetry in time: the new orbits have the same period, not twice that."""
+    # At -1 the shift by one return makes all terms odd.
     quadratic = _quadratics(block.representation) if critical is Event.PLUS else 0
     kind = _kind(block, critical, quadratic, returns)
-    if critical is Event.PAIR or not block.real:  # of the complex type fixed-point spaces have even dimensions
+    if critical is Event.PAIR or not block.real:  # fixed-point spaces of the complex type have even dimensions
         return SymmetricCrossing(kind, quadratic, (), True)
     lines, complete = _fixed_lines(block.representation, critical)
     branches = [_branch(line, block, critical) for line in lines]
@@ -131,7 +131,7 @@ def _kind(block: Block, critical: Event, quadratic: int, returns: int) -> Symmet
 
 
 def _quadratics(rho: Array) -> int:
-    """Number of quadratic equivariants V -> V: how often V is in its symmetric square (Sattinger, Group Theoretic
+    """Number of quadratic equivariants V -> V: multiplicity of V in its symmetric square (Sattinger, Group Theoretic
     Methods in Bifurcation Theory, Springer 1979)."""
     one, two = (np.trace(power, axis1=1, axis2=2) for power in (rho, rho @ rho))
     return round(float((one * (one**2 + two)).mean() / 2.0))
@@ -139,7 +139,7 @@ def _quadratics(rho: Array) -> int:
 
 def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
     """Unit vectors of the lines that are the fixed-point space of a subgroup, one of each class of conjugate ones, and
-    whether the search came to its end.
+    True if the search was complete.
 
     Every fixed-point space is an intersection of those of single elements, at -1 with either sign.
     """
@@ -155,7 +155,7 @@ def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
     waiting: list[Array] = []
 
     def take(projector: Array) -> None:
-        """Note a space, unless it or a conjugate one was met before."""
+        """Note a space, unless it or a conjugate one is known."""
         size = round(float(np.trace(projector)))
         if size == 0 or seen.number(projector @ seen.probes) is not None:
             return
@@ -174,7 +174,7 @@ def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
         if not waiting:
             break
         space = waiting.pop()
-        # Directions of it that a projector leaves as they are.
+        # Its directions that a projector leaves unchanged.
         cosines, vectors = np.linalg.eigh(space.T @ projectors @ space)
         sizes = (cosines > 1.0 - _ALIGNED).sum(axis=1)
         for size in range(1, space.shape[1]):

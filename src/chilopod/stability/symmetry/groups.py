@@ -1,7 +1,7 @@
 """Finite groups of matrices: the spatial symmetries P f(t, x) = f(t, P x) of a system.
 
 An orbit that is invariant under a group, P x(t) = x(t), has a return map whose derivative commutes with every P of it;
-:mod:`.isotypic` makes blocks of that. The matrices need not be orthogonal: the mean of P^T P over the
+:mod:`.isotypic` splits it into blocks. The matrices need not be orthogonal: the mean of P^T P over the
 group is a metric in which they are (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II,
 Springer 1988, proposition XII.1.3).
 """
@@ -23,15 +23,15 @@ from chilopod.frozen import ReadOnlyArrays, read_only
 
 Array = NDArray[np.float64]
 
-_PROBES = 3  # vectors: one alone may by chance lie close to a mirror plane
+_PROBES = 3  # probe vectors: a single one may by chance lie close to a mirror plane
 _SAME = 1e-7  # two elements of a cyclic group of ten thousand are 6e-4 apart; round-off of as many products is 1e-11
 _CELL = 8.0 * _SAME
-_LARGEST_ORDER = 10_000  # a group of more elements is refused
+_LARGEST_ORDER = 10_000  # largest number of elements of a group
 _MOST_GENERATORS = 500
 _MOST_ENTRIES = 2**25  # numbers in the matrices of all elements: 256 MiB
-_RETURNED = 1e-9  # of the identity's diagonal from that of a power; a rotation by 2 pi / 10 000 is 2e-7 away
-_MIXED = 1e-11  # coordinates are mixed by elements, of order one, with larger entries than this between them
-_CHANCE = 1e-12  # of what goes from one coordinate to another over a third one: a smaller entry is round-off
+_RETURNED = 1e-9  # difference from the identity's diagonal of a power that equals it; a turn by 2 pi / 10 000 has 2e-7
+_MIXED = 1e-11  # least entry, relative to elements of order one, that mixes two coordinates
+_CHANCE = 1e-12  # entry that is round-off, relative to the coupling of two coordinates through a third
 _LEVELLED = 0.125  # exponent that makes a weight of 1e-17 one of 0.7 %
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 
@@ -43,15 +43,15 @@ class Group(ReadOnlyArrays):
     Attributes
     ----------
     generators, elements
-        Elements whose products are the group, and all of them, the identity first, shape (any, n, n) both.
+        Generators, and all elements, the identity first, shape (any, n, n) both.
     to_orthogonal, from_orthogonal
         Coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both.
     scales
         Scales of the coordinates x, shape (n,): entry (i, j) of an element is of the order of ``scales[i] / scales[j]``
-        at most. Between coordinates that no element mixes they say nothing.
+        at most. Between coordinates that no element mixes they have no meaning.
     component
-        Number of the set of coordinates that each one belongs to, shape (n,), such as one kind of state over all cells
-        of a ring: neither elements nor ``to_orthogonal`` mix the sets, and their units do not matter to each other.
+        Number of each coordinate's set, shape (n,), such as one kind of state over all cells of a ring: neither
+        elements nor ``to_orthogonal`` mix the sets, so their units are independent.
     """
 
     generators: Array
@@ -79,7 +79,7 @@ class Group(ReadOnlyArrays):
 
 def finite_group(generators: ArrayLike) -> Group:
     """The group of all products of some real matrices, shape (n, n) each, such as the cyclic shift and the reversal of
-    a ring, in any units; a ParameterError if they have too many of them, or are no such matrices."""
+    a ring, in any units; a ParameterError if the products are too many, or the matrices are invalid."""
     given = _checked(generators)
     n = given.shape[1]
     most = max(1, min(_LARGEST_ORDER, _MOST_ENTRIES // n**2))
@@ -104,14 +104,14 @@ def finite_group(generators: ArrayLike) -> Group:
 
 
 def _needed(by: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Numbers of the generators that a group is made by; of the identity alone one."""
+    """Indices of generators that suffice for a group; one for the identity alone."""
     return np.unique(by[1:]) if len(by) > 1 else by
 
 
 def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
-    """The isotropy subgroup of a state, shape (n,), known to a bound on its error: all P of a group with P x = x.
+    """The isotropy subgroup of a state, shape (n,), with a bound on its error: all P of a group with P x = x.
 
-    With symmetries that hold at every instant one state decides: by uniqueness of the flow its whole orbit is
+    One state suffices for symmetries that hold at every instant: by uniqueness of the flow its whole orbit is
     invariant.
     """
     moved = np.abs(group.elements @ x - x)
@@ -121,12 +121,12 @@ def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
 
 def centraliser(group: Group, gamma: Array) -> Group:
     """The subgroup of all P that commute with the spatial part of a symmetry in space and time, gamma f(t, x) =
-    f(t + T/k, gamma x): what blocks of a return map M = gamma Phi are made from.
+    f(t + T/k, gamma x): the source of blocks of a return map M = gamma Phi.
 
     Where the whole group leaves an orbit invariant, P commutes with the derivative Phi of the flow, and with M exactly
     if it does with gamma.
 
-    It must normalise the group: gamma P gamma^-1 is an element wherever P is one.
+    It must normalise the group: gamma P gamma^-1 is an element for every element P.
     """
     matrix = _scaled(gamma, group.scales)
     own = _scaled(group.elements, group.scales)
@@ -145,8 +145,8 @@ def centraliser(group: Group, gamma: Array) -> Group:
 
 
 def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
-    """How far the derivative of a return map is from commuting with a group, in units of what a bound on the error of
-    its entries and round-off explain: at most 1 if it does."""
+    """Commutator of the derivative of a return map with a group, relative to the bound on the error of its entries and
+    round-off: at most 1 if it commutes."""
     n = group.dimension
     sizes = group.scales[:, None] / group.scales
     pairs = group.component[:, None], group.component[None, :]
@@ -175,14 +175,14 @@ def _checked(generators: ArrayLike) -> Array:
 
 
 def _powers(matrix: Array, most: int) -> tuple[Array, Array]:
-    """Largest absolute value of each entry over the powers, shape (n, n), and what the last one differs by from the
-    identity, which it is but for round-off if the matrix generates a finite group."""
+    """Largest absolute value of each entry over the powers, shape (n, n), and the last one's difference from the
+    identity, which is round-off if the matrix generates a finite group."""
     n = len(matrix)
     power, envelope = matrix, np.maximum(np.abs(matrix), np.eye(n))
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(most):
             diagonal = np.diag(power)
-            # Whatever the units: the diagonal is free of them.
+            # The diagonal does not depend on the units.
             if np.abs(diagonal - 1.0).max() < _RETURNED:
                 return envelope, power - np.eye(n)
             if not abs(diagonal.sum()) < n + 1.0:  # of finite order, its eigenvalues lie on the unit circle
@@ -197,9 +197,9 @@ def _coordinate_scales(envelope: Array) -> Array:
 
     A symmetry in a user's units is S P S^-1 with P well scaled and S diagonal. With P orthogonal, the inverse of one of
     its powers is its transpose and another power, so that s_i / s_j is the root of the ratio of the entries (i, j) and
-    (j, i) of the envelope: by least squares of the logarithms, where round-off weighs little but tells about the units
-    of coordinates that nothing else connects. Coordinates that act on others but not the other way round (positions
-    relative to a first one) are balanced afterwards.
+    (j, i) of the envelope: by least squares of the logarithms, where round-off has little weight but gives the units of
+    coordinates that nothing else connects. Coordinates that act on others but not in reverse (positions relative to a
+    first one) are balanced afterwards.
     """
     envelope = np.where(envelope < _CHANCE * (envelope @ envelope), 0.0, envelope)
     weights = (np.sqrt(envelope) * np.sqrt(envelope.T)) ** _LEVELLED
@@ -228,15 +228,13 @@ def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
     chosen = np.flatnonzero(members)
     found = _factors(_scaled(group.elements[chosen], group.scales), len(chosen))
     if found is None:
-        raise AnalysisError(
-            "is kept by elements that form no group: its error is at the edge of what tells them apart", field=field
-        )
+        raise AnalysisError("is invariant under elements that do not form a group: its error is too large", field=field)
     return _with_metric(group.elements[chosen[_needed(found[0])]], group.elements[chosen], group.scales)
 
 
 def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
     n = elements.shape[1]
-    # In scaled coordinates: in those of the user the entries may differ by more than double precision has.
+    # In scaled coordinates: the user's entries may differ by more than double precision.
     scaled = _scaled(elements, scales)
     component = connected_components(np.abs(scaled).max(axis=0) > _MIXED)[1]
     stacked = scaled.reshape(-1, n)
@@ -254,7 +252,7 @@ def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
     q = group.orthogonal
     if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < _SAME:
         raise AnalysisError(
-            "are no exact symmetries, or too oblique", field="generators", allowed="matrices exact to 1e-9 or better"
+            "must be exact symmetries, less oblique", field="generators", allowed="matrices exact to 1e-9 or better"
         )
     return group
 
@@ -275,7 +273,7 @@ class Images:
         self.all.append(image)
 
     def number(self, image: Array) -> int | None:
-        """Number of an image, shape (n, probes), None if it is not there."""
+        """Number of an image, shape (n, probes); None if it is unknown."""
         cell = self._cell(image)
         for near in (cell, cell - 1, cell + 1):
             for number in self._cells.get(near, ()):
@@ -288,8 +286,8 @@ class Images:
 
 
 def _factors(generators: Array, largest: int) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-    """Every element as a generator, with entries of order one, times an earlier element: their numbers, shape (order,)
-    both, without meaning for the identity, which comes first; None if there are more than ``largest`` elements."""
+    """Numbers of a generator, with entries of order one, and of an earlier element whose product is each element, shape
+    (order,) both, undefined for the identity, which comes first; None for more than ``largest`` elements."""
     images, by, of = Images(generators.shape[1]), [0], [0]
     images.add(images.probes)
     needed: list[int] = []

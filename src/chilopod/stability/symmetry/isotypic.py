@@ -1,10 +1,10 @@
-"""Symmetry-adapted bases: what commutes with a finite group becomes block-diagonal, one block for each irreducible
-representation.
+"""Symmetry-adapted bases: matrices that commute with a finite group become block-diagonal, with one block for each
+irreducible representation.
 
-Without tables of characters: the eigenspaces of a generic symmetric matrix that commutes with the group are irreducible
-(a mean over the group of a random one is generic). Characters tell which of them are equivalent and of which type
-(Serre, Linear Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections made from one of
-them give all its copies (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer
+No tables of characters are needed: the eigenspaces of a generic symmetric matrix that commutes with the group are
+irreducible (a mean over the group of a random one is generic). Characters give their equivalence and type (Serre,
+Linear Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections from one give all
+its copies (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer
 1988, sections XII.2 and XII.3).
 """
 
@@ -23,9 +23,9 @@ from chilopod.stability.symmetry.groups import Group
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_TRIES = 8  # random matrices: one in millions is not generic
-_DISTINCT = 1e-7  # eigenvalues of a random matrix of norm one that lie closer together are one
-_EXACT = 1e-6  # entries of orthogonal matrices and numbers are told apart from 0 and from whole numbers
+_TRIES = 8  # random matrices, of which one in millions is not generic
+_DISTINCT = 1e-7  # distance of eigenvalues of a random matrix of norm one that count as equal
+_EXACT = 1e-6  # distance of entries of orthogonal matrices and numbers from 0 and from whole numbers
 
 
 @dataclass(frozen=True)
@@ -36,17 +36,17 @@ class Block(ReadOnlyArrays):
     ----------
     real
         True for the real type, whose representation commutes with multiples of the identity only; False for the complex
-        type, such as of the turns of a plane.
+        type, such as turns of a plane.
     basis
-        Symmetry-adapted basis B, shape (n, m d). Of the real type it has one copy after the other, in all of them the
-        same matrices: P B = B (I_m ⊗ rho(P)).
+        Symmetry-adapted basis B, shape (n, m d). For the real type it has one copy after the other, with the same
+        matrices in all: P B = B (I_m ⊗ rho(P)).
     dual
-        Its left inverse, zero on the other blocks, shape (m d, n).
+        Left inverse of the basis, zero on the other blocks, shape (m d, n).
     representation
-        rho(P) of each element, orthogonal matrices, shape (order, d, d).
+        Orthogonal matrices rho(P) of the elements, shape (order, d, d).
     kernel
-        Elements that act as the identity, truth values of shape (order,): new orbits keep these symmetries whatever
-        else they break.
+        Elements that act as the identity, truth values of shape (order,): new orbits always keep these
+        symmetries.
     """
 
     real: bool
@@ -67,31 +67,31 @@ class Block(ReadOnlyArrays):
 
     @property
     def trivial(self) -> bool:
-        """True if every element acts as the identity: what happens in this block breaks no symmetry."""
+        """True if every element acts as the identity: a bifurcation in this block breaks no symmetry."""
         return bool(self.kernel.all())
 
     @property
     def repeats(self) -> int:
-        """How many eigenvalues of a matrix an eigenvalue of its reduced form stands for."""
+        """Multiplicity in the full matrix of an eigenvalue of the reduced form."""
         return self.dimension if self.real else 1
 
     def reduced(self, matrices: ArrayLike) -> Array:
         """Reduced form of matrices M, shape (..., n, n), that commute with the group.
 
-        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; of a matrix that does not commute, the mean of
-        P M P^-1 over the group is taken. Complex type: dual @ M @ basis, shape (..., m d, m d).
+        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; a matrix that does not commute is replaced by
+        the mean of P M P^-1 over the group. Complex type: dual @ M @ basis, shape (..., m d, m d).
         """
         return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
-        """Bound on the absolute error of the reduced matrices, from one on the entries of the matrices (a number or of
-        their shape) and round-off."""
+        """Bound on the absolute error of the reduced matrices, from that of the matrices' entries (one number or all)
+        and round-off."""
         round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
         entries = np.asarray(error, dtype=np.float64) + round_off
         return self._diagonal(np.abs(self.dual) @ entries @ np.abs(self.basis))
 
     def _diagonal(self, full: Array) -> Array:
-        """Means over the diagonals of the parts between two copies, of the real type; else what is given."""
+        """Means over the diagonals of the parts between two copies for the real type; else the argument."""
         if not self.real:
             return np.asarray(full)
         m, d = self.multiplicity, self.dimension
@@ -107,8 +107,8 @@ class Block(ReadOnlyArrays):
 def isotypic(group: Group) -> tuple[Block, ...]:
     """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel.
 
-    An AnalysisError says that the matrices are not exact enough to tell its representations apart, or that one of these
-    is of quaternionic type.
+    Raises AnalysisError if the matrices are not exact enough to separate its representations, or one of these is of
+    quaternionic type.
     """
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
@@ -116,14 +116,14 @@ def isotypic(group: Group) -> tuple[Block, ...]:
         if blocks is not None:
             return tuple(sorted(blocks, key=_rank))
     raise AnalysisError(
-        "no symmetry-adapted basis found: the matrices are no exact symmetries",
+        "no symmetry-adapted basis found: the matrices are not exact symmetries",
         field="group",
         allowed="matrices exact to 1e-9 or better",
     )
 
 
 def _blocks(group: Group, random: np.random.Generator) -> list[Block] | None:
-    """The blocks of a group; None where a random matrix was not generic, or the group is not exact."""
+    """The blocks of a group; None if a random matrix was not generic, or the group is not exact."""
     q, n = group.orthogonal, group.dimension
     sets = [np.flatnonzero(group.component == number) for number in range(group.component.max() + 1)]
     blocks: list[Block] = []
@@ -159,7 +159,7 @@ def _irreducible(q: Array, coordinates: NDArray[np.intp], random: np.random.Gene
     matrix = random.standard_normal((k, k))
     values, vectors = np.linalg.eigh(_mean(own, matrix + matrix.T))
     border = np.flatnonzero(np.diff(values) > _DISTINCT * np.abs(values).max()) + 1
-    # Once more with eigenvalues that lie evenly: eigenvectors are as exact as their eigenvalues are far apart.
+    # Again with evenly spaced eigenvalues: the gaps between eigenvalues determine the accuracy of eigenvectors.
     levels = 1.0 + np.searchsorted(border, np.arange(k), side="right")
     embedded = np.zeros((q.shape[1], k))
     embedded[coordinates] = np.linalg.eigh(_mean(own, (vectors * levels) @ vectors.T))[1]
@@ -175,8 +175,8 @@ def _mean(q: Array, matrix: Array) -> Array:
 
 
 def _image(projector: Array, coordinates: NDArray[np.intp]) -> Array:
-    """Orthonormal basis, shape (n, any), of what a projector leaves of the space of some of the coordinates, which it
-    does not mix with others: these may have other units."""
+    """Orthonormal basis, shape (n, any), of the image under a projector of the space of some of the coordinates, which
+    it does not mix with others, as these may have other units."""
     values, vectors = np.linalg.eigh(projector[np.ix_(coordinates, coordinates)])
     embedded = np.zeros((len(projector), int((values > 0.5).sum())))
     embedded[coordinates] = vectors[:, values > 0.5]
@@ -193,7 +193,7 @@ def _is_real(rho: Array, character: Array) -> bool | None:
         raise AnalysisError(
             "the group has a representation of quaternionic type",
             field="group",
-            allowed="those of real or complex type",
+            allowed="representations of real or complex type",
         )
     return {(1, 1): True, (2, 0): False}.get(whole)
 

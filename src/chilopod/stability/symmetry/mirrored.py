@@ -1,4 +1,4 @@
-"""Spatial symmetries of a state, and of a mode, where these are known to an accuracy only."""
+"""Spatial symmetries of a state and of a mode, within their accuracy."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from chilopod.stability.symmetry.groups import finite_group
 
 Array = NDArray[np.float64]
 
-_LOOSE = 1e-6  # relative to the size of the states: how well a symmetry holds for a state that has it
+_LOOSE = 1e-6  # largest residual of a symmetry of a state, relative to the size of the states
 
 
 def symmetric_states(system: SystemLike, state: Array, size: Array, near: float = _LOOSE) -> Array:
-    """Orthonormal basis, in units of the states' sizes, shape (n,), of the states with the spatial symmetries of one of
-    them: of those that change it by no more than ``near``."""
+    """Orthonormal basis, in units of the states' sizes, shape (n,), of the space of states with the spatial symmetries
+    of a state: those that change it by at most ``near``."""
     n = size.size
     conditions = [np.zeros((0, n))]
     generators = spatial_symmetries(system)
@@ -32,7 +32,7 @@ def symmetric_states(system: SystemLike, state: Array, size: Array, near: float 
 
 @functools.lru_cache(maxsize=8)
 def _elements(generators: bytes, n: int) -> Array:
-    """Elements of the group that some matrices generate, shape (order, n, n)."""
+    """Elements of the group of some generators, shape (order, n, n)."""
     return finite_group(np.frombuffer(generators).reshape(-1, n, n)).elements
 
 

@@ -1,4 +1,4 @@
-"""Why a curve ends."""
+"""Ends of curves."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from chilopod.labels import Labelled
 
 
 class Ending(Labelled):
-    """Why a curve ends where it does; each member's ``sentence`` says it in words."""
+    """Reason for the end of a curve; each member's ``sentence`` describes it in words."""
 
     START = "start", "the curve was followed from here, the other way only"
     LEFT_INTERVAL = "left the interval", "the parameter reached an end of the interval"

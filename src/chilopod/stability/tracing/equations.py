@@ -21,7 +21,7 @@ R = TypeVar("R")
 
 
 class OutsideBoxError(AnalysisError):
-    """A step asked for a value of a parameter outside the box: beyond the end of which one."""
+    """A step needs a value outside the box: number of the parameter and end of its interval."""
 
     def __init__(self, parameter: int, end: float, value: float) -> None:
         super().__init__("leaves the interval", field="parameter", value=value)
@@ -29,8 +29,8 @@ class OutsideBoxError(AnalysisError):
 
 
 class Plane(NamedTuple):
-    """The equation that ends a step, ``row . moved = target``; on an edge of the box the number of a parameter, and the
-    value that it has there exactly."""
+    """The equation that ends a step, ``row . moved = target``; on an edge of the box the number of a parameter, and its
+    exact value there."""
 
     row: Array
     target: float
@@ -39,8 +39,8 @@ class Plane(NamedTuple):
 
 @dataclass(frozen=True)
 class Corrected(Generic[R]):
-    """A solution: displacement, what was computed there, values of the parameters, the residual that is left, the
-    inverse of the matrix, and how many corrections it took."""
+    """A solution: displacement, result of the evaluation there, values of the parameters, residual, inverse of the
+    matrix, and number of corrections."""
 
     moved: Array
     found: R
@@ -51,16 +51,16 @@ class Corrected(Generic[R]):
 
 
 class Equations(ABC, Generic[A, S, R]):
-    """N equations with N+1 unknowns, in coordinates of the anchor that a solution is seen from.
+    """N equations with N+1 unknowns, in coordinates of an anchor.
 
     Attributes
     ----------
     box
-        Intervals of the parameters, shape (parameters, 2): no value outside is asked for.
+        Intervals of the parameters, shape (parameters, 2): all evaluations are inside.
     budget
-        Flows and time that may be taken.
+        Budget of flows and time.
     precision
-        Residual, in units of the parameters, that counts as none.
+        Residual, in units of the parameters, that counts as zero.
     """
 
     box: Array
@@ -69,7 +69,7 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def parameters(self, anchor: A) -> tuple[slice, Array]:
-        """Where the parameters stand among the coordinates, and their units."""
+        """Indices of the parameters among the coordinates, and their units."""
 
     @abstractmethod
     def residual(self, anchor: A, moved: Array, values: Array) -> tuple[R, Array]:
@@ -78,23 +78,23 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def off(self, found: R, residual: Array, move: Array) -> float:
-        """How far a solution is off, by the residual and the correction that it asks for."""
+        """Error of a solution, from the residual and its correction."""
 
     @abstractmethod
     def met(self, anchor: A, found: R, off: float, stalled: int, singular: bool) -> bool:
-        """True if corrections end that far off, the last so many of which have not halved it; ``singular``: along some
-        direction they cannot."""
+        """True if the corrections end at this error, which the last few did not halve; ``singular``: along some
+        direction they cannot reduce it."""
 
     @abstractmethod
     def step(self, anchor: A, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[A, S]:
-        """The solution near a guess, with tangent and matrix; ``bounded``: with the errors that its end has.
+        """The solution near a guess, with tangent and matrix; ``bounded``: with the errors at its end.
 
         Raises
         ------
         OutsideBoxError
             If it lies outside the box.
         AnalysisError
-            If there is none near the guess.
+            If no solution is found near the guess.
         """
 
     @abstractmethod
@@ -103,14 +103,14 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def first_from(self, anchor: A) -> tuple[Array, Array, slice]:
-        """Displacement of the curve's first point, its tangent, and by which coordinates it is known again."""
+        """Displacement of the curve's first point, its tangent, and the coordinates that identify it."""
 
     def is_first(self, step: Step[A, S]) -> bool:
-        """True if a step to where the first point is, by these coordinates, ends there indeed."""
+        """True if a step to the first point, by these coordinates, ends at it."""
         return True
 
     def exact(self, anchor: A, found: R, row: Array) -> Array | None:
-        """The matrix at a solution, where that which it was found with may be weak; else None."""
+        """A new matrix at a solution whose corrector had a weak one; else None."""
         return None
 
     def corrected(self, anchor: A, guess: Guess, plane: Plane) -> Corrected[R]:
@@ -129,7 +129,7 @@ class Equations(ABC, Generic[A, S, R]):
             if plane.edge is not None:
                 wanted[plane.edge[0]] = plane.edge[1]
             values = np.clip(wanted, *self.box.T)
-            # A curve that turns back at an edge of the box is sought beyond it on the way there.
+            # The corrector may leave the box on its way to a curve that turns back at an edge.
             strays = (wanted - values) / widths
             self._check_inside(strays, values, wanted, tolerances.STRAYS * float(np.linalg.norm(guess.moved)))
             found, equations = self.residual(anchor, moved, values)
@@ -164,10 +164,10 @@ class Equations(ABC, Generic[A, S, R]):
 
 
 def inverted(matrix: Array) -> tuple[Array, bool]:
-    """Inverse of the matrix of a curve, shape (N+1, N+1), or that of shortest solutions, and whether it is the latter.
+    """Inverse of the matrix of a curve, shape (N+1, N+1), or that for shortest solutions, and True for the latter.
 
-    Where branches meet rounding decides how near to singular the matrix is, and a solution with its inverse may end on
-    the other branch. The shortest one leaves a residual as it is in a direction in which the matrix is singular.
+    At a branch point rounding decides how nearly singular the matrix is, and a solution with its inverse may end on the
+    other branch. The shortest solution leaves the residual unchanged in a singular direction of the matrix.
     """
     with contextlib.suppress(np.linalg.LinAlgError):
         found = np.linalg.inv(matrix)
@@ -180,6 +180,6 @@ def inverted(matrix: Array) -> tuple[Array, bool]:
 
 
 def _updated(inverse: Array, move: Array, change: Array) -> Array:
-    """Broyden's update of an inverse matrix, from a move and what the inverse makes of the residual's change."""
+    """Broyden's update of an inverse matrix, from a move and the inverse's product with the residual's change."""
     along = float(move @ change)
     return inverse + np.outer(move - change, move @ inverse) / along if along else inverse

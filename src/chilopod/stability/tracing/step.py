@@ -1,4 +1,4 @@
-"""Points of a curve from which steps start, steps between them, and the predictor."""
+"""Anchors of steps along a curve, steps between them, and the predictor."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class Before(NamedTuple):
-    """The point before another one, seen from there: displacement, unit tangent and, if it is of use, the matrix."""
+    """The previous point in coordinates of an anchor: displacement, unit tangent and, if useful, the matrix."""
 
     moved: Array
     tangent: Array
@@ -43,15 +43,15 @@ S = TypeVar("S")
 
 
 class Guess(NamedTuple):
-    """A displacement, shape (N+1,), and the matrix there, of which the last row means nothing."""
+    """A displacement, shape (N+1,), and the matrix there, whose last row has no meaning."""
 
     moved: Array
     matrix: Array
 
 
 def predicted(anchor: Anchor, size: float) -> Guess:
-    """Where a step of some size should end: by the cubic through the last two points along their tangents, and by the
-    straight line through their matrices; by the tangent and the matrix where there is but one point."""
+    """Predicted end of a step of some size: by the cubic through the last two points along their tangents, and the
+    straight line through their matrices; by the tangent and the matrix of a single point."""
     tangent, matrix, before = anchor.tangent, anchor.matrix, anchor.before
     if before is None:
         return Guess(size * tangent, matrix)
@@ -67,7 +67,7 @@ def predicted(anchor: Anchor, size: float) -> Guess:
 
 @dataclass(frozen=True)
 class Step(Generic[A, S]):
-    """A step, or a part of one: a solution of the equations as it is seen from an anchor."""
+    """A step, or a part of one: a solution of the equations in coordinates of an anchor."""
 
     start: A  # the anchor
     moved: Array  # displacement, shape (N+1,)
@@ -75,7 +75,7 @@ class Step(Generic[A, S]):
     tangent: Array  # tangent and matrix at the end, in the coordinates of the start
     matrix: Array
     corrections: int = 0  # number of corrections that were needed
-    missed: float = 0.0  # distance from where it was predicted to end
+    missed: float = 0.0  # distance from its predicted end
     end: Any = None  # the anchor at the end; None for a part of a step
 
     @property
@@ -85,7 +85,7 @@ class Step(Generic[A, S]):
 
     def between(self, place: float) -> Guess:
         """Displacement at a place (along the first tangent), by the cubic through both ends along their tangents, and
-        the matrix there by the straight line."""
+        the matrix there by linear interpolation."""
         t, size, first = place / self.size, self.size, self.start.tangent
         last = self.tangent / float(first @ self.tangent)
         moved = (

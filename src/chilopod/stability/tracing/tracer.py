@@ -1,7 +1,7 @@
-"""The tracer: one way along every curve, by steps of a length of its own, to where the curve ends.
+"""The tracer: pseudo-arclength continuation of any curve, with step control, to its end.
 
-A step is predicted, corrected at right angles to the tangent where it starts (Keller 1977; Kuznetsov, *Elements of
-Applied Bifurcation Theory*, section 10.2), and cut off at an edge of the box or where the curve is closed.
+A step is predicted, corrected at right angles to the tangent at its start (Keller 1977; Kuznetsov, *Elements of
+Applied Bifurcation Theory*, section 10.2), and cut at an edge of the box or where the curve closes.
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ def trace(
     Parameters
     ----------
     equations, anchor
-        The curve, and the point to start from.
+        Curve, and its first point.
     sizes
         First and longest step.
     points
-        Number of steps at most; None for any number.
+        Largest number of steps; None for any number.
     look
-        ``look(step, ending)`` finds what happens within a step, and why the curve ends with it, if it does; it raises a
-        ChilopodError where a shorter step may succeed.
+        Function ``look(step, ending)`` that finds the events within a step, and the ending if the curve ends there; it
+        raises a ChilopodError if a shorter step may succeed.
     keep
-        ``keep(found, count)`` is told what was found within the step with number ``count``, which is taken.
+        Function ``keep(found, count)`` that receives the events of the accepted step with number ``count``.
 
     Returns
     -------
-    Why it ends, what stood in the way if it was lost, and the step to go on with.
+    The ending, the reason if the curve was lost, and the size of the next step.
     """
     longest = sizes[1]
     size = min(sizes)
@@ -67,12 +67,12 @@ def trace(
                 found, ending = look(step, ending)
                 break
             except (ChilopodError, ArithmeticError, ValueError) as error:
-                # A parameter may step out of what the systems can have, whatever these then raise.
+                # A parameter may leave the domain of the systems, which then raise any exception.
                 shortened = True
                 size *= tolerances.RETRY
                 if size < tolerances.SHORTEST * longest and not equations.budget.spent:
                     return Ending.LOST, str(error), size
-        if not shortened:  # or an edge of what the system can have would be met again at once
+        if not shortened:  # else the edge of the systems' domain would be met again at once
             few, many = step.corrections <= tolerances.FEW, step.corrections > tolerances.MANY
             size *= tolerances.GROWTH if few else tolerances.FALL if many else 1.0
         size = min(longest, size)
@@ -84,12 +84,12 @@ def trace(
 
 
 def outward(box: Array, values: Array, ahead: Array) -> bool:
-    """True if a curve leaves the box where it is, its parameters heading a given way."""
+    """True if a curve at this place leaves the box, for a direction of its parameters."""
     return bool((((values <= box[:, 0]) & (ahead < 0.0)) | ((values >= box[:, 1]) & (ahead > 0.0))).any())
 
 
 class Parts(Generic[A, S, R]):
-    """Parts of a step, each solved for once."""
+    """Parts of a step, each corrected once."""
 
     def __init__(self, equations: Equations[A, S, R], step: Step[A, S]) -> None:
         self.equations, self.step = equations, step
@@ -129,7 +129,7 @@ def _taken(equations: Equations[A, S, R], anchor: A, size: float, count: int) ->
 
 
 def _edge(equations: Equations[A, S, R], anchor: A, guess: Guess) -> tuple[int, float] | None:
-    """The edge of the box that is crossed first on the way to a guess: the number of a parameter, and its value."""
+    """The first edge of the box on the way to a guess: the number of a parameter, and its value."""
     parameters, widths = equations.parameters(anchor)
     way = widths * guess.moved[parameters]
     ends = np.clip(anchor.values + way, *equations.box.T)
@@ -141,7 +141,7 @@ def _edge(equations: Equations[A, S, R], anchor: A, guess: Guess) -> tuple[int, 
 
 
 def _to_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[int, float]) -> Step[A, S]:
-    """A step that ends on an edge of the box, about as long as it was to be."""
+    """A step that ends on an edge of the box, of about its planned length."""
     for _ in equations.box:
         try:
             step = _on_edge(equations, anchor, size, edge)
@@ -151,11 +151,11 @@ def _to_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[
         if not 0.0 < step.size <= tolerances.OVER * size:
             break
         return step
-    raise AnalysisError("the curve does not reach the end of the interval so soon", field="step")
+    raise AnalysisError("the curve does not reach the end of the interval within the step", field="step")
 
 
 def _on_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[int, float]) -> Step[A, S]:
-    """The point of the curve where it is predicted to reach an edge first."""
+    """The point of the curve at its first predicted edge."""
     parameters, widths = equations.parameters(anchor)
     j = parameters.start + edge[0]
     target = (edge[1] - anchor.values[edge[0]]) / widths[edge[0]]
@@ -171,7 +171,7 @@ def _on_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[
 
 
 def _closed(equations: Equations[A, S, R], step: Step[A, S]) -> Step[A, S] | None:
-    """The part of a step up to where the curve passes its first point again; None if it does not."""
+    """The part of a step up to the first point of the curve; None if the step does not reach it."""
     first, ahead, seen = equations.first_from(step.start)
     row = np.zeros(step.moved.size)
     row[seen] = step.moved[seen]

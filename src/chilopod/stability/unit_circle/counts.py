@@ -1,4 +1,4 @@
-"""Balance of the number of multipliers outside the unit circle against the crossings, and the crossings it lacks."""
+"""Balance of the number of multipliers outside the unit circle with the crossings, and missing crossings."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from chilopod.stability.unit_circle.zeros import Interval, between
 
 Array = NDArray[np.float64]
 
-_CLEARLY, _ROOM = 1e-5, 1e3  # distance from the circle, or errors elsewhere times that, that needs no error of its own
-_GREY = 32.0  # a multiplier between one and this many errors from the circle may have left it or not
-_ROUNDS = 200  # of balancing: each adds a root, joins two or counts nearer to one
-_GROWTH = 8.0  # from one distance from a root at which multipliers are counted to the next
-_JUMP, _WIDER = 0.5, 100.0  # of the change of a multiplier on an interval wider by that: what is left in a jump
-_SHADOW = 1.5  # widths of a touch within which a crossing explains it
+_CLEARLY, _ROOM = 1e-5, 1e3  # distance from the circle, and multiple of errors elsewhere, that needs no error estimate
+_GREY = 32.0  # distance from the circle, in errors, up to which a multiplier may have left it or not
+_ROUNDS = 200  # rounds of balancing: each adds a root, joins two or counts nearer to one
+_GROWTH = 8.0  # ratio of successive distances from a root at which multipliers are counted
+_JUMP, _WIDER = 0.5, 100.0  # part of a multiplier's change that remains in a jump, and ratio of the intervals' widths
+_SHADOW = 1.5  # distance of a crossing that explains a touch, in widths of the touch
 _EPSILON = float(np.finfo(float).eps)
 
 
 class Report:
-    """Remarks of a search, a sentence each, whether its budget was spent, and whether something is left open."""
+    """Remarks of a search, a sentence each, and flags for a spent budget and for open questions."""
 
     def __init__(self) -> None:
         self.remarks: list[str] = []
@@ -44,14 +44,14 @@ class Report:
         self.open = False
 
     def leave(self, remark: str) -> None:
-        """Say what is not accounted for."""
+        """Note a remark on an open question."""
         self.open = True
         self.remarks.append(remark)
 
 
 class _Gap(NamedTuple):
-    """Roots between two neighbouring places at which the multipliers outside are counted, with the counts; one place
-    is None beyond the first or the last of them."""
+    """Roots between two neighbouring places at which the multipliers outside are counted, with the counts; a place is
+    None beyond the first or the last of them."""
 
     x: float | None
     y: float | None
@@ -65,8 +65,8 @@ class _Gap(NamedTuple):
 
 
 class Accounts:
-    """The numbers of multipliers outside the circle, at all values at which spectra are known in an interval, and the
-    roots that explain their changes; remarks go to a report, in terms of the parameter at a place."""
+    """Numbers of multipliers outside the circle, at all values of an interval with known spectra, and the roots that
+    explain their changes; remarks go to a report, in terms of the parameter at a place."""
 
     def __init__(self, spectra: Spectra, ends: Interval, parameter: Callable[[float], float], report: Report) -> None:
         self._spectra = spectra
@@ -101,7 +101,7 @@ class Accounts:
         return sorted(found, key=lambda crossing: crossing.value)
 
     def count(self, place: float) -> int | None:
-        """Number of multipliers outside the circle; None where one of them is too near to say, or there is none."""
+        """Number of multipliers outside the circle; None if one is too near the circle, or without a spectrum."""
         if place not in self._counts:
             self._counts[place] = self._counted(place) if self._spectra.exists(place) else None
         return self._counts[place]
@@ -113,7 +113,7 @@ class Accounts:
         if not spectra.conservative:
             return outside if int((np.abs(found) <= errors).sum()) <= spectra.resting else None
         for event in Event:
-            # Those that meet may have left the circle or not.
+            # Multipliers that meet may have left the circle or not.
             sizes, uncertain = spectra.factor_sizes(place, event)
             if (sizes <= _GREY * uncertain)[spectra.idle[event] :].any():
                 return None
@@ -121,7 +121,7 @@ class Accounts:
         return None if ((away > 1.0) & (away <= _GREY)).any() else outside
 
     def _gaps(self, roots: list[Root]) -> list[_Gap]:
-        """The interval cut where multipliers are counted, with the roots in every part; none if that is nowhere."""
+        """The interval cut where multipliers are counted, with the roots in every part; empty without counts."""
         values, within = self._spectra.values, set[float]()
         for root in roots:
             left, right = (root.place, root.place) if root.touch else root.known
@@ -148,10 +148,10 @@ class Accounts:
         return gaps
 
     def _crossings(self, gap: _Gap, root: Root) -> list[Crossing]:
-        """Crossings at a root in a gap, with what the number of multipliers outside changes by."""
+        """Crossings at a root in a gap, with the change of the number of multipliers outside."""
         crossings = self._critical(root)
         if gap.x is None or gap.y is None:
-            # As if the multipliers went on as they come.
+            # As if the multipliers continued in their direction.
             number = sum(crossing.multiplicity for crossing in crossings)
             surely = int((self._spectra.margins(root.place) > tolerances(self._spectra, root)).sum())
             outside = gap.before - surely
@@ -168,7 +168,7 @@ class Accounts:
         return [replace(each, change=change) for each, change in near]
 
     def _mended(self, gap: _Gap) -> list[Root] | None:
-        """Roots in place of those in a gap that do not explain its counts; None if they do, or nothing helps."""
+        """Better roots for a gap whose roots do not explain its counts; None if they do, or without better ones."""
         inside, x, y = gap.inside, gap.x, gap.y
         if x is None or y is None:
             return None if inside else self._at_end(self._ends[0] if x is None else self._ends[1], x, y)
@@ -184,14 +184,14 @@ class Accounts:
             return self._separated(inside)
         if self._tightened(inside[0], x, y):
             return inside
-        # Or it is a collision whose ends are too near each other.
+        # It may also be a collision whose ends are too near each other.
         if not (self._spectra.conservative and gap.change == 0):
             critical = sum(crossing.multiplicity for crossing in self._critical(inside[0]))
             self._remark(f"{gap.change:+d} multipliers outside where {critical} are on the circle", (x, y))
         return None
 
     def _at_end(self, place: float, x: float | None, y: float | None) -> list[Root] | None:
-        """A root at an end of the interval that no count decides."""
+        """A root at an end of the interval without a deciding count."""
         if place in (x, y) or place not in self._spectra.values:
             return None
         end = Root(place, place, place, None, True)
@@ -202,7 +202,7 @@ class Accounts:
         self._report.leave(f"{remark}, {between(*map(self._parameter, gap))}")
 
     def _critical(self, root: Root) -> list[Crossing]:
-        key = root, len(self._spectra.values)  # all that is known of the multipliers beside a root
+        key = root, len(self._spectra.values)  # all information on the multipliers beside a root
         if key not in self._known:
             self._known[key] = critical_at(self._spectra, root)
         return self._known[key]
@@ -211,7 +211,7 @@ class Accounts:
         return self._spectra.exists(root.place) and bool(self._critical(root))
 
     def _lost(self, root: Root) -> bool:
-        """Say so where a root is none only because the multipliers there are not known; False."""
+        """Remark on a root that is rejected only because the multipliers there are unknown; return False."""
         if self._spectra.exists(root.place) and float(tolerances(self._spectra, root).max()) > UNKNOWN:
             gap = root.left, root.right
             if gap not in self._settled and not (root.touch and root.event is not None):
@@ -219,7 +219,7 @@ class Accounts:
         return False
 
     def _explains(self, root: Root, change: int) -> bool:
-        """True if a change of the count is what the critical multipliers at a root may do."""
+        """True if the critical multipliers at a root may explain a change of the count."""
         crossings = self._critical(root)
         number = sum(crossing.multiplicity for crossing in crossings)
         if self._spectra.conservative and all(crossing.collision for crossing in crossings):
@@ -230,7 +230,7 @@ class Accounts:
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
     def _followed(self, x: float, y: float, before: int, after: int) -> list[Root]:
-        """Roots of the multipliers of those ranks that are inside the circle at one end of a gap and outside at the
+        """Roots of the multipliers whose ranks are inside the circle at one end of a gap and outside at the
         other."""
         changed, spectra = f"{after - before:+d} multipliers outside", self._spectra
         if spectra.conservative and not spectra.holes(x, y):
@@ -240,12 +240,12 @@ class Accounts:
         for rank in range(min(before, after), max(before, after)):
 
             def margin(place: float, rank: int = rank) -> float:
-                # Those that rest on the circle are of any rank in between, and add nothing.
+                # Multipliers that rest on the circle have any rank in between, and add nothing.
                 found = float(spectra.margins(place)[rank : rank + spectra.resting + 1].sum())
                 return found if np.isfinite(found) else 0.0
 
             if spectra.holes(x, y) or spectra.left <= 0 or margin(x) * margin(y) >= 0.0:
-                break  # the last: errors were not what they were said to be
+                break  # the last one: the errors were larger than their bounds
             root = rooted(spectra, margin, x, y, None)
             if not spectra.exists(root.place):
                 break
@@ -266,7 +266,7 @@ class Accounts:
         return roots
 
     def _bisected(self, x: float, y: float, before: int, after: int) -> list[Root]:
-        """The root of a conservative family where the count changes: found by halving, as far as counts are certain."""
+        """The root of a conservative family where the count changes, by bisection while counts are certain."""
         gap = (x, y)
         while x < (middle := 0.5 * x + 0.5 * y) < y and self._spectra.left > 0:
             if (count := self.count(middle)) is None:
@@ -280,7 +280,7 @@ class Accounts:
         return []
 
     def _jumps(self, place: float, rank: int) -> bool:
-        """True if the multiplier of a rank is not continuous at a place: its change does not fall with the width."""
+        """True if the multiplier of a rank is discontinuous at a place: its change does not fall with the width."""
         spectra = self._spectra
         left, right = spectra.beside(place)
         width = max(right - left, 4.0 * float(np.spacing(abs(place))))
@@ -290,7 +290,7 @@ class Accounts:
         return bool(small > _JUMP * large and small > _WIDER * errors)
 
     def _separated(self, inside: list[Root]) -> list[Root]:
-        """Roots with a counted place between them; those without one made a single root."""
+        """Roots with a counted place between them; those without one are merged."""
         roots = [inside[0]]
         for root in inside[1:]:
             last = roots[-1]
@@ -319,7 +319,7 @@ class Accounts:
 
 
 def _without_shadows(roots: list[Root]) -> list[Root]:
-    """Roots without the touches that are but the uncertain surroundings of a crossing."""
+    """Roots without the touches that lie in the uncertain surroundings of a crossing."""
     crossings = [root.place for root in roots if not root.touch]
     return [
         root

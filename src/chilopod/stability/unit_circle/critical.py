@@ -16,24 +16,24 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event, Spectra
 Array = NDArray[np.float64]
 
 UNKNOWN = 1.0
-"""Error of a multiplier's margin that reaches from zero to the circle, and so tells nothing of where it is."""
+"""Error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined."""
 
 LOST = "multipliers near the circle are known no better than their distance from it"
 
 _EPSILON = float(np.finfo(float).eps)
 _ULPS = 64.0
-_TELLING = 0.01  # error of a margin, which goes from -1 to 1, that tells where the multiplier is
+_TELLING = 0.01  # error of a margin, from -1 to 1, that determines the multiplier's side
 
 
 class Root(NamedTuple):
-    """A place where a multiplier may be critical, and the interval in which it is enclosed."""
+    """A place where a multiplier may be critical, with its enclosing interval."""
 
     place: float
     left: float
     right: float
-    event: Event | None  # the event whose function vanishes; None where a multiplier was followed by its rank
+    event: Event | None  # event whose function vanishes; None if a multiplier was followed by its rank
     touch: bool = False  # the function does not change sign
-    known: tuple[float, float] = (0.0, 0.0)  # interval without another root of the event, if that is known
+    known: tuple[float, float] = (0.0, 0.0)  # interval without another root of the event, if known
 
 
 def rooted(
@@ -44,8 +44,8 @@ def rooted(
     event: Event | None,
     within: float = 0.0,
 ) -> Root:
-    """The root of a function of the eigenvalues between two places where it has opposite signs, to within a distance
-    or to the last digits."""
+    """The root of a function of the eigenvalues between two places with opposite signs, to within a distance or to the
+    last digits."""
     most = min(200, max(spectra.left, 1))
     finest = max(within, 5e-324)
     place = float(brentq(function, low, high, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
@@ -58,16 +58,16 @@ class Crossing:
     """Multipliers on the unit circle at a value of the parameter."""
 
     value: float
-    bracket: tuple[float, float]  # in which the root finder has enclosed the value; errors of the matrices come on top
+    bracket: tuple[float, float]  # interval of the root finder around the value, without errors of the matrices
     event: Event
-    multiplicity: int  # number of multipliers on the circle, both of a pair counted
-    change: int  # rise of the number outside; 0 for a touch; at an end of the interval as if they went on as they come
-    multiplier: complex  # one of the critical ones, of a pair the one with positive imaginary part
-    collision: bool = False  # they meet on the circle and leave it, or come back: a conservative family
+    multiplicity: int  # number of multipliers on the circle, counting both of a pair
+    change: int  # rise of the number outside; 0 for a touch; at an end of the interval for a continued motion
+    multiplier: complex  # critical multiplier, the one with positive imaginary part of a pair
+    collision: bool = False  # True if they meet on the circle and leave it, or come back: a conservative family
 
 
 def tolerances(spectra: Spectra, root: Root) -> Array:
-    """Largest margins at a root of multipliers that may be on the circle there, shape (m,)."""
+    """Largest margins of multipliers that may be on the circle at a root, shape (m,)."""
     ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
     left, right = spectra.beside(root.place, ulps)
     errors = spectra.margin_errors(root.place)
@@ -77,8 +77,8 @@ def tolerances(spectra: Spectra, root: Root) -> Array:
         errors = errors + changes * min(reach / (right - left), 1.0)
     if errors.max() <= _TELLING:
         return np.asarray(errors)
-    # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not, or
-    # between the one such place and an end of the interval.
+    # Where the orbit is uncertain, multipliers lie between those of the nearest certain places, or between one such
+    # place and an end of the interval.
     here = bisect.bisect_left(spectra.values, root.place)
     sides = [
         next((v for v in near if spectra.margin_errors(v).max() <= _TELLING), None)
@@ -93,12 +93,12 @@ def tolerances(spectra: Spectra, root: Root) -> Array:
 
 
 def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
-    """Crossings at a root, by where on the circle, without what rests there; changes are not known yet."""
+    """Crossings at a root, by place on the circle, without multipliers that rest there; changes are unknown yet."""
     nu = spectra.at(np.array([root.place]))[0]
     allowed = tolerances(spectra, root)
     critical = np.abs(spectra.margins(root.place)) <= allowed
     if root.event is None:
-        # No function vanishes here: what may be anywhere is not on the circle for that.
+        # No function vanishes here: an undetermined multiplier does not count as critical.
         critical &= allowed <= UNKNOWN
     rest, found = nu[critical], []
     conservative, bracket = spectra.conservative, (root.left, root.right)
@@ -106,8 +106,8 @@ def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
         if not rest.size:
             break
         reach = spectra.factor_sizes(root.place, event)[1][: rest.size].max() + allowed.max()
-        # A real multiplier on the circle is nowhere else. However large errors are, what is critical is so at the
-        # nearer of the two.
+        # A real multiplier on the circle is +1 or -1. For any errors, a critical one is so at the nearer of the
+        # two.
         near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
         number = int(near.sum()) - spectra.idle[event]
         if number > 0 and (not conservative or root.event in (event, None)):
@@ -134,7 +134,7 @@ def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 
 def outside_near(spectra: Spectra, crossing: Crossing, place: float) -> int:
-    """Number outside the circle, at a place beside a crossing, of the multipliers nearest to the critical ones."""
+    """Number of the multipliers nearest to the critical ones outside the circle, at a place beside a crossing."""
     nu, number = spectra.at(np.array([place]))[0], crossing.multiplicity
     times = 2 if crossing.event is Event.PAIR else 1
     if times == 2:

@@ -1,9 +1,9 @@
 """Search for all crossings of the unit circle by eigenvalues of a family of matrices.
 
-Two ways meet here. Zeros of functions that are analytic in the parameter (:mod:`.spectra`) show
-events however close together they lie, but not two equal ones at once. The number of eigenvalues outside the circle,
-known wherever a matrix was asked for, must change by what was found in between: where it does not, the multiplier that
-crosses is followed by its rank, which is continuous whatever the multiplicities are.
+Two methods are combined. Zeros of functions that are analytic in the parameter (:mod:`.spectra`) show events however
+close they lie, but not two equal ones together. The number of eigenvalues outside the circle, known at every evaluated
+matrix, must change by the crossings found in between: if it does not, the crossing multiplier is followed by its rank,
+which is continuous for any multiplicities.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_
 Array = NDArray[np.float64]
 
 BUDGET = 5000
-"""Matrices that a search may ask for, by default."""
+"""Default budget of matrices of a search."""
 
 _DECADES = 4.0
-_SEARCH = 0.7  # of the budget for the zeros of the functions; the rest for counting
-_IDLE = 1e-4  # factors larger than this are not looked at closely
+_SEARCH = 0.7  # part of the budget for the zeros of the functions; the rest is for counting
+_IDLE = 1e-4  # size up to which factors are checked for vanishing throughout
 _HUGE = 1e150
-_TELLING = 0.1  # error of a factor that tells whether it vanishes
-_FEWEST_TELLING = 3  # places where it does
-_MOSTLY = 0.25  # of the first places may disagree on what vanishes everywhere: errors are estimates
-_MANY = 800  # pairs of multipliers; beyond that the bialternate product has too many zeros that mean nothing
+_TELLING = 0.1  # error of a factor that decides whether it vanishes
+_FEWEST_TELLING = 3  # least number of such places
+_MOSTLY = 0.25  # part of the first places that may disagree on factors that vanish throughout, as errors are estimates
+_MANY = 800  # pairs of multipliers beyond which the bialternate product has too many meaningless zeros
 _PROBES = 65
-_FINEST_PROBE = 1e-6  # of the interval
-_OF_ERROR = 1e-4  # of what a root may be wrong by, which sums the errors of all entries: how closely it is enclosed
-_NARROW = 1e-13  # of the value: nearer than that no root is known before it is looked for
-_CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
+_FINEST_PROBE = 1e-6  # finest spacing of probes, relative to the interval
+_OF_ERROR = 1e-4  # width of a root's enclosure, relative to its error from those of all entries
+_NARROW = 1e-13  # narrowest enclosure of a root, relative to its value
+_CLOSE = 0.25  # predicted approach to the circle, relative to the nearer end, that calls for a probe
 
 
 class SearchStatus(Labelled):
@@ -51,14 +51,14 @@ class SearchStatus(Labelled):
     BUDGET = "budget", "the budget was spent; what was found until then is listed"
 
     def worst(self, *others: SearchStatus) -> SearchStatus:
-        """The worst of some statuses; members stand from the best to the worst."""
+        """The worst of some statuses; members are ordered from best to worst."""
         return max(self, *others, key=list(SearchStatus).index)
 
 
 @dataclass(frozen=True)
 class Crossings:
-    """Crossings by rising value, how the search for them ended, remarks of a sentence each, and the number of values at
-    which matrices were asked for."""
+    """Crossings by rising value, status of the search, remarks of a sentence each, and number of evaluated
+    values."""
 
     crossings: tuple[Crossing, ...]
     status: SearchStatus
@@ -77,21 +77,21 @@ def find_crossings(
 ) -> Crossings:
     """Every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
-    Matrices may be asked for at ``budget`` values, or ``affordable()`` more where that is for their cost to say.
-    Remarks say ``shown(value)`` of a value. Raises ParameterError if the interval is empty, reversed or not finite, or
-    the budget too small to begin.
+    Matrices are evaluated at up to ``budget`` values, or ``affordable()`` more if their cost decides. Remarks show a
+    value as ``shown(value)``. Raises ParameterError if the interval is empty, reversed or not finite, or the budget too
+    small to begin.
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")
     least = 2 * first_places(0.0, 1.0).size
     if budget < least:
         raise ParameterError("is too small to begin", field="budget", value=budget, allowed=f"{least} or more")
-    # Over decades a parameter acts by its logarithm.
+    # Over decades the logarithm of a parameter is used.
     inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
     a, b = float(inward(low)), float(inward(high))
 
     def parameter(places: Any) -> Any:
-        # The ends exactly, whatever the logarithm rounds to.
+        # The exact ends, in spite of rounding in the logarithm.
         inner = np.clip(outward(places), low, high)
         return np.where(places <= a, low, np.where(places >= b, high, inner))
 
@@ -106,7 +106,7 @@ def find_crossings(
 
 
 class _Finder:
-    """The search, in a coordinate in which the parameter acts evenly."""
+    """The search, in a coordinate with an even effect of the parameter."""
 
     def __init__(self, spectra: Spectra, a: float, b: float, shown: Callable[[float], float]) -> None:
         self.spectra = spectra
@@ -116,7 +116,7 @@ class _Finder:
         self.crossings: list[Crossing] = []
 
     def search(self) -> SearchStatus:
-        """Find the crossings; how that ended."""
+        """Find the crossings; return the result."""
         report, spectra = self.report, self.spectra
         first = first_places(self.a, self.b)
         spectra.at(first)
@@ -144,7 +144,7 @@ class _Finder:
         return m if event is not Event.PAIR else m * (m - 1) // 2
 
     def _rest(self, places: Array) -> None:
-        """See what is critical at all places, with remarks."""
+        """Find factors that are critical at all places, with remarks."""
         idle = self.spectra.idle = {event: self._idle(places, event) for event in Event}
         for event in (Event.PLUS, Event.MINUS):
             if idle[event]:
@@ -156,13 +156,13 @@ class _Finder:
             self.report.remarks.append(pairs)
 
     def _idle(self, places: Array, event: Event) -> int:
-        """Number of factors of the function of an event that vanish for all values of the parameter."""
+        """Number of factors of an event's function that vanish at all values of the parameter."""
         nu = self.spectra.at(places)
         here = np.isfinite(nu).all(axis=1)
         places, nu = places[here], nu[here]
         if self._factors(event) == 0:
             return 0
-        # Of a matrix with a large eigenvalue the small ones are uncertain, and their products with it.
+        # A large eigenvalue makes the small ones, and their products with it, uncertain.
         largest = np.maximum(1.0, np.abs(nu).max(axis=1))
         if event is Event.PAIR:
             largest = np.minimum(largest, _HUGE) ** 2
@@ -180,9 +180,9 @@ class _Finder:
         return int(sorted(numbers)[int(_MOSTLY * len(numbers))])
 
     def _probe(self) -> None:
-        """Ask for matrices wherever a multiplier may cross the circle and come back: where it heads for the circle on
+        """Evaluate matrices wherever a multiplier may cross the circle and come back: it approaches the circle from
         both sides of a gap."""
-        self.report.remarks.append("so many multipliers: pairs are found by counting, not by a function that vanishes")
+        self.report.remarks.append("with many multipliers pairs are found by counting, not by zeros of a function")
         places = np.linspace(self.a, self.b, _PROBES)
         while places.size and self.spectra.left > places.size:
             self.spectra.at(places)
@@ -190,10 +190,10 @@ class _Finder:
             found = margins(self.spectra.at(known))
             gaps = np.diff((0.5 * known - 0.5 * self.a) / (0.5 * self.b - 0.5 * self.a))
             start, end, gap = found[1:-2], found[2:-1], gaps[1:-1]
-            # Where a crossing was closed in on, a gap may round to nothing: no slope, and nobody heads anywhere.
+            # Near an enclosed crossing a gap may round to zero: the slope is then undefined.
             with np.errstate(divide="ignore", invalid="ignore"):
                 slopes = np.diff(found, axis=0) / gaps[:, None]
-                into, out = slopes[:-2], -slopes[2:]  # both taken towards the inside of the gap
+                into, out = slopes[:-2], -slopes[2:]  # both towards the inside of the gap
                 reach = np.clip((end - start + out * gap[:, None]) / (into + out), 0.0, gap[:, None])
                 towards = np.sign(start) * (start + into * np.nan_to_num(reach))
             turning = (start * end > 0.0) & (np.sign(start) * into < 0.0) & (np.sign(start) * out < 0.0)
@@ -202,7 +202,7 @@ class _Finder:
             places = (0.5 * known[1:-2] + 0.5 * known[2:-1])[again]
 
     def _searched(self, events: list[Event]) -> dict[Event, Zeros]:
-        """Zeros of the functions of some events: each with an even share of the budget, then with what is left."""
+        """Zeros of the functions of some events: each with an even share of the budget, then with the rest."""
         reserve = int((1.0 - _SEARCH) * self.spectra.left)
         found: dict[Event, Zeros] = {}
         for number, event in enumerate(events):
@@ -230,7 +230,7 @@ class _Finder:
         if not found.spent:
             for piece in found.unresolved:
                 report.leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
-        if not report.spent:  # or they were not looked for
+        if not report.spent:  # else they were not searched
             for piece in found.missing:
                 report.leave(f"there are no matrices {self._between(piece)}, or only in part")
         roots = []
@@ -253,7 +253,7 @@ class _Finder:
         if within > _NARROW * max(abs(left), abs(right)):
             error = float(self.spectra.function_error(np.array([left]), event)[0])
             wrong = float(np.exp(min(error - reference, 0.0)))
-            # Between the two the function is about straight, if it is sure of its signs there.
+            # Between the two the function is nearly linear, if its signs there are certain.
             within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left) if wrong < _TELLING else 0.0
 
         def value(place: float) -> float:

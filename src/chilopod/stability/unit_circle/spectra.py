@@ -1,5 +1,5 @@
-"""Eigenvalues along a family of matrices, what errors of the matrices make of them, and functions that vanish where
-one of them is critical."""
+"""Eigenvalues along a family of matrices, their errors from those of the matrices, and functions that vanish at
+critical ones."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
-entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, where there is no
-matrix, and may be asked for the same value twice."""
+entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, for a missing matrix,
+and may be called twice for a value."""
 
 _ROUNDING = 2.0 * np.finfo(float).eps
 _SMALLEST = -1e300  # logarithm of zero
-_LARGEST = 1e150  # modulus beyond which multipliers are all the same
-_TURNING = 1e-6  # imaginary part of a multiplier that is not real, relative to its size
+_LARGEST = 1e150  # modulus to which larger multipliers are reduced
+_TURNING = 1e-6  # least imaginary part of a complex multiplier, relative to its size
 _SMALL = 1e-3  # modulus of multipliers that are far inside the circle
-_SPARE = 8  # factors beside the idle ones that take part in the sum over what may be left out
-_FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
+_SPARE = 8  # number of factors, beside the idle ones, in the sum over factors to leave out
+_FILL = 1e-30  # value in place of zeros, relative to the largest entry, for the balance of a triangular matrix
 
 
 class Event(Labelled):
@@ -43,24 +43,24 @@ TARGETS = {Event.MINUS: -1.0, Event.PLUS: 1.0}
 
 
 def distances(nu: ComplexArray, event: Event) -> Array:
-    """Distances of multipliers from where they are critical at an event: from -1, from +1, or from the circle."""
+    """Distances of multipliers from their critical value at an event: from -1, from +1, or from the circle."""
     return np.asarray(np.abs(np.abs(nu) - 1.0) if event is Event.PAIR else np.abs(nu - TARGETS[event]))
 
 
 class Spectra:
     """Eigenvalues of a family of matrices M, each computed once.
 
-    Errors are found by changing M at random by what it may be wrong by (:mod:`chilopod.stability.spectrum.errors`). An
-    entry with a relative error is off by that times the geometric mean of the largest entries of its row and its
-    column, the states being in units that balance M: that does not depend on the units the states came in, and a small
-    multiplier beside a huge one is not lost where the matrix keeps them apart. M may be asked for at ``budget`` values,
-    twice where errors matter, or ``affordable()`` more where that is for its cost to say.
+    Errors come from random changes of M within its errors (:mod:`chilopod.stability.spectrum.errors`). The relative
+    error of an entry multiplies the geometric mean of the largest entries of its row and column, in units that balance
+    M: this does not depend on the user's units, and keeps a small multiplier beside a huge one if the matrix separates
+    them. M is evaluated at up to ``budget`` values, twice where errors matter, or ``affordable()`` more if its cost
+    decides.
     """
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
-        self.values: list[float] = []  # at which there is a matrix, in order
+        self.values: list[float] = []  # values with a matrix, in order
         self.size = 0  # number of eigenvalues, once a matrix is known
-        self.idle = dict.fromkeys(Event, 0)  # factors of the function of an event that vanish throughout
+        self.idle = dict.fromkeys(Event, 0)  # numbers of factors of an event's function that vanish throughout
         self.conservative = False  # multipliers come in pairs with product 1 throughout, and may stay on the circle
         self._matrices = matrices
         self._budget = budget
@@ -77,17 +77,17 @@ class Spectra:
 
     @property
     def evaluations(self) -> int:
-        """Number of values at which M was asked for."""
+        """Number of evaluated values."""
         return len(self._known)
 
     @property
     def left(self) -> int:
-        """Number of values that may still be asked for."""
+        """Remaining number of values."""
         left = self._budget - len(self._known)
         return left if self._affordable is None else min(left, self._affordable())
 
     def at(self, values: Array) -> ComplexArray:
-        """Eigenvalues by falling modulus, shape (k, m); NaN where there is no matrix."""
+        """Eigenvalues by falling modulus, shape (k, m); NaN for a missing matrix."""
         wanted = values.tolist()
         missing = sorted({value for value in wanted if value not in self._known})
         if missing:
@@ -109,7 +109,7 @@ class Spectra:
             bisect.insort(self.values, value)
 
     def _ask(self, values: list[float]) -> list[tuple[float, Array, Array]]:
-        """The values at which there is a matrix, with the matrix and its error."""
+        """The values with a matrix, with the matrix and its error."""
         try:
             matrices, errors = self._matrices(np.array(values))
         except AnalysisError:
@@ -118,7 +118,7 @@ class Spectra:
         return [each for each in zip(values, matrices, errors, strict=True) if np.isfinite(each[1]).all()]
 
     def _balanced(self, matrices: Array) -> Array:
-        """Matrices with the states in units in which rows and columns are of the same size; the same for all."""
+        """Matrices in common units of the states that give rows and columns similar sizes."""
         if self._units is None:
             size = np.abs(matrices).max(axis=0)
             filled = size + _FILL * size.max() if size.max() > 0.0 else size
@@ -128,25 +128,25 @@ class Spectra:
         return np.asarray(matrices * (self._units / self._units[:, None]))
 
     def exists(self, value: float) -> bool:
-        """True if there is a matrix at a value; asked for if that is not known."""
+        """True if a matrix exists at a value, which is evaluated if unknown."""
         self.at(np.array([value]))
         return self._known[value] is not None
 
     def beside(self, place: float, apart: float = 0.0) -> tuple[float, float]:
-        """The nearest values with a matrix on either side of a place, at least so far from it; where there is none, the
-        place or the value that is beyond it."""
+        """The nearest values with a matrix on either side of a place, at a least distance; without one, the place or
+        the value beyond it."""
         here = bisect.bisect_left(self.values, place)
         left = next((v for v in reversed(self.values[:here]) if place - v >= apart), min(self.values[0], place))
         after = self.values[bisect.bisect_right(self.values, place) :]
         return left, next((v for v in after if v - place >= apart), max(self.values[-1], place))
 
     def holes(self, low: float, high: float) -> bool:
-        """True if there was no matrix somewhere between two values."""
+        """True if a matrix is missing between two values."""
         return any(low < value < high and nu is None for value, nu in self._known.items())
 
     def without_pair(self, low: float, high: float) -> bool:
-        """True if all complex multipliers are clear of the circle between two values, as far as those in between that
-        are known say.
+        """True if all complex multipliers are clear of the circle between two values, according to the known values in
+        between.
 
         The bialternate product also vanishes where two real multipliers have product 1.
         """
@@ -154,7 +154,7 @@ class Spectra:
         if len(values) < 2:
             return False
         nu = self.at(np.array(values))
-        # Whether small ones are real or a pair, rounding decides; a pair that grew from them would change the count.
+        # Rounding decides if small ones are real or a pair; a pair that grew from them would change the count.
         turning = (nu.imag > _TURNING * np.abs(nu)) & (np.abs(nu) > _SMALL)
         if (turning.sum(axis=1) != turning[0].sum()).any():
             return False
@@ -163,8 +163,8 @@ class Spectra:
         return bool(((2.0 * least - most > 0.0) | (2.0 * most - least < 0.0)).all())
 
     def disturbed(self, values: Array) -> ComplexArray:
-        """Eigenvalues of matrices whose entries are changed by what they may be wrong by, shape (k, draws, m); NaN
-        where there is no matrix."""
+        """Eigenvalues of matrices whose entries are changed within their errors, shape (k, draws, m); NaN for a missing
+        matrix."""
         missing = sorted({value for value in values.tolist() if value not in self._disturbed})
         if missing:
             self.at(np.array(missing))
@@ -195,11 +195,11 @@ class Spectra:
         return np.asarray(SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
 
     def clear(self, value: float) -> bool:
-        """True if all multipliers are off the circle by more than their errors."""
+        """True if the distance of all multipliers from the circle exceeds their errors."""
         return bool((np.abs(self.margins(value)) > self.margin_errors(value)).all())
 
     def factor_sizes(self, value: float, event: Event) -> tuple[Array, Array]:
-        """Sizes of the factors of the function of an event, rising, and what they may be wrong by."""
+        """Rising sizes of the factors of an event's function, and their errors."""
         sizes = np.sort(np.abs(factors(self.at(np.array([value])), event)), axis=-1)
         moved = np.sort(np.abs(factors(self.disturbed(np.array([value])), event)), axis=-1)[0]
         return sizes[0], np.asarray(SAFETY * np.abs(moved - sizes).max(axis=0) + _ROUNDING)
@@ -221,12 +221,12 @@ class Spectra:
         return signs, logs - self._bounds(values, event)
 
     def _bounds(self, values: Array, event: Event) -> Array:
-        """Logarithms of what the functions of an event are divided by; NaN where there is no matrix."""
+        """Logarithms of the divisors of an event's function; NaN for a missing matrix."""
         stretch = np.array([self._stretch.get(value, np.nan) for value in values.tolist()])
         return np.asarray(stretch * (1.0 if event is not Event.PAIR else self.size - 1.0))
 
     def function_error(self, values: Array, event: Event) -> Array:
-        """Logarithm of what :meth:`function` may be wrong by, shape (k,)."""
+        """Logarithm of the error of :meth:`function`, shape (k,)."""
         idle = self.idle[event]
         signs, logs = symmetric(factors(self.at(values), event), idle)
         largest = np.full(values.size, -np.inf)
@@ -270,8 +270,8 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
         terms = np.take_along_axis(terms, order, axis=1)
         few = min(terms.shape[1], 2 * left_out + _SPARE)
         for term in terms[:, :few].T:
-            # Times (term + t), up to t^left_out; the others are so far from zero that leaving one of them out instead
-            # changes nothing.
+            # Times (term + t), up to t^left_out; the others are too far from zero for their omission to
+            # matter.
             scale = np.maximum(np.abs(term), 1.0)
             logs += np.log(scale)
             shifted = np.concatenate([np.zeros_like(small[:, :1]), small[:, :-1]], axis=1)
@@ -280,7 +280,7 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
     last = small[:, left_out]
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real if left_out else last))
-    # Real and imaginary part apart: the quotient of a complex subnormal and its size would overflow.
+    # Real and imaginary part separately: the quotient of a complex subnormal and its size would overflow.
     divisors = np.where(sizes == 0.0, 1.0, sizes)
     directions = terms.real / divisors + 1j * (terms.imag / divisors)
     signs = np.sign((np.prod(directions, axis=1) * last).real)
@@ -303,8 +303,8 @@ def _stretches(balanced: Array) -> Array:
 def _eigenvalues(balanced: Array) -> ComplexArray:
     """Eigenvalues by falling modulus, shape (k, m).
 
-    The states with the largest rows come first: of a matrix graded downward the QR algorithm finds small eigenvalues to
-    their own size (Stewart, Numer. Math. 90, 2001), of another one rounding decides.
+    The states with the largest rows come first: for a matrix graded downward the QR algorithm resolves small
+    eigenvalues relative to their size (Stewart, Numer. Math. 90, 2001), for others they are rounding.
     """
     order = np.argsort(-np.abs(balanced).max(axis=-1), axis=-1)
     each = np.arange(len(balanced))[:, None]

@@ -2,10 +2,10 @@
 
 The interval is cut until the function is a polynomial of degree eight on every piece, to a small part of its size
 there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to its own error. So every piece
-falls into parts where the function has a sign for certain and narrow parts where it may vanish. Between opposite signs
-such a part holds one zero, if the polynomial goes straight through it and the function itself has these signs at both
-its ends. Any other one, which may hold no zero, two, or a double one, is looked at on its own scale, until the function
-has a sign there or is zero within its error.
+consists of parts with a certain sign and narrow parts where the function may vanish. Between opposite signs such a part
+contains one zero, if the polynomial is monotonic there and the function has these signs at both ends. Any other part,
+which may contain no zero, two, or a double one, is refined on its own scale, until the function has a sign there or is
+zero within its error.
 """
 
 from __future__ import annotations
@@ -28,42 +28,42 @@ SignedLog = Callable[[Array], tuple[Array, Array]]
 """A function given as ``numpy.linalg.slogdet`` gives a determinant: signs, shape (k,), and logarithms of sizes, shape
 (k,), so that no size is too small or too large; NaN where the function cannot be evaluated."""
 
-_RESOLVED = 1e-4  # of the largest value on a piece: what its polynomial may be wrong by
-_CLEAR = 4.0  # times that: a value so far from zero has its sign for certain
-_ROUNDING = 32.0 * float(np.finfo(float).eps)  # of the largest value: what any polynomial may be wrong by
-_NARROW = 0.05  # of a piece: widest part without a certain sign; on a wider one the polynomial tells too little
-_DEEP = 2.0**-4  # of the interval: on pieces no wider than this the error of the function is asked for
-_HOLE = 2.0**-8  # of the interval: width of a piece in which the function exists in part
-_ROUGH = 2.0**-34  # of the interval: width at which a piece that is no polynomial is given up
-_FINEST = 1e-12  # of the interval: width of a part in which zeros are not told apart
+_RESOLVED = 1e-4  # largest error of a piece's polynomial, relative to its largest value
+_CLEAR = 4.0  # value, in errors, with a certain sign
+_ROUNDING = 32.0 * float(np.finfo(float).eps)  # rounding of any polynomial, relative to its largest value
+_NARROW = 0.05  # widest useful part without a certain sign, relative to its piece
+_DEEP = 2.0**-4  # widest piece, relative to the interval, whose function error is computed
+_HOLE = 2.0**-8  # width of a piece where the function exists in part, relative to the interval
+_ROUGH = 2.0**-34  # least width of a piece that is not a polynomial, relative to the interval
+_FINEST = 1e-12  # width of a part in which zeros are not separated, relative to the interval
 _ULPS = 256.0  # width of the finest piece in units in the last place
 
-_WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # of such a part, and of its steepest slope: it goes straight through
-_REAL = 1e-6  # imaginary part of a place where a level is just reached
+_WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # places in a part, and least relative slope for a simple zero
+_REAL = 1e-6  # largest imaginary part of a place where a level is just reached
 
 _DEGREES = np.arange(DEGREE + 1.0)
 _BULGE = _DEGREES**2 * (_DEGREES**2 - 1.0) / 3.0 * (DENSE[1] - DENSE[0]) ** 2 / 8.0
-"""How far each Chebyshev polynomial may bulge between two neighbours of ``DENSE``, by its largest second derivative."""
+"""Largest bulge of each Chebyshev polynomial between neighbours of ``DENSE``, by its largest second derivative."""
 
 
 class Zeros(NamedTuple):
     """Intervals in which a search found something, in order."""
 
     changes: tuple[Interval, ...]  # opposite signs at the ends, one zero each; (a, a) for a zero at an end
-    touches: tuple[Interval, ...]  # a zero of even order, or no sign that is certain, between equal signs
-    unresolved: tuple[Interval, ...]  # no polynomial: the function is not smooth there, or the budget was spent
+    touches: tuple[Interval, ...]  # a zero of even order, or an uncertain sign, between equal signs
+    unresolved: tuple[Interval, ...]  # not polynomial: the function is not smooth there, or the budget was spent
     missing: tuple[Interval, ...]  # the function cannot be evaluated, or only in part
     spent: bool  # the budget ended the search
 
 
 def between(low: float, high: float) -> str:
-    """Words for an interval of the parameter, with as many digits as tell its ends apart."""
+    """Words for an interval of the parameter, with enough digits to separate its ends."""
     texts = f"{low:.9g}", f"{high:.9g}"
     return "between {} and {}".format(*(texts if texts[0] != texts[1] else (repr(float(low)), repr(float(high)))))
 
 
 def first_places(low: float, high: float) -> Array:
-    """Places at which a search asks for any function first."""
+    """First places at which a search evaluates any function."""
     return _places(low, high, PLACES)
 
 
@@ -78,9 +78,9 @@ def find_zeros(
 ) -> Zeros:
     """All zeros of an analytic function, which need not be scaled, in an interval.
 
-    Below its ``error``, given as a logarithm, shape (k,), a value is zero. Once no more values may be asked for
-    (``left``, by default 20 000 in all), the widest pieces have been looked at, and the changes of sign met so far are
-    reported. Zeros between two values for which ``skip`` is true are of no interest.
+    Below its ``error``, given as a logarithm, shape (k,), a value is zero. When the budget of values is spent
+    (``left``, by default 20 000 in all), the widest pieces have been searched, and the changes of sign so far are
+    reported. Zeros between two values for which ``skip`` is true are ignored.
     """
     search = _Search(function, error, skip, low, high)
     room_left = left if left is not None else lambda: 20_000 - search.asked
@@ -102,17 +102,17 @@ class _Kind(Enum):
     """Knowledge of a function on a part of the interval."""
 
     SIGN = auto()  # it has one sign
-    DOUBT = auto()  # it may vanish, and the polynomial goes straight through
+    DOUBT = auto()  # it may vanish, and the polynomial is monotonic
     BENT = auto()  # it may vanish, and the polynomial turns
     ZERO = auto()  # it is zero within its error
-    ROUGH = auto()  # it is no polynomial
+    ROUGH = auto()  # it is not a polynomial
     MISSING = auto()  # it cannot be evaluated
-    SKIPPED = auto()  # its zeros are of no interest
+    SKIPPED = auto()  # its zeros are ignored
 
 
 class _Part(NamedTuple):
-    """A part of the interval, with the sign, where it is certain, or the logarithm of what the polynomial may be wrong
-    by."""
+    """A part of the interval, with its sign, if certain, or the logarithm of the polynomial's
+    error."""
 
     a: float
     b: float
@@ -137,14 +137,14 @@ class _Search:
     parts: list[_Part] = field(default_factory=list)  # in order
 
     def put(self, parts: list[_Part]) -> None:
-        """Put parts in the place of what was known there."""
+        """Replace the known parts there."""
         for part in parts:
             before = [each._replace(b=min(each.b, part.a)) for each in self.parts if each.a < part.a]
             after = [each._replace(a=max(each.a, part.b)) for each in self.parts if each.b > part.b]
             self.parts = [*before, part, *after]
 
     def look(self, pieces: list[Interval]) -> list[Interval]:
-        """Look at some pieces at once; those that are left to be looked at."""
+        """Search some pieces together; return the remaining pieces."""
         places = np.array([_places(a, b, PLACES) for a, b in pieces])
         signs, logs = (part.reshape(places.shape) for part in self._ask(places.ravel()))
         left: list[Interval] = []
@@ -164,12 +164,12 @@ class _Search:
         return signs, logs
 
     def _fine(self, a: float, b: float, part: float) -> bool:
-        """True if a piece is too narrow to be cut."""
+        """True if a piece is too narrow for a cut."""
         least = max(part * (0.5 * self.high - 0.5 * self.low), 0.5 * _ULPS * float(np.spacing(max(abs(a), abs(b)))))
         return 0.5 * b - 0.5 * a <= least
 
     def _parts(self, a: float, b: float, signs: Array, logs: Array) -> list[_Part]:
-        """Parts of a piece; none if it has to be cut."""
+        """Parts of a piece; empty if it must be cut."""
         absent = np.isnan(signs) | np.isnan(logs) | (logs == np.inf)
         if absent.any():
             return [_Part(a, b, _Kind.MISSING)] if absent.all() or self._fine(a, b, _HOLE) else []
@@ -190,7 +190,7 @@ class _Search:
             if _CLEAR * noise >= 1.0:
                 return [_Part(a, b, _Kind.ZERO)]
             if wrong <= _CLEAR * noise:
-                # What is wide now does not become narrower on a smaller piece.
+                # A wide part does not become narrower on a smaller piece.
                 parts = self._cut(a, b, coefficients, _CLEAR * noise, reference)
                 return [part._replace(wrong=-np.inf) if _wide(part, a, b) else part for part in parts]
         if self._fine(a, b, _ROUGH):
@@ -198,7 +198,7 @@ class _Search:
         return []
 
     def _cut(self, a: float, b: float, coefficients: Array, wrong: float, reference: float) -> list[_Part]:
-        """A piece on which the function is a polynomial, cut where its size is what makes a sign certain."""
+        """A piece with a polynomial, cut where the value's size makes a sign certain."""
         level = _CLEAR * wrong
         ends = np.concatenate([[-1.0], _levels(coefficients, level), [1.0]])
         values = chebyshev.chebval(0.5 * ends[1:] + 0.5 * ends[:-1], coefficients)
@@ -217,7 +217,7 @@ class _Search:
         return parts
 
     def doubtful(self, room: int) -> list[Interval]:
-        """Pieces around what has to be looked at on its own scale; ``room`` values of the function may be asked for."""
+        """Pieces around parts that need their own scale, within ``room`` values of the function."""
         runs = [run for run in self._runs() if any(part.kind in _OPEN for part in run[1])]
         ends = [(run[0].a, run[-1].b) for _, run, _ in runs]
         unknown = sorted({place for place in itertools.chain(*ends) if place not in self.signs})
@@ -228,7 +228,7 @@ class _Search:
             self._ask(np.array(unknown))
         pieces = []
         for (before, run, after), (a, b) in zip(runs, ends, strict=True):
-            # Beyond what is known the function has the sign that it has at the end.
+            # Beyond the known parts the function keeps the sign at their end.
             seen = before in (self.signs[a], 0.0) and after in (self.signs[b], 0.0)
             if seen and before * after <= 0.0 and all(part.kind is not _Kind.BENT for part in run):
                 continue
@@ -240,12 +240,12 @@ class _Search:
         return pieces
 
     def _vanishes(self, a: float, b: float, wrong: float) -> bool:
-        """True if a function that comes to zero as far as its polynomial tells is wrong by as much itself."""
+        """True if the function's own error reaches its polynomial's distance from zero."""
         return self.error is not None and wrong <= float(self.error(np.array([0.5 * a + 0.5 * b]))[0]) + np.log(_CLEAR)
 
     def _runs(self) -> Iterator[tuple[float, list[_Part], float]]:
-        """Parts where the function may vanish, as far as they follow each other, with the signs before and after, 0
-        at the ends of what is known."""
+        """Groups of adjacent parts where the function may vanish, with the signs before and after, 0 at the ends of the
+        known range."""
         before, run = 0.0, []
         for part in [*self.parts, _Part(self.high, self.high, _Kind.SKIPPED)]:
             if part.kind in (*_OPEN, _Kind.ZERO):
@@ -256,7 +256,7 @@ class _Search:
             before, run = part.sign, []
 
     def result(self) -> Zeros:
-        """The zeros, from the parts as they are."""
+        """The zeros from the current parts."""
         ends = [(x, x) for x in (self.low, self.high) if self.signs.get(x) == 0.0]
         met = sorted((place, sign) for place, sign in self.signs.items() if sign in (-1.0, 1.0))
         changes: list[Interval] = []
@@ -273,7 +273,7 @@ class _Search:
                 touches += [part[:2] for part in run if part.kind is _Kind.ZERO]
         of_kind = {kind: _joined([part[:2] for part in self.parts if part.kind is kind]) for kind in _Kind}
         for a, b in of_kind[_Kind.ROUGH]:
-            # Nothing separates the zeros here; the changes of sign that were met are certain nevertheless.
+            # The zeros here are not separated, but the observed changes of sign are certain.
             within = [each for each in met if a <= each[0] <= b]
             changes += [(x, y) for (x, u), (y, v) in itertools.pairwise(within) if u != v]
         changes = sorted(changes + ends)
@@ -288,13 +288,13 @@ def _wide(part: _Part, a: float, b: float) -> bool:
 
 
 def _places(a: float, b: float, parts: Array) -> Array:
-    """From -1 ... 1 to a ... b; the ends exactly, no overflow."""
+    """Map -1 ... 1 to a ... b, with exact ends and no overflow."""
     places = (0.5 * a + 0.5 * b) + (0.5 * b - 0.5 * a) * parts
     return np.asarray(np.where(parts <= -1.0, a, np.where(parts >= 1.0, b, np.clip(places, a, b))))
 
 
 def _levels(coefficients: Array, level: float) -> Array:
-    """Places within -1 ... 1 at which a polynomial is a level, or minus that, in order."""
+    """Places within -1 ... 1 at which a polynomial equals a level or its negative, in order."""
     constant = np.eye(1, coefficients.size)[0]
     both = [chebyshev.chebroots(np.trim_zeros(coefficients + side * constant, "b")) for side in (-level, level)]
     roots = np.concatenate(both)
@@ -302,7 +302,7 @@ def _levels(coefficients: Array, level: float) -> Array:
 
 
 def _joined(pieces: list[Interval]) -> list[Interval]:
-    """Pieces in order, those that touch as one."""
+    """Pieces in order, with adjacent ones merged."""
     joined: list[Interval] = []
     for a, b in sorted(pieces):
         if joined and a <= joined[-1][1]:
