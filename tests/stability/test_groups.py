@@ -410,5 +410,5 @@ def test_symmetries_in_time_that_do_not_fit_the_group_are_refused_in_one_line(ga
 
 def test_a_state_at_the_edge_of_what_is_told_apart():
     # Two shifts by one cell stay within the error, three do not: no group.
-    with pytest.raises(AnalysisError, match="edge"):
+    with pytest.raises(AnalysisError, match="do not form a group"):
         isotropy(finite_group(cyclic(12)), np.sin(2.0 * math.pi * np.arange(12) / 12), error=0.4)

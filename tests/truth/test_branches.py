@@ -403,9 +403,9 @@ def test_every_mode_of_a_symmetric_pitchfork_has_its_branch():
 
 def test_tori_and_folds_are_not_switched_at():
     branch = follow(ring, begin(ring, 0.0, [0.5]), (-1.0, 1.0))
-    with pytest.raises(ParameterError, match="goes round it"):
+    with pytest.raises(ParameterError, match="passes it along the same branch"):
         switch(ring, branch.special_points[0])
-    with pytest.raises(ParameterError, match="no special point"):
+    with pytest.raises(ParameterError, match="must be a special point"):
         switch(ring, branch.points[0])
     with pytest.raises(ParameterError, match="switch"):
         follow(ring, branch.special_points[0].bifurcation, (-1.0, 1.0))

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.style import context as styled
 
 # Okabe and Ito (2008), told apart with every common colour vision; its yellow is too pale on white.
 BLACK: Final = "#1a1a1a"
@@ -92,8 +93,7 @@ def figure(wide: Layout, narrow: Layout, is_narrow: bool) -> tuple[Figure, dict[
 @contextmanager
 def house_style() -> Iterator[None]:
     """Within it figures look alike, whatever the user's matplotlib is set to."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
+    with styled("default"):
         mpl.rcParams.update(_RC)
         yield
 
