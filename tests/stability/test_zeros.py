@@ -100,6 +100,13 @@ def test_roots_on_nodes_with_near_neighbours_in_intervals_of_any_scale(clusters,
     assert zeros(function, low, high) == pytest.approx(list(roots), abs=1e-12 * scale + 16.0 * ulp)
 
 
+def test_a_zero_on_the_border_of_two_pieces_is_found():
+    for offset in (0.0, -0.5, 1e3, 1e6):
+        roots = [1e3 * offset, 1e3 * offset + 500.0]
+        found = zeros(lambda x, r=roots: (x - r[0]) * (x - r[1]) / 1e6, roots[0], roots[0] + 1e3)
+        assert found == pytest.approx(roots)
+
+
 def test_a_double_zero_is_a_touch_wherever_it_lies():
     for place in (0.3, 0.5, 0.25):
         found = find_zeros(signed_log(lambda x, p=place: np.expm1(x - p) ** 2), 0.0, 1.0)

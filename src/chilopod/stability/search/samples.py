@@ -43,6 +43,7 @@ _BEHIND = 4  # number of samples of a prediction
 _BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
 _TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
 _TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
+_NEAR_MERGED = 1e-2  # gap, relative to the interval, in which a failed correction confirms that they do
 _MERGED = 1e-5  # gap, relative to the interval, in which they still do
 _JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 
@@ -305,10 +306,14 @@ class Samples:
                 if ahead.value - behind[-1].value <= _MERGED * self.width:
                     self.merges = True
                     return behind
-                middle = 0.5 * (behind[-1].value + ahead.value)
                 try:
-                    found = self._sampled(middle, self._foreseen(behind[: -_BEHIND - 1 : -1], middle), behind[-1])
-                except AnalysisError:
+                    found = self._inside(behind, ahead)
+                except SpentError:
+                    break
+                if found is None:  # H - 1 is singular where they meet
+                    self.merges = ahead.value - behind[-1].value <= _NEAR_MERGED * self.width
+                    if self.merges:
+                        return behind
                     break
                 self._keep(found)
                 if _touches(behind[-2], behind[-1], found, ahead):
@@ -316,6 +321,18 @@ class Samples:
                 else:
                     behind.append(found)
         return path
+
+    def _inside(self, behind: list[Sample], ahead: Sample) -> Sample | None:
+        """Sample between the last one and another, in the middle or nearer to the last; None if there is none."""
+        for part in (0.5, 0.25, 0.125, 0.0625):
+            value = behind[-1].value + part * (ahead.value - behind[-1].value)
+            try:
+                return self._sampled(value, self._foreseen(behind[: -_BEHIND - 1 : -1], value), behind[-1])
+            except SpentError:
+                raise
+            except AnalysisError:
+                continue
+        return None
 
     def _follow(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
         """Samples from the last one to ``value``, by smaller steps where Newton's method fails. They end early with

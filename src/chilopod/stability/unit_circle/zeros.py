@@ -276,7 +276,13 @@ class _Search:
             # The zeros here are not separated, but the observed changes of sign are certain.
             within = [each for each in met if a <= each[0] <= b]
             changes += [(x, y) for (x, u), (y, v) in itertools.pairwise(within) if u != v]
-        changes = sorted(changes + ends)
+        # A zero on the border of two pieces leaves no part without a sign.
+        between_signs = [
+            (left.b, left.b)
+            for left, right in itertools.pairwise(self.parts)
+            if left.kind is right.kind is _Kind.SIGN and left.sign * right.sign < 0.0
+        ]
+        changes = sorted(changes + ends + between_signs)
         apart = [(a, b) for a, b in _joined(touches) if not any(x <= b and a <= y for x, y in changes)]
         rough, missing = of_kind[_Kind.ROUGH], of_kind[_Kind.MISSING]
         return Zeros(tuple(changes), tuple(apart), tuple(rough), tuple(missing), self.spent)
