@@ -33,11 +33,8 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-10
 """Tolerance of the nonlinear flow along a branch; orbits are accurate to 1e-10 (the tests compare 1e-9 with 1e-14)."""
 
-VERSION = 2
+VERSION = 3
 """Version of the file of a branch, increased whenever the meaning of its data or their continuation changes."""
-
-GRAVITY = 9.80665
-"""Standard gravity, m/s^2."""
 
 _SUFFIX = {
     "axis_radius": "m",
@@ -314,7 +311,7 @@ def _walked(
     points, make, unit = branch.points, _followed(robot, parameter), robot.unit_of(parameter)
     models = [make(point.value) for point in points]
     means = walk_means(models, [point.orbit for point in points])
-    weight = np.array([model.robot.body.mass * GRAVITY for model in models])
+    weight = np.array([model.robot.weight for model in models])
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
     verdicts = [

@@ -14,7 +14,7 @@ from pydantic import PlainValidator, model_validator
 from chilopod import units
 from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.gait import Gait
-from chilopod.ground import Ground
+from chilopod.ground import GRAVITY, Ground
 from chilopod.robot.files import Table, parsed, read_table, to_toml
 from chilopod.robot.inertia import module_yaw_inertia
 from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
@@ -154,6 +154,11 @@ class Robot(Description):
     def module_mass(self) -> float:
         """Mass of one module, kg."""
         return self.body.mass / self.body.modules
+
+    @property
+    def weight(self) -> float:
+        """Weight of the whole robot, N."""
+        return self.body.mass * GRAVITY
 
     @property
     def module_yaw_inertia(self) -> float:

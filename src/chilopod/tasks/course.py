@@ -21,9 +21,6 @@ from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import Trial, finite
 
-GRAVITY = 9.81
-"""Standard gravity, m/s^2."""
-
 _RATE = 20.0  # Hz, of records: looks of the referee fall on samples
 _PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the straight walk without slip
 _OF_GOALS = {
@@ -191,7 +188,7 @@ def steering_cost(robot: Robot, record: xr.Dataset) -> float:
     the cost of transport that steering adds to walking. NaN for a robot that did not move."""
     work = float(record.goal_spring_work.sum() + record.goal_drive_work.sum())
     way = float(record.goal_path.sum())
-    return work / (robot.body.mass * GRAVITY * way) if way > 0.0 else np.nan
+    return work / (robot.weight * way) if way > 0.0 else np.nan
 
 
 def driver(
