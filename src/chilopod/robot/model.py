@@ -22,6 +22,7 @@ from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
 from chilopod.units import Description, Flag, quantities
 
 _OVERRIDDEN: Final = "set by override"
+_DERIVED: Final = "body.yaw_inertia"  # the one optional number that has a value where none is given
 
 
 def _name(text: object) -> str:
@@ -170,9 +171,9 @@ class Robot(Description):
         paths: list[str] = []
         for path, quantity in QUANTITIES.items():
             section, key = path.split(".")
-            if quantity.optional and quantity.each and getattr(getattr(self, section), key) is None:
-                continue
             if self.twin is None and section == "twin":
+                continue
+            if quantity.optional and path != _DERIVED and getattr(getattr(self, section), key) is None:
                 continue
             count = self.body.modules - 1
             paths += [f"{path}[{index}]" for index in range(count)] if quantity.each else [path]
@@ -186,7 +187,7 @@ class Robot(Description):
         ParameterError.
         """
         place = self._locate(path)
-        if path == "body.yaw_inertia":
+        if path == _DERIVED:
             return self.module_yaw_inertia
         value = getattr(getattr(self, place.section), place.key)
         if value is None:
