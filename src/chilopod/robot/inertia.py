@@ -19,7 +19,7 @@ def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
     """
     if body.yaw_inertia is not None:
         return body.yaw_inertia
-    rod = body.loaded_mass / body.modules * (body.length / body.modules) ** 2 / 12.0
+    rod = body.mass / body.modules * (body.length / body.modules) ** 2 / 12.0
     return rod if twin is None else max(rod, yaw_inertia_range(body, legs, twin)[0])
 
 
@@ -32,7 +32,7 @@ def yaw_inertia_range(body: Body, legs: Legs, twin: Twin) -> tuple[float, float]
 
 def body_mass(body: Body, twin: Twin) -> float:
     """Mass of a module without its legs, kg; a module has four links."""
-    return body.loaded_mass / body.modules - 4.0 * twin.link_mass
+    return body.mass / body.modules - 4.0 * twin.link_mass
 
 
 def body_inertia(body: Body, legs: Legs, twin: Twin) -> tuple[float, float, float]:

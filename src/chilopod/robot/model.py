@@ -153,13 +153,13 @@ class Robot(Description):
 
     @property
     def module_mass(self) -> float:
-        """Mass of one module with its share of the payload, kg."""
-        return self.body.loaded_mass / self.body.modules
+        """Mass of one module, kg."""
+        return self.body.mass / self.body.modules
 
     @property
     def weight(self) -> float:
         """Weight of the whole robot, N."""
-        return self.body.loaded_mass * GRAVITY
+        return self.body.mass * GRAVITY
 
     @property
     def module_yaw_inertia(self) -> float:

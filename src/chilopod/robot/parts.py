@@ -28,8 +28,6 @@ class Body(Description):
         Length of the whole chain, m.
     mass
         Mass of the whole chain, kg.
-    payload
-        Mass of a load that is spread evenly over the chain, kg; None for no load.
     yaw_inertia
         Yaw inertia of one whole module with its legs about its centre, kg*m^2, in every engine. None means that of a
         uniform rod of the module's mass and length, or the least possible value if legs and body width of [twin] alone
@@ -39,13 +37,7 @@ class Body(Description):
     modules: Annotated[int, MODULES]
     length: Annotated[float, Quantity("m", "m")]
     mass: Annotated[float, Quantity("kg", "kg")]
-    payload: Annotated[float | None, Quantity("kg", "kg", optional=True)] = None
     yaw_inertia: Annotated[float | None, Quantity("kg*m^2", "kg*m^2", optional=True)] = None
-
-    @property
-    def loaded_mass(self) -> float:
-        """Mass of the chain with its payload, kg."""
-        return self.mass + (self.payload or 0.0)
 
 
 class Springs(Description):
