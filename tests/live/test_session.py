@@ -184,10 +184,10 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
 @pytest.mark.parametrize(
     ("asked", "part"),
     [
-        (wishes.Spring(0, float("nan")), "stiffness[0] = nan: is no number"),
+        (wishes.Spring(0, float("nan")), "stiffness[0] = nan: must be a finite number"),
         (wishes.Spring(None, -1.0), "springs.stiffness"),
         (wishes.Spring(0, stiffness(99.0)), "springs.stiffness[0] = "),
-        (wishes.Spring(17, stiffness(9.0)), "there is no such slider"),
+        (wishes.Spring(17, stiffness(9.0)), "must be a slider"),
         (wishes.Set("frictoin", 1.0), "did you mean 'friction'"),
         (wishes.Friction(float("inf")), "friction = inf"),
         (wishes.Friction(7.0), "0.3 to 3"),

@@ -57,11 +57,10 @@ def _root(
 
 
 def _check_completion() -> None:
-    asked = os.environ.get(_COMPLETION, "")
-    if asked and not re.fullmatch(r"(complete|source)_(bash|zsh|fish|powershell|pwsh)", asked):
-        raise ParameterError(
-            "is none of the instructions of shells", field=_COMPLETION, value=asked, allowed="complete_bash, or unset"
-        )
+    instruction = os.environ.get(_COMPLETION, "")
+    if instruction and not re.fullmatch(r"(complete|source)_(bash|zsh|fish|powershell|pwsh)", instruction):
+        problem, allowed = "must be the instruction of a shell", "complete_bash, or unset"
+        raise ParameterError(problem, field=_COMPLETION, value=instruction, allowed=allowed)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

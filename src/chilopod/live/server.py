@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import io
 import math
 import socket
@@ -365,8 +366,7 @@ def _quiet() -> contextlib.AbstractContextManager[object]:
 
 def _free_port(host: str, port: int) -> int:
     """Make sure that the page can listen at a port, and nowhere else."""
-    if not 0 <= port < 65536:
-        raise ParameterError("is no port", field="port", value=port, allowed="1 to 65535, or 0 for any that is free")
+    wishes.check_port(port)
     try:
         family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, socket.SOCK_STREAM) as trial:
@@ -374,10 +374,10 @@ def _free_port(host: str, port: int) -> int:
             trial.bind(address)
             free: int = trial.getsockname()[1]
             return free
-    except (socket.gaierror, UnicodeError) as error:
-        allowed = "an address or a name of this machine, or 0.0.0.0 for all of them"
-        raise ParameterError("is no address of this machine", field="host", value=host, allowed=allowed) from error
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
+        if not isinstance(error, OSError) or isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
+            problem, allowed = "must be an address of this machine", "an address or a name of it, or 0.0.0.0 for all"
+            raise ParameterError(problem, field="host", value=host, allowed=allowed) from error
         raise ParameterError(
             f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
         ) from error

@@ -317,7 +317,7 @@ class Session:
         slider = self.sliders.get(name)
         if slider is None:
             near, allowed = nearest_name(name, self.sliders), ", ".join(self.sliders)
-            raise ParameterError("there is no such slider", field="slider", value=name, allowed=allowed, nearest=near)
+            raise ParameterError("must be a slider", field="slider", value=name, allowed=allowed, nearest=near)
         number, before = as_within(name, value, slider.limits, slider.si), self.settings.robot
         settings = slider.apply(self.settings, number)
         self._engine.common(settings.robot)
@@ -350,7 +350,7 @@ class Session:
     def _pull_at(self, joint: int, torque: float, time: float) -> None:
         own = self.file.springs.stiffness
         if joint not in range(len(own)):
-            raise ParameterError("there is no such joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
+            raise ParameterError("must be a joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
         strongest = _STRONGEST * own[joint]
         self._pull[joint] = np.clip(as_finite("pull", torque), -strongest, strongest)
         self._pulled_until[joint] = self._before + self._walk.time + time

@@ -65,12 +65,12 @@ def filmed(
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
     """Times of the frames of a film, s; errors as of :func:`filmed` if it cannot be encoded like this."""
     if not 1 <= fps <= 120:
-        raise ParameterError("is no frame rate", field="fps", value=fps, allowed="1 to 120 per second")
+        raise ParameterError("must be a frame rate", field="fps", value=fps, allowed="1 to 120 per second")
     if not _SLOWEST <= speed <= FASTEST:
-        raise ParameterError("is no speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
+        raise ParameterError("must be a speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
     if any(side % 2 or not _SMALLEST <= side <= LARGEST for side in size):
         allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
-        raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
+        raise ParameterError("must be the size of a film", field="size", value=size, allowed=allowed)
     if not has_encoder():
         raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
     recorded = record["time"].values.astype(np.float64)

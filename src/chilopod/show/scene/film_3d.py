@@ -91,7 +91,7 @@ def stills(
         raise ParameterError("is not in the record", field="times", value=float(wanted[outside][0]), allowed=allowed)
     if any(not _NARROWEST <= side <= LARGEST for side in size):
         allowed = f"{_NARROWEST} to {LARGEST} pixels"
-        raise ParameterError("is no size of a picture", field="size", value=size, allowed=allowed)
+        raise ParameterError("must be the size of a picture", field="size", value=size, allowed=allowed)
     walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
     with gl.context(*size), style.house_style():
         studio = Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)

@@ -194,7 +194,7 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
     if isinstance(titles, Mapping):
         missing = [label for label in labels if label not in titles]
         if missing:
-            raise ParameterError(f"has none for robot {missing[0]!r}", field="titles", allowed="one for each robot")
+            raise ParameterError(f"must name robot {missing[0]!r} too", field="titles", allowed="one for each robot")
         return tuple(titles[label] for label in labels)
     if len(titles) != len(labels):
         raise ParameterError(f"has {len(titles)} titles", field="titles", allowed=f"{len(labels)}, one for each robot")
