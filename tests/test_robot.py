@@ -327,6 +327,11 @@ def test_bad_files(tmp_path, content, complaint):
     assert complaint in str(caught.value)
 
 
+def test_a_byte_order_mark_is_skipped(tmp_path):
+    (tmp_path / "robot.toml").write_text(load_robot(PRESET).to_toml(), encoding="utf-8-sig")
+    assert load_robot(tmp_path / "robot.toml") == load_robot(PRESET)
+
+
 @given(st.binary(max_size=200))
 def test_random_files_are_refused(tmp_path_factory, content):
     file = tmp_path_factory.getbasetemp() / "random.toml"

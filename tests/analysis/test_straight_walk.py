@@ -1,11 +1,14 @@
 """Stability of the straight walk and its bifurcations, in the robot's own terms."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
 from chilopod import stability
 from chilopod.analysis import bifurcations, first_loss, straight_walk
 from chilopod.analysis.parameters import ALL, K1, stiffness
+from chilopod.analysis.straight_walk import family
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
@@ -27,9 +30,20 @@ def test_coefficients_are_those_of_the_joint_angles():
     assert point.error_bound < 1e-8
 
 
-def test_modules_are_no_continuous_parameter():
-    with pytest.raises(ParameterError, match=r"body\.modules"):
+def test_only_continuous_numbers_that_the_model_reads_are_parameters():
+    with pytest.raises(ParameterError, match=r"body\.modules.*continuous"):
         bifurcations(ROBOT, "body.modules", (3.0, 8.0))
+    robot = load_robot("aoi2022").set_from_text(["body.yaw_inertia=0.02", "twin.timestep=0.0005"])
+
+    def data(robot):
+        model = PlanarModel(robot)
+        read = model.scalars, model.stiffness, model.damping, model.moments(np.arange(3)), model.schedule.times
+        return np.concatenate([np.ravel(each) for each in read]).tolist()
+
+    for path in set(robot.parameters()) - {"body.modules"}:
+        changes = data(robot.with_value(path, 0.5 * robot.get(path) or 0.1)) != data(robot)
+        with nullcontext() if changes else pytest.raises(ParameterError, match="that the planar model reads"):
+            family(robot, path)
 
 
 def test_stability_agrees_with_the_sign_of_the_leading_exponent():

@@ -314,7 +314,7 @@ def test_recordings_end_where_there_is_no_room(monkeypatch):
         session.walk_on(1.3)
     assert len(session.records()) == 2
     assert not session.settings.recording
-    assert "room for no more than the 2" in " ".join(session.said())
+    assert "room for no more than the 2" in " ".join(session.messages())
 
 
 def test_what_no_browser_took_is_there_for_the_next(page):

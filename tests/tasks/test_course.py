@@ -149,6 +149,13 @@ def test_what_cannot_be_driven_is_refused(changed, strategy, spring, error, word
         driver(ROBOT.set_from_text(changed), ON_COURSES[strategy], spring)
 
 
+def test_names_are_no_strategies_and_courses(ready):
+    with pytest.raises(ParameterError, match="strategy = 'variable': must be a strategy"):
+        driver(ROBOT, "variable")
+    with pytest.raises(ParameterError, match="course = 'slalom': must be a course"):
+        drive(ready, "slalom")
+
+
 def test_the_whole_robot_walks_a_course():
     whole = Driver(load_robot("aoi2022"), ON_COURSES["leg-yaw"], LegYawController(), None, "twin")
     done = drive(whole, course_named("0 deg, 0.25 m; 170 deg, 6 m", 1.5))

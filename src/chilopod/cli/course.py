@@ -89,7 +89,7 @@ def course(
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
 
-    def walked(told: Callable[[str], Progress]) -> Driven:
+    def results(progress: Callable[[str], Progress]) -> Driven:
         from chilopod.tasks.course import Driver, drive, driver, patience_of
         from chilopod.trials import check_fits
 
@@ -97,7 +97,7 @@ def course(
         how = options.steering
         # What cannot be driven is refused before the radius law takes its time.
         check_fits(Driver(described, chosen, law=None, **how).trial(goals).repeated(options.seed, options.repeats))
-        ready = driver(described, chosen, spring, **how, folder=options.trials, progress=told("radius law"))
-        return drive(ready, goals, **options.runs(told("course")))
+        ready = driver(described, chosen, spring, **how, folder=options.trials, progress=progress("radius law"))
+        return drive(ready, goals, **options.runs(progress("course")))
 
-    options.walk_into(out, "course", walked)
+    options.walk_into(out, "course", results)

@@ -199,8 +199,8 @@ def planar(
 
     free([*files_of("identification", out), *_identified(out)], force)
     with progress_bar("identification") as progress:
-        told = partial(progress, "identification")
-        found = identify_planar(described, critical_mode_data(), points, variant_settings(), told)
+        step = partial(progress, "identification")
+        found = identify_planar(described, critical_mode_data(), points, variant_settings(), step)
     lines = [*found.lines(), f"profile, figure and robot file are in {out}"]
     result, more = {"robot": described.name, **found.as_json()}, identification_files(found, out)
     _deliver(out, result, found.best, lines, more, force=force, as_json=as_json)
@@ -251,8 +251,8 @@ def twin(
     from chilopod.tasks.identify import identify_twin
 
     with progress_bar("identification") as progress:
-        kept, told = check_folder(out / "evaluations"), partial(progress, "identification")
-        found = identify_twin(described, base_series_data(), starts, generations, seed, kept, fresh, told)
+        kept, step = check_folder(out / "evaluations"), partial(progress, "identification")
+        found = identify_twin(described, base_series_data(), starts, generations, seed, kept, fresh, step)
     result = {"robot": described.name, **found.as_json()}
     constants = result["constants"].items()
     lines = [

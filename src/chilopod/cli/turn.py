@@ -61,10 +61,10 @@ def turn(
     with reading("duration"):
         seconds = None if duration is None else units.parse(duration, "s")
 
-    def walked(told: Callable[[str], Progress]) -> Turn:
+    def results(progress: Callable[[str], Progress]) -> Turn:
         from chilopod.tasks import turn as walk_there
 
         how = {"duration": seconds, **options.steering}
-        return walk_there(described, goal, chosen, spring, **how, **options.runs(told("turn")))
+        return walk_there(described, goal, chosen, spring, **how, **options.runs(progress("turn")))
 
-    options.walk_into(out, "turn", walked)
+    options.walk_into(out, "turn", results)

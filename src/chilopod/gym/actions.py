@@ -97,18 +97,18 @@ class Actions:
         events = self.legs.events(self.robot.gait)
         return tuple(sorted((each.phase, each.window, SIDES.index(each.name)) for each in events))
 
-    def checked(self, actions: ArrayLike, robots: int) -> Array:
-        """Actions of a batch, each its own copy, shape (robots, len(names)). Raises ParameterError for a wrong shape,
-        NaN, or values out of range."""
-        array, shape = as_array("action", actions), (robots, len(self.names))
+    def checked(self, actions: ArrayLike, *robots: int) -> Array:
+        """Copy of actions of shape (len(names),), or (robots, len(names)) for a batch. Raises ParameterError for a
+        wrong shape, NaN, or values out of range."""
+        array, shape = as_array("action", actions), (*robots, len(self.names))
         if array.shape != shape:
-            raise ParameterError("has the wrong shape", field="action", value=array.shape, allowed=str(shape))
+            problem = f"must be {shape}, the numbers {', '.join(self.names)}"
+            raise ParameterError(problem, field="action.shape", value=array.shape)
         inside = np.abs(array) <= 1.0 + _ROUNDING
         if not inside.all():
-            robot, number = (int(each) for each in np.argwhere(~inside)[0])
-            problem, value = f"the {self.names[number]} is out of range", float(array[robot, number])
-            where = f"action[{number}]" if robots == 1 else f"action[{robot}, {number}]"
-            raise ParameterError(problem, field=where, value=value, allowed="-1 to 1")
+            place = np.argwhere(~inside)[0].tolist()
+            problem, value = f"the {self.names[place[-1]]} is out of range", float(array[tuple(place)])
+            raise ParameterError(problem, field=f"action{place}", value=value, allowed="-1 to 1")
         return np.clip(array, -1.0, 1.0)
 
     def stiffness(self, actions: Array) -> Array:

@@ -147,7 +147,7 @@ class RobotEnv(gymnasium.Env[Row, Row]):
             raise ParameterError(
                 "must not be called after the end of an episode", field="step", allowed="reset() first"
             )
-        step = self.episodes.step(np.asarray(action)[None])
+        step = self.episodes.step(self.episodes.actions.checked(action)[None])
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         self._over = terminated or truncated
         return step.observation[0], float(step.reward[0]), terminated, truncated, _info(step)

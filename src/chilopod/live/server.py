@@ -106,7 +106,7 @@ class Live:
         self._theory = Theory()
         self._growth: Growth | None = None
         self._wants_record: viser.ClientHandle | None = None
-        self.frames, self.busy, self._told = 0, 0.0, False
+        self.frames, self.busy, self._wished = 0, 0.0, False
         self.gate = Gate(host, token)
         free = _free_port(host, port)
         with _quiet():
@@ -142,7 +142,7 @@ class Live:
     def wish(self, wish: wishes.Wish) -> None:
         """Leave a wish, from any thread, as if somebody had done it at the page."""
         self._session.box.put(wish)
-        self._told = True
+        self._wished = True
 
     def wait(self, seconds: float | None = None) -> None:
         """Wait so long, or until the thread of the walk fails, and raise its error then."""
@@ -229,7 +229,7 @@ class Live:
     def _obey(self) -> bool:
         """Grant wishes and take answers; True if there was a wish."""
         session, before = self._session, self._session.settings
-        told, self._told = self._told, False
+        wished, self._wished = self._wished, False
         obeyed = session.obey()
         if obeyed:
             if session.settings.robot != before.robot:
@@ -237,10 +237,10 @@ class Live:
             if session.seen().time < self.seen.time:
                 self._view.forget_way()
                 self._plots.forget()
-        said = session.said()
-        for sentence in said:
+        messages = session.messages()
+        for sentence in messages:
             self._at_server(partial(self._notify, sentence))
-        if said or told:
+        if messages or wished:
             self._at_server(partial(self._controls.put_back, session.settings))
         for answer in self._beside.answers():
             if isinstance(answer, Theory):
@@ -268,11 +268,11 @@ class Live:
 
     def _tell(self, rate: float) -> None:
         session, seen = self._session, self.seen
-        told = sentences(seen, session.settings, self._theory, self._growth)
+        words = sentences(seen, session.settings, self._theory, self._growth)
         settings = session.settings
         slow = "" if settings.paused or rate > 0.8 * settings.speed else f", as fast as it goes: {rate:.1f} times"
         recording = ", recording" if settings.recording else ""
-        text = f"{' '.join(told)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
+        text = f"{' '.join(words)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
         if self._controls.words.content != text:
             self._controls.words.content = text
 

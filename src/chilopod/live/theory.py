@@ -70,7 +70,7 @@ def growth_of(robot: Robot) -> Growth:
     return Growth(robot, max(real for real, _ in exponents))
 
 
-def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None:
+def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> None:
     """Compute the theory of a robot, and call a function with what is known so far; what that raises ends the work.
 
     In an engine whose walks are not those of the planar theory, some are walked. The first spring does not matter.
@@ -78,20 +78,22 @@ def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None
     known = Theory(robot)
     try:
         if engine_named(engine).traits.exact:
-            _exact(known, told)
+            _exact(known, callback)
         else:
             from chilopod.tasks import radius_law
 
             law = radius_law(
-                robot, engine, progress=lambda done, words: told(replace(known, remark=_share(done, "how it turns")))
+                robot,
+                engine,
+                progress=lambda done, words: callback(replace(known, remark=_share(done, "how it turns"))),
             )
             stable = np.ones(len(law.values), dtype=np.bool_)
-            told(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
+            callback(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
     except ChilopodError as error:
-        told(replace(known, remark=error.problem))
+        callback(replace(known, remark=error.problem))
 
 
-def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
+def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
     from chilopod.analysis import curved_walks, first_loss
     from chilopod.stability import Kind
     from chilopod.tasks.radius_law import that_holds
@@ -100,13 +102,13 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
     assert robot is not None
     # As the radius law has it, but for the first spring, which is what varies.
     low, high = (part * max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]) for part in _BETWEEN)
-    told(replace(known, remark="looking for the pitchfork"))
+    callback(replace(known, remark="looking for the pitchfork"))
     loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
     known = replace(known, pitchfork=loss.point.value)
-    told(replace(known, remark="following the curved walks"))
+    callback(replace(known, remark="following the curved walks"))
 
     def follow(done: float, words: str) -> None:
-        told(replace(known, remark=_share(done, "following the curved walks")))
+        callback(replace(known, remark=_share(done, "following the curved walks")))
 
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=follow)
     possible = walks.verdict.values != Status.OUT_OF_RANGE.label
@@ -121,7 +123,7 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
         known = replace(known, law=that_holds(law, robot))
     except ChilopodError as error:
         known = replace(known, remark=error.problem)
-    told(known)
+    callback(known)
 
 
 def _share(done: float, what: str) -> str:

@@ -20,7 +20,7 @@ class Said:
     """Something that is printed: the statement, and what counts as agreement, in words."""
 
     words: str
-    asked: str
+    condition: str
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,8 @@ def _spring(value: float, tolerance: float = ONSETS) -> Number:
 def _around(k_hat: float) -> Band:
     """Around it is between the paper's own neighbours of 21."""
     low, high = 17.0 / 21.0 * k_hat, 28.0 / 21.0 * k_hat
-    asked = f"{low:.3g} to {high:.3g} {PAPER_UNIT}, with all that are no worse"
-    return Band(f"around k1 = {k_hat:g} {PAPER_UNIT}", asked, low, high)
+    condition = f"{low:.3g} to {high:.3g} {PAPER_UNIT}, with all that are no worse"
+    return Band(f"around k1 = {k_hat:g} {PAPER_UNIT}", condition, low, high)
 
 
 ANALYSIS = "section Verification by Floquet analysis"

@@ -54,12 +54,12 @@ def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool =
     if only is None:
         found = [each for each in sections.values() if not each.on_request and not (quick and each.full)]
         return [section for section in found if not (paper and section.beyond)]
-    asked = list(only)
-    for name in asked:
+    names = list(only)
+    for name in names:
         if name not in sections:
             near, allowed = nearest_name(name, sections), ", ".join(sections)
-            raise ParameterError("no such section", field="only", value=name, allowed=allowed, nearest=near)
-    found = [section for name, section in sections.items() if name in asked]
+            raise ParameterError("must be a section", field="only", value=name, allowed=allowed, nearest=near)
+    found = [section for name, section in sections.items() if name in names]
     for section in found:
         if paper and section.beyond:
             raise ParameterError("goes beyond the paper's own experiments", field="only", value=section.name)

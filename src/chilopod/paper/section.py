@@ -141,12 +141,12 @@ def reproduce(
     sections: Sequence[Section[Any]],
     context: Context | None = None,
     progress: SectionProgress = lambda what, done, words: None,
-    told: Callable[[Found, Section[Any]], None] = lambda found, section: None,
+    callback: Callable[[Found, Section[Any]], None] = lambda found, section: None,
 ) -> Found:
     """Compute sections of the report; one that fails does not keep the others from being computed.
 
     ``sections`` are those of :func:`chilopod.paper.registry.chosen`, the context by default that of the paper's robots.
-    ``progress`` is called as the work goes on, ``told`` after every section with all that is found by then, and the
+    ``progress`` is called as the work goes on, ``callback`` after every section with all that is found by then, and the
     section. An OutputError is raised if trials cannot be kept.
     """
     found = Found(context or Context())
@@ -165,5 +165,5 @@ def reproduce(
             found.failures[section] = error
         found.seconds[section] = time.perf_counter() - started
         progress(section.sentence, 1.0, "failed" if section in found.failures else "done")
-        told(found, section)
+        callback(found, section)
     return found

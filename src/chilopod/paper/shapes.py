@@ -118,7 +118,7 @@ def draw_joints(axes: Axes, data: xr.Dataset, here: NDArray[np.bool_] | bool, al
     finish(axes, legend="upper left", ylabel="mean absolute angle (deg)")
 
 
-def draw_asked(axes: Axes, asked: Sequence[tuple[str, float, Band]]) -> None:
+def draw_bands(axes: Axes, asked: Sequence[tuple[str, float, Band]]) -> None:
     """Band of what agrees with the paper's robot, a row for each printed number, under its name."""
     for row, (_, paper, band) in enumerate(asked):
         axes.plot([band.low, band.high], [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")

@@ -162,8 +162,8 @@ def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Stateme
         twins = [row for row in rows if isinstance(row, OfTwin) and row.statement == each]
         for twin in twins:
             quantity = f"{each.quantity} ({twin.reading})" if twin.reading else each.quantity
-            lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.asked))
+            lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.condition))
         if planar and not twins:
             none = Verdict.NOT_COMPUTED
-            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.asked))
+            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.condition))
     return lines

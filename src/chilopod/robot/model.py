@@ -96,8 +96,8 @@ class Robot(Description):
         try:
             return cls(**table)
         except ChilopodError as error:
-            told = {name: getattr(error, name) for name in ("field", "value", "allowed", "nearest")}
-            raise RobotFileError(error.problem, **told, source=source) from None
+            details = {name: getattr(error, name) for name in ("field", "value", "allowed", "nearest")}
+            raise RobotFileError(error.problem, **details, source=source) from None
         except RecursionError:
             raise RobotFileError("is nested too deeply", source=source) from None
 
@@ -245,8 +245,8 @@ class Robot(Description):
 
     def with_twin_of(self, other: Robot) -> Self:
         """Return this robot with the [twin] of another, and the provenance of its numbers."""
-        told = {path: text for path, text in other.provenance.items() if path.startswith("twin.")}
-        return self.with_(twin=other.twin, provenance={**self.provenance, **told})
+        texts = {path: text for path, text in other.provenance.items() if path.startswith("twin.")}
+        return self.with_(twin=other.twin, provenance={**self.provenance, **texts})
 
     def provenance_of(self, path: str) -> str | None:
         """Return the provenance of a parameter; a spring falls back on that of all springs."""
@@ -331,8 +331,8 @@ class Robot(Description):
             changes["springs"] = self.springs.model_copy(
                 update={key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
             )
-        told = {name: text for name, text in self.provenance.items() if spring_index(name, path) < joints}
-        changes["provenance"] = Table({**told, path: _OVERRIDDEN})
+        texts = {name: text for name, text in self.provenance.items() if spring_index(name, path) < joints}
+        changes["provenance"] = Table({**texts, path: _OVERRIDDEN})
         return self.model_copy(update=changes)
 
 

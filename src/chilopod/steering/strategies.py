@@ -173,6 +173,13 @@ ON_THE_WAY: Mapping[str, Strategy] = {each.name: each for each in ON_COURSES.val
 """Strategies for courses without a spring to choose before the walk, by name."""
 
 
+def check_strategy(strategy: object) -> None:
+    """Refuse anything but a strategy with a ParameterError."""
+    if not isinstance(strategy, Strategy):
+        allowed = 'a Strategy, such as chilopod.steering.strategy_named("leg-yaw")'
+        raise ParameterError("must be a strategy", field="strategy", value=strategy, allowed=allowed)
+
+
 def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
     """Return a strategy of :data:`STRATEGIES`, or of other strategies, by its name.
 

@@ -24,7 +24,7 @@ from chilopod.show.panel import Panel
 from chilopod.show.scene.encoder import has_encoder
 from chilopod.show.scene.film import filmed
 from chilopod.show.scene.film_3d import film_3d, stills
-from chilopod.show.scene.played import replay
+from chilopod.show.scene.replay import replay
 
 T = TypeVar("T")
 

@@ -67,8 +67,8 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}
     for index, (letter, said) in enumerate(printed.TASKS.items()):
-        told = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
-        tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=told)
+        share = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
+        tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=share)
     task = tasks["A"]
     same: dict[str, Any] = {"folder": folder, "progress": part(progress, 0.5, 0.65, "uniform springs")}
     uniform = UNIFORM_SPRINGS[::3] if quick else UNIFORM_SPRINGS
@@ -78,8 +78,8 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
     rough_springs = QUICK_SPRINGS if quick else ROUGH_SPRINGS
     rough = turning_task(robot, task.target, rough_springs, disturbance=rougher, **same)
     springs_ = {"best spring": task.best, "spring of the law": laws.k_hat(task.target.radius)[0]}
-    told = part(progress, 0.85, 0.9, "with and without leg yaw")
-    without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=told)
+    share = part(progress, 0.85, 0.9, "with and without leg yaw")
+    without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=share)
     settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
     distances = FARTHER[:2] if quick else FARTHER
     farther = farther_targets(robot, laws, task.target.bearing, distances, folder=folder)

@@ -231,7 +231,7 @@ class FilmPanel:
 
     def __init__(self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text) -> None:
         self.shown, self.robot, self.label = shown, robot, label
-        self.outcome, self.told = shown.outcomes[robot], label.get_text()
+        self.outcome, self.outcome_text = shown.outcomes[robot], label.get_text()
         self.rings: list[tuple[Circle, Line2D]] = []
         floor, frames = shown.floor, shown.frames
         axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1), xticks=[], yticks=[])
@@ -275,7 +275,7 @@ class FilmPanel:
     def tell(self, now: float) -> None:
         """Show the outcome, or that there is none yet, and the targets so far."""
         known, *reached = self.known(now)
-        self.label.set_text(self.told if known else "walking")
+        self.label.set_text(self.outcome_text if known else "walking")
         self.label.set_color(_MARKS[self.outcome.kind][1] if known else "#555555")
         self.label.set_fontweight("bold" if known else "normal")
         for index, (ring, cross) in enumerate(self.rings):

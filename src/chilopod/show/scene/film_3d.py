@@ -195,7 +195,7 @@ class _Panel3D(FilmPanel):
         self, stage: _Stage3D, robot: int, size: tuple[int, int], corner: tuple[int, int], label: Text
     ) -> None:
         self.stage, self.shown, self.robot, self.size, self.label = stage, stage.shown, robot, size, label
-        self.outcome, self.told, self.rings = stage.shown.outcomes[robot], label.get_text(), []
+        self.outcome, self.outcome_text, self.rings = stage.shown.outcomes[robot], label.get_text(), []
         (left, above), (width, height) = corner, size
         self.box = (slice(above, above + height), slice(left, left + width), slice(0, 3))
         self.whole = stage.walks.view(size)

@@ -117,7 +117,7 @@ class Identification(Summary):
         largest = np.abs(self.residuals).max()
         return f"{self.given.name}: largest residual {largest:.2f}; 1 is what the tolerances of the data allow"
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         constants = self.as_json()["constants"].items()
         rows = [(path, each["text"], each["allowed_text"]) for path, each in constants]
         cut = [path for path, each in constants if any(each["cut_by_the_search"])]

@@ -14,7 +14,7 @@ from chilopod.output import Content, write_all
 from chilopod.show import style
 from chilopod.show.scene.encoder import has_encoder
 from chilopod.show.scene.film import FASTEST, filmed
-from chilopod.show.scene.played import SHOWN, replay
+from chilopod.show.scene.replay import SHOWN, replay
 
 _LONGEST_FILM = 15.0  # s: it takes half as long to make
 _FILM_SIZE = (960, 640)
