@@ -79,7 +79,7 @@ def test_the_help_has_all_choices(capsys):
         ),
         (
             ["--strategy", "pitchfrok"],
-            "--strategy = 'pitchfrok': must be one of the strategies; did you mean 'pitchfork'?",
+            "--strategy = 'pitchfrok': must be a strategy; did you mean 'pitchfork'?",
         ),
         (["--k1", "15 N*mm/deg"], "--k1 = '15 N*mm/deg': must not be given: strategy variable sets its own springs"),
         (["--strategy", "pitchfork"], "--k1: strategy pitchfork needs one stiffness"),

@@ -118,16 +118,13 @@ def test_walk_refuses(capsys, arguments, words):
             ["walk", ROBOT, "--set", "springs.stiffness[ 0]=1"],
             "springs.stiffness[ 0]: must be the path of a parameter; did you mean ",
         ),
-        (
-            ["turn", ROBOT, "--target", "170 deg, 1 m"],
-            "--target bearing = '170 deg': must lie in front of the robot; allowed: -90 to 90 deg; a number without",
-        ),
+        (["turn", ROBOT, "--target", "170 deg, 1 m"], "--target bearing = '170 deg': "),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--k1", "-3"], "--k1 = '-3': must be positive"),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--duration", "1e6 s"], "--duration = '1e6 s': is out of range"),
         (["branch", ROBOT, "--between", "1 kg", "2 kg"], "--between springs.stiffness[0] = '1 kg': is a mass"),
         (
             ["branch", ROBOT, "--parameter", "k1"],
-            "--parameter = 'k1': must be the path of a parameter; allowed: body.length, ",
+            "--parameter = 'k1': must be the path of a parameter; allowed: body.l",
         ),
         (["branch", ROBOT, "--parameter", "springs.lag"], "--parameter = 'springs.lag': must be a number that the"),
         (["robot", "new", "x.toml", "--modules", "1"], "--modules = '1': "),

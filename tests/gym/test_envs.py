@@ -252,7 +252,7 @@ def test_time_that_is_over_truncates():
     steps = [env.step(np.ones(3, dtype=np.float32)) for _ in range(54)]
     assert [each[3] for each in steps] == [False] * 53 + [True]
     assert steps[-1][4]["verdict"] == "out of time"
-    with pytest.raises(ParameterError, match="must not be called after the end of an episode"):
+    with pytest.raises(ParameterError, match="must not follow the end of an episode"):
         env.step(np.zeros(3, dtype=np.float32))
 
 

@@ -145,5 +145,5 @@ def test_patience_view_and_range_within_reason(number):
 
 @pytest.mark.parametrize("place", [(math.nan, 0.0), (math.inf, 0.0), (1e4, 1e4), (0.1, 0.1)])
 def test_goals_too_near_or_too_far(place):
-    with pytest.raises(ParameterError, match="a distance that a robot can walk"):
+    with pytest.raises(ParameterError, match="a distance to walk"):
         Goal(*place, relative=True)

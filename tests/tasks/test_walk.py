@@ -20,14 +20,9 @@ def test_seeds_count_up_and_walk_as_trials_do():
     assert done.foot_creep is None
     (record,) = run([Trial(ROBOT, 3.0, 5, (0.02,) * 5)])
     np.testing.assert_array_equal(done.record.joint_angle.values[:, 1], record.joint_angle.values[:, 0])
-    callback = done.as_json()
-    assert (callback["robot"], callback["engine"], callback["duration_s"], callback["seeded"]) == (
-        ROBOT.name,
-        "planar",
-        3.0,
-        True,
-    )
-    assert [each["seed"] for each in callback["walks"]] == [4, 5]
+    told = done.as_json()
+    assert (told["robot"], told["engine"], told["duration_s"], told["seeded"]) == (ROBOT.name, "planar", 3.0, True)
+    assert [each["seed"] for each in told["walks"]] == [4, 5]
 
 
 def test_what_walks_came_to_needs_no_record(monkeypatch):

@@ -85,11 +85,9 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
     if options.overrides:
         from chilopod.errors import ParameterError
 
-        raise ParameterError(
-            "reproduce changes nothing about the robot: the paper's numbers are those of the paper's",
-            value=options.overrides[0],
-            allowed="no --set; stability, bifurcation, branch, walk and turn take any robot",
-        )
+        problem = "must not be given, because the paper's numbers are those of its own robot"
+        allowed = "no --set; stability, bifurcation, branch, walk and turn take any robot"
+        raise ParameterError(problem, field="--set", value=options.overrides[0], allowed=allowed)
     sections = chosen(options.only, options.quick or options.tiny, options.paper)  # refuses an unknown section
     from chilopod.errors import in_words
 

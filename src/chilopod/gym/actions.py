@@ -59,7 +59,7 @@ class Actions:
         """
         if springs not in SPRINGS:
             raise ParameterError(
-                "must be one of the sets of springs", field="springs", value=springs, allowed=" or ".join(SPRINGS)
+                "must be a set of springs", field="springs", value=springs, allowed=" or ".join(SPRINGS)
             )
         own = robot.springs
         if own.adjustable is None:
@@ -69,10 +69,7 @@ class Actions:
         joints = (0,) if springs == "first" else tuple(joint for joint, each in enumerate(can) if each)
         if not any(can) or not all(can[joint] for joint in joints):
             raise ParameterError(
-                "must be true: the action sets the first spring",
-                field="springs.adjustable[0]",
-                value=False,
-                allowed="true",
+                "must be true: the action sets the first spring", field="springs.adjustable[0]", value=False
             )
         most = max(own.stiffness)
         softest = tuple(own.softest[joint] if own.softest else _SOFTEST * most for joint in joints)

@@ -144,9 +144,7 @@ class RobotEnv(gymnasium.Env[Row, Row]):
     def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
         """Walk for a gait cycle."""
         if self._over:
-            raise ParameterError(
-                "must not be called after the end of an episode", field="step", allowed="reset() first"
-            )
+            raise ParameterError("must not follow the end of an episode", field="step", allowed="reset() first")
         step = self.episodes.step(self.episodes.actions.checked(action)[None])
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         self._over = terminated or truncated

@@ -189,9 +189,7 @@ class Robot(Description):
         if not place.quantity.each:
             return float(value)
         if place.index is None and any(item != value[0] for item in value):
-            raise ParameterError(
-                "must be a single value, but its values differ", field=path, allowed=f"a single one, such as {path}[0]"
-            )
+            raise ParameterError(f"must be one spring, such as {path}[0], because they differ", field=path)
         return float(value[place.index or 0])
 
     def unit_of(self, path: str) -> str:

@@ -61,10 +61,7 @@ class Goal:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
             allowed = f"{near}at most {FARTHEST:g} m"
             raise ParameterError(
-                "must be a distance that a robot can walk",
-                field="target distance",
-                value=f"{distance:g} m",
-                allowed=allowed,
+                "must be a distance to walk", field="target distance", value=f"{distance:g} m", allowed=allowed
             )
 
     @classmethod

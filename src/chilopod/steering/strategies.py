@@ -190,7 +190,5 @@ def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Str
     """
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
-        raise ParameterError(
-            "must be one of the strategies", field="strategy", value=name, allowed=allowed, nearest=nearest
-        )
+        raise ParameterError("must be a strategy", field="strategy", value=name, allowed=allowed, nearest=nearest)
     return among[name]

@@ -153,9 +153,7 @@ def turn(
     """
     check_strategy(strategy)
     if spring not in ("auto", "law") and isinstance(spring, str):
-        raise ParameterError(
-            "must be a spring setting", field="spring", value=spring, allowed="auto, law, or a stiffness"
-        )
+        raise ParameterError("must be a spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
     if strategy.springs is None and spring != "auto":
         problem = f"must be auto: strategy {strategy.name} does not set the springs"
         raise ParameterError(problem, field="spring", value=spring, allowed="auto")
