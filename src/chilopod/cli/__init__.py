@@ -110,7 +110,7 @@ def _help_of(error: Exception) -> str:
 
 
 def _not_imported(error: Exception) -> str | None:
-    """The package of somebody else's that could not be imported, if that is what went wrong."""
+    """Name of another project's package that could not be imported, if the import failed."""
     frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__))
     loading = (frame.f_globals.get("__name__", "") for frame in frames if frame.f_code.co_name == "<module>")
     packages = (name.partition(".")[0] for name in loading)

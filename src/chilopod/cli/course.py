@@ -71,10 +71,10 @@ def course(
     ] = None,
     out: OutOption = None,
 ) -> None:
-    """Let a robot walk from target to target, and report what became of each.
+    """Let a robot walk from target to target, and report the outcome of each.
 
     A target is reached where the robot comes within 0.15 m of it; then, or when its time is over, the next has its
-    turn. The robot knows of it what a laser scanner on module 1 sees: within 4.1 m and 120 deg to either side.
+    turn. The robot sees the target as a laser scanner on module 1 does: within 4.1 m and 120 deg to either side.
 
     With --out, draws the way and writes the record, a replay that opens in any browser, and a film.
 

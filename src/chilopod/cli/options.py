@@ -152,7 +152,7 @@ def _as_typed(error: ChilopodError, ctx: Any) -> None:
 
 @contextmanager
 def reading(option: str) -> Iterator[None]:
-    """Errors in this block are errors of what was typed for an option (its name in Python)."""
+    """Give errors in this block the name of an option (its name in Python) as their field."""
     try:
         yield
     except ChilopodError as error:
@@ -198,7 +198,7 @@ def walking_on(cluster: str | None) -> Iterator[None]:
 
 
 def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
-    """Load a robot and apply what ``--set`` asked for."""
+    """Load a robot and apply the overrides of ``--set``."""
     from chilopod.robot import load_robot
 
     described = load_robot(robot)
@@ -257,7 +257,7 @@ class WalkOptions(RobotOptions):
         return {"engine": self.engine, "controller": own_controller(self.controller)}
 
     def runs(self, progress: Progress) -> tasks.RunOptions:
-        """Options of every task, which tells how far it is."""
+        """Options of every task, with the function that shows its progress."""
         return {"seed": self.seed, "repeats": self.repeats, "folder": self.trials, "progress": progress}
 
     def spring(self, path: str | None, k1: str) -> float:
@@ -309,7 +309,7 @@ class WalkOptions(RobotOptions):
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Let typer see the fields of the options that come as a command's first argument, beside those of its own."""
+    """Decorator that shows typer the fields of a command's first argument, a dataclass, beside its other arguments."""
     first, *own = (
         each.replace(kind=Parameter.KEYWORD_ONLY) for each in signature(command, eval_str=True).parameters.values()
     )

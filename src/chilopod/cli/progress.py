@@ -21,8 +21,8 @@ _States = dict[str, tuple[float, str]]
 
 @contextmanager
 def progress_bar(doing: str) -> Iterator[Callable[[str, float, str], None]]:
-    """Show progress on stderr while the block runs, if that takes a moment: what is done until the work calls the
-    function it gets with a title, the part done (0 to 1), and a few words about the current step."""
+    """Show progress on stderr while the block runs, if that takes a moment. The block gets a function to call with a
+    title, the fraction done (0 to 1), and a few words about the current step."""
     states: _States = {}
     over = threading.Event()
 

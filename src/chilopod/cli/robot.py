@@ -100,7 +100,7 @@ def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fal
 
 @app.command()
 def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
-    """Say whether a robot is valid, and what is unusual about it."""
+    """Check that a robot is valid, and list its unusual numbers."""
     from chilopod.robot import remarks
 
     described = read_robot(robot, overrides)

@@ -1,4 +1,4 @@
-"""``chilopod trials``: what is in a folder of trials, whether it is whole, and what may go."""
+"""``chilopod trials``: list, check and clean a folder of trials."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from chilopod.trials.folder import Group
 
 BROKEN = 2
-"""Exit code where a file is not what it should be."""
+"""Exit code where a file is damaged."""
 
 app = new_app("List, check and clean a folder in which trials are kept.")
 
@@ -113,7 +113,7 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
 
     All of every file is read. Each damaged file is a line; the exit code is 0, or 2 if there is one. A command that
     walks sets such a file aside and walks the trial again. Trials of another version of chilopod or MuJoCo are counted:
-    they are whole, but walk again too.
+    they are whole, but are walked again too.
     """
     from chilopod.trials.folder import checked, contents
 

@@ -44,7 +44,7 @@ def turn(
     ] = None,
     out: OutOption = None,
 ) -> None:
-    """Pick the spring that leads to a target, walk there, and say how well it went.
+    """Pick the spring that leads to a target, walk there, and report the outcome.
 
     The robot arrives where it comes within 0.15 m of the target. The criteria are the paper's: what is left of the
     distance (epsilon 1) and the angle between heading and target (epsilon 2) when the first walk arrives, and until

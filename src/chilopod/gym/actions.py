@@ -58,9 +58,7 @@ class Actions:
         the axis to that spring. Raises ParameterError if a spring has no actuator, or an empty range.
         """
         if springs not in SPRINGS:
-            raise ParameterError(
-                "must be a set of springs", field="springs", value=springs, allowed=" or ".join(SPRINGS)
-            )
+            raise ParameterError(f"must be {' or '.join(SPRINGS)}", field="springs", value=springs)
         own = robot.springs
         if own.adjustable is None:
             every = springs == "all"

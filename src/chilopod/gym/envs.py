@@ -114,7 +114,7 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
 
 
 class RobotEnv(gymnasium.Env[Row, Row]):
-    """One robot of :class:`RobotVectorEnv`, whose parameters these are."""
+    """One robot; the parameters are those of :class:`RobotVectorEnv`."""
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS}  # noqa: RUF012
 

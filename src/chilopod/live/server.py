@@ -140,7 +140,7 @@ class Live:
         server.on_client_connect(self._send_undelivered)
 
     def wish(self, wish: wishes.Wish) -> None:
-        """Leave a wish, from any thread, as if somebody had done it at the page."""
+        """Leave a wish, from any thread, as the page does."""
         self._session.box.put(wish)
         self._wished = True
 
@@ -255,7 +255,7 @@ class Live:
             client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
 
     def _ask(self, before: Robot | None = None) -> None:
-        """Ask what is not known of the robot as it is now."""
+        """Ask for the unknown theory of the present robot."""
         robot = self._session.settings.robot
         if engine_named(self._session.engine).traits.exact:
             self._beside.ask_growth(robot)
@@ -311,7 +311,7 @@ class Live:
             client.send_file_download(f"{name}.html", page.encode(), save_immediately=True)
 
     async def _send_undelivered(self, client: viser.ClientHandle) -> None:
-        """Give a browser what was recorded while there was none."""
+        """Give a browser the recordings that ended while none was connected."""
         while self.undelivered and not self._over.is_set():
             self._send(*self.undelivered.pop(0), client)
 
@@ -337,7 +337,7 @@ class Live:
 
 
 class _Rate:
-    """Seconds walked a second, of late."""
+    """Seconds walked in a second of the clock, lately."""
 
     def __init__(self) -> None:
         self.value = 0.0

@@ -1,4 +1,4 @@
-"""A walk that goes on while somebody changes what it is: everything of the live page but the page."""
+"""Walk of the live page, which goes on while the user changes the robot."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ class Session:
         )
 
     def messages(self) -> list[str]:
-        """Sentences on what happened since the last call."""
+        """Messages about events since the last call."""
         sentences = list(self._messages)
         self._messages.clear()
         return sentences
@@ -163,7 +163,7 @@ class Session:
                 until = self._walk.time + left
 
     def stop_recording(self) -> None:
-        """End what is being written down, if anything is."""
+        """End the recording, if there is one."""
         self.settings = replace(self.settings, recording=False)
         self._keep_record()
 
@@ -278,7 +278,7 @@ class Session:
         self._walk.command(Command(stiffness=[self.settings.robot.springs.stiffness]))
 
     def _let_go(self) -> None:
-        """Walk nowhere in particular, with the springs as they are set and straight legs."""
+        """Walk without a target, with the springs as set and straight legs."""
         self._target, self._controller, self._steering = None, None, ""
         self._walk.aim((np.nan, np.nan))
         self._walk.command(Command(leg_yaw=[(0.0, 0.0)], within=self._period))

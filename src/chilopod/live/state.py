@@ -1,4 +1,4 @@
-"""States of a live walk that can be seen, its settings, and checks of numbers that somebody wishes."""
+"""Visible state of a live walk, its settings, and checks of numbers in wishes."""
 
 from __future__ import annotations
 

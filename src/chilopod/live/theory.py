@@ -1,4 +1,4 @@
-"""Where the walk gives way and how tightly it then turns, computed beside the walk by a process of its own.
+"""Pitchfork and curved walks of the robot on the page, computed in a process of their own.
 
 The page asks anew whenever springs, floor or steps change; only the last question is answered.
 """
@@ -32,7 +32,7 @@ _GROWTH = 30.0  # s that a short question may take
 
 @dataclass(frozen=True)
 class Theory:
-    """Theory of a robot with any first spring; None where something is not known, with a remark that says why."""
+    """Theory of a robot with any first spring; None for unknown parts, with a remark that gives the reason."""
 
     robot: Robot | None = None
     pitchfork: float | None = None  # first spring below which the straight walk gives way, N*m/rad
@@ -63,7 +63,7 @@ class Growth:
 
 
 def growth_of(robot: Robot) -> Growth:
-    """Growth about the straight walk in the planar theory."""
+    """Rate of growth of a small bend about the straight walk, by the planar theory."""
     from chilopod.analysis import straight_walk
 
     exponents = straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"]
@@ -71,7 +71,7 @@ def growth_of(robot: Robot) -> Growth:
 
 
 def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> None:
-    """Compute the theory of a robot, and call a function with what is known so far; what that raises ends the work.
+    """Compute the theory of a robot, and call a function with each intermediate result; its exceptions end the work.
 
     In an engine whose walks are not those of the planar theory, some are walked. The first spring does not matter.
     """
@@ -170,7 +170,7 @@ class Beside:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Ctrl-C is the page's: a process that is started here does not hear it, not even while it loads."""
+    """Block in which new processes ignore Ctrl-C, which only the page obeys."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -182,7 +182,7 @@ def _deaf() -> Iterator[None]:
 
 
 class _Stale(Exception):
-    """Another question has come."""
+    """Exception that ends the work on a question when another has come."""
 
 
 def _answer(pipe: Connection, engine: str) -> None:

@@ -35,7 +35,7 @@ REGISTRY: dict[str, str] = {
     "robot-courses": "courses.sections.ROBOT_COURSES",
     "courses-movie": "courses.sections.COURSES_FILM",
 }
-"""Module and constant of each section, by its name: the paper's own experiments, then what goes beyond them."""
+"""Module and constant of each section, by its name: the paper's own experiments, then the studies beyond them."""
 
 
 def load_sections() -> tuple[Section[Any], ...]:
@@ -46,9 +46,10 @@ def load_sections() -> tuple[Section[Any], ...]:
 
 def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool = False) -> list[Section[Any]]:
     """The sections asked for, by default all but those that are computed on request, in the order they are computed; a
-    quick report leaves out some that are not named, and one of the paper what goes beyond its own experiments.
+    quick report leaves out some that are not named, and a report of the paper leaves out studies beyond its
+    experiments.
 
-    A ParameterError if one of them does not exist, or goes beyond though only the paper's are asked for.
+    Raises ParameterError if one of them does not exist, or goes beyond the paper in a report of the paper.
     """
     sections = {section.name: section for section in load_sections()}
     if only is None:

@@ -1,4 +1,4 @@
-"""Sections of the report, what they find, and how they are computed."""
+"""Sections of the report, their results, and their computation."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Section(Generic[T]):
     full: bool = False  # left out of a quick report unless it is asked for by name
 
     def figures(self, found: Found) -> list[Panel]:
-        """Figures of what was found."""
+        """Figures of the results."""
         drawn = self.panels(found[self], *found.of(self.beside))
         return [drawn] if isinstance(drawn, Panel) else list(drawn)
 
@@ -133,7 +133,7 @@ class Found:
         return {chapter: rows for chapter, rows in found.items() if rows}
 
     def robot_rows(self) -> list[RobotRow]:
-        """The table robot | twin | planar model."""
+        """Rows of the table robot | twin | planar model."""
         return robot_rows((row for rows in self.rows.values() for row in rows), ORDER)
 
 

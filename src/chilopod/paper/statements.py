@@ -1,4 +1,4 @@
-"""Statements of the paper on its robot, and what is asked of the twin besides, in the order of the table."""
+"""Statements of the paper on its robot, and further conditions on the twin, in the order of the table."""
 
 from __future__ import annotations
 

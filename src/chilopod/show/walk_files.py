@@ -35,7 +35,7 @@ def write_walks(what: str, done: Any, folder: str | Path, *, replace: bool = Tru
 
 
 def _contents(figure: Any, done: Any, files: list[Path]) -> Iterator[tuple[Path, Content]]:
-    """Contents in the order of writing: what cannot be made again comes first."""
+    """Contents in the order of writing: files that cannot be made again come first."""
     pixels, vector, record, page, *film = files
     yield record, netcdf(done.record)
     with style.house_style():

@@ -100,9 +100,7 @@ class Strategy:
         if controller is not None:
             return Prepared(walker, controller, remarks)
         if self.needs_law and law is None:
-            raise ParameterError(
-                f"must be the radius law of the robot for strategy {self.name}", field="law", value=None
-            )
+            raise ParameterError(f"must be the radius law of the robot for strategy {self.name}", field="law")
         own, more = self.controller(walker, law)
         return Prepared(walker, own, (*remarks, *more))
 

@@ -63,7 +63,7 @@ class Pace:
             done += size
 
     def took(self, batch: Sequence[Trial], threads: int, seconds: float) -> None:
-        """Learn how long a batch took, s."""
+        """Record the time that a batch took, s."""
         walks = sum(trial.duration for trial in batch) / min(threads, len(batch))
         self._speeds[batch[0].engine] = walks / max(seconds, 1e-9)
 

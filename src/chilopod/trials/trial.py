@@ -167,9 +167,7 @@ class Trial:
         if repeats < 1:
             raise ParameterError("must be positive", field="repeats", value=repeats)
         if repeats > 1 and seed is None:
-            raise ParameterError(
-                "must be 1 without a seed: the trials would be identical", field="repeats", value=repeats
-            )
+            raise ParameterError("must be 1 without a seed: trials would be equal", field="repeats", value=repeats)
         spread = NONE if seed is None else self.disturbance
         return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 

@@ -58,7 +58,7 @@ WHOLE: Mapping[Size, Plan] = {
 
 @dataclass(frozen=True)
 class Case:
-    """Something that drives along courses, under a disturbance besides what a course's seed draws."""
+    """Driver along courses, with a disturbance besides that of the course's seed."""
 
     name: str
     driver: Driver
@@ -155,7 +155,7 @@ def robot_of(context: Context, variable: Driver) -> Robot:
 
 
 def prepared(context: Context, engine: str = "planar") -> Driver:
-    """The robot with the variable spring; a tiny report has the law of the planar robot for both, which takes no
+    """Driver of the robot with the variable spring. A tiny report uses the law of the planar robot, which takes no
     walks."""
     if engine == "planar":
         return driver(context.robot, VARIABLE)

@@ -33,7 +33,7 @@ class Fact:
 
 
 def facts(found: Found) -> list[Fact]:
-    """The numbers that matter, of what was computed."""
+    """The most important numbers of the results."""
     facts, mode = [], found[MODE]
     if mode is not None:
         about = "front spring at which the straight walk gives way, in the planar model"

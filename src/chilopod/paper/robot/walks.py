@@ -163,7 +163,7 @@ def undulations(
     folder: measures.Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Walks with all springs alike: how far the body swings once it has settled.
+    """Walks with all springs alike: amplitude of the settled undulation.
 
     Returns
     -------

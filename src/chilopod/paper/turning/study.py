@@ -1,4 +1,4 @@
-"""Turning tasks: all of them together, and why the best spring is not the law's."""
+"""Turning tasks together, and the causes of the difference between the best spring and the law's."""
 
 from __future__ import annotations
 
@@ -138,14 +138,14 @@ def farther_targets(
     springs: Sequence[float] = FARTHER_SPRINGS,
     folder: Folder = None,
 ) -> xr.Dataset:
-    """Targets in one direction, farther and farther: what the time that a bend needs to grow makes of the task.
+    """Results for targets in one direction at growing distances, with the effect of the time that a bend needs to grow.
 
     One undisturbed trial each, with leg yaw, as much longer as the way is.
 
     Returns
     -------
     Dataset over (away, spring): ``nearest`` (m), ``effort`` until the earliest arrival of that distance, and
-    ``effort_part`` of what legs at their limit all the time would make of it (1); over away: ``earliest`` (s),
+    ``effort_part``, its ratio to the effort of legs at their limit all the time (1); over away: ``earliest`` (s),
     ``k_hat`` by the law (N*mm/deg).
     """
     limit, both, found = LegYawController().limit, ("spring",), []

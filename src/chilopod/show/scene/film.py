@@ -89,7 +89,7 @@ def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> 
 
 
 class Stage:
-    """The panels, and what moves in them drawn anew over what does not."""
+    """Frames of the panels: moving parts are drawn anew over the fixed ones."""
 
     def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float) -> None:
         self.shown, self.size = shown, size
@@ -188,7 +188,10 @@ class Stage:
 
     def _panels(self, bottom: float, top: float) -> None:
         """Lay the panels out, all of one size, in the middle of the room there is."""
-        said, width = zip(self.shown.titles, map(says, self.shown.outcomes), strict=True), self.size[0] - 2.0 * GAP
+        said, width = (
+            zip(self.shown.titles, map(caption_of, self.shown.outcomes), strict=True),
+            self.size[0] - 2.0 * GAP,
+        )
         captions = [[self._text(0.0, 0.0, each, weight="bold", va="top") for each in both] for both in said]
         longest = max(sum(map(self._extent, both)) for both in captions) + self.font
         across, tall, columns, lines = self._layout(width, top - bottom, longest)
@@ -317,8 +320,8 @@ class FilmPanel:
         axes.text(x + bar + 6.0 / zoom, y, f"{bar:g} m", va="center_baseline", fontsize=small, path_effects=halo)
 
 
-def says(outcome: Outcome) -> str:
-    """An outcome in words, behind its mark."""
+def caption_of(outcome: Outcome) -> str:
+    """Caption of an outcome: its mark and its name."""
     return _MARKS[outcome.kind][0] + outcome.text
 
 

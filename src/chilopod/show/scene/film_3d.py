@@ -88,7 +88,8 @@ def stills(
     outside = ~((wanted >= recorded[0] - 1e-9) & (wanted <= recorded[-1] + 1e-9))
     if outside.any():
         allowed = f"{recorded[0]:g} to {recorded[-1]:g} s"
-        raise ParameterError("is not in the record", field="times", value=float(wanted[outside][0]), allowed=allowed)
+        value = float(wanted[outside][0])
+        raise ParameterError("must be a time of the record", field="times", value=value, allowed=allowed)
     if any(not _NARROWEST <= side <= LARGEST for side in size):
         allowed = f"{_NARROWEST} to {LARGEST} pixels"
         raise ParameterError("must be the size of a picture", field="size", value=size, allowed=allowed)

@@ -1,5 +1,5 @@
-"""Why the robot bends earlier than the planar model says, how far to trust what the twin predicts, and what other
-structures of the robot predict."""
+"""Figures on the robot's earlier onset, the reliability of the twin's predictions, and the predictions of other
+structures."""
 
 from __future__ import annotations
 
