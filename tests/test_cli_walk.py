@@ -107,17 +107,11 @@ def test_walk_refuses(capsys, arguments, words):
     ("arguments", "start"),
     [
         (["walk", ROBOT, "--duration", "abc"], "--duration = 'abc': "),
-        (
-            ["walk", ROBOT, "--duration", "1e6 s"],
-            "--duration = '1e6 s': is out of range; allowed: more than 0, at most",
-        ),
+        (["walk", ROBOT, "--duration", "1e6 s"], "--duration = '1e6 s': is out of range; allowed: more than 0, at m"),
         (["walk", ROBOT, "--initial-joints", "2 kg"], "--initial-joints = '2 kg': "),
         (["walk", ROBOT, "--initial-joints", "120 deg"], "--initial-joints = '120 deg': must be smaller"),
         (["walk", ROBOT, "--set", "1"], "--set = '1': must be an override"),
-        (
-            ["walk", ROBOT, "--set", "springs.stiffness[ 0]=1"],
-            "springs.stiffness[ 0]: must be the path of a parameter; did you mean ",
-        ),
+        (["walk", ROBOT, "--set", "springs.stiffness[ 0]=1"], "springs.stiffness[ 0]: must be the path of a parameter"),
         (["turn", ROBOT, "--target", "170 deg, 1 m"], "--target bearing = '170 deg': "),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--k1", "-3"], "--k1 = '-3': must be positive"),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--duration", "1e6 s"], "--duration = '1e6 s': is out of range"),

@@ -125,20 +125,8 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
 @pytest.mark.parametrize(
     ("changed", "strategy", "spring", "error", "words"),
     [
-        (
-            ["springs.adjustable=false"],
-            "variable",
-            None,
-            ParameterError,
-            "must be true: strategy variable sets the first spring",
-        ),
-        (
-            ["legs.half_width=0.3 m"],
-            "variable",
-            None,
-            AnalysisError,
-            "no pitchfork.*narrower.* or the strategy leg-yaw",
-        ),
+        (["springs.adjustable=false"], "variable", None, ParameterError, "must be true: strategy variable sets the"),
+        (["legs.half_width=0.3 m"], "variable", None, AnalysisError, "no pitchfork.*narrower.* the strategy leg-yaw"),
         (["legs.half_width=0.3 m"], "actuated", None, AnalysisError, "no pitchfork"),
         ([], "pitchfork", None, ParameterError, "strategy pitchfork needs one stiffness"),
         ([], "variable", 0.3, ParameterError, "sets its own springs"),

@@ -98,8 +98,8 @@ def shares(data: xr.Dataset) -> xr.Dataset:
 
 
 def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
-    """Mask of the trials with an angle and a radius that count: curved ones that have settled (all without ``settled``), at
-    springs at which most curve; shape (springs, repeats)."""
+    """Mask of the trials that curve, and have settled if ``settled``, at springs at which most curve; shape (springs,
+    repeats)."""
     most = is_curved(data).mean(axis=1) > 0.5
     return (in_settled_curve(data) if settled else is_curved(data)) & most[:, None]
 

@@ -150,7 +150,7 @@ def compared(context: Context, variable: Driver, plan: Plan, progress: Progress 
 
 
 def robot_of(context: Context, variable: Driver) -> Robot:
-    """The robot that a driver of :func:`prepared` drives, as it is without a variable spring."""
+    """Robot of a driver of :func:`prepared`, without its variable spring."""
     return context.robot if variable.engine == "planar" else context.whole
 
 
