@@ -56,7 +56,7 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
     context, folder = Context(size=Size.TINY, folder=kept), tmp_path_factory.mktemp("tiny")
     sections = load_sections()
     with watched() as painted, Report(sections, context, folder) as report:
-        found = reproduce(sections, context, told=lambda found, section: report.add(found, [section]))
+        found = reproduce(sections, context, callback=lambda found, section: report.add(found, [section]))
     return SimpleNamespace(folder=folder, found=found, failures=report.failures, painted=painted)
 
 

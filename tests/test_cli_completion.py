@@ -34,7 +34,7 @@ def test_a_shell_completes(typed, completed):
 def test_an_instruction_that_is_none_is_one_line():
     found = python("doctor", _CHILOPOD_COMPLETE="nosuch")
     assert (found.returncode, found.stdout) == (2, "")
-    assert found.stderr.startswith("error: _CHILOPOD_COMPLETE = 'nosuch': is none of the instructions")
+    assert found.stderr.startswith("error: _CHILOPOD_COMPLETE = 'nosuch': must be the instruction")
     assert found.stderr.count("\n") == 1
 
 

@@ -106,13 +106,13 @@ def test_new_with_a_twin_walks_in_three_dimensions(folder):
     assert mine.provenance_of("legs.half_width") == load_robot(PRESET).provenance_of("legs.half_width")
     assert run("robot", "new", "again.toml", "--twin", "--preset", "whole.toml")[0] == 0
     assert load_robot("again.toml").twin == whole.twin
-    assert run("robot", "export", "mine.toml", "--out", "mine.xml")[0] == 0
+    assert run("robot", "export", "mine.toml", "--out", "new/folder/mine.xml")[0] == 0
+    assert run("robot", "new", "another/new/folder/mine.toml")[0] == 0
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["no/such/folder/x.toml"],
         ["."],
         ["x.toml", "--modules", "1"],
         ["x.toml", "--modules", "many"],

@@ -3,13 +3,16 @@
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from chilopod import load_robot
 from chilopod.cli import main
+from chilopod.cli.trials import _cells
 from chilopod.steering import Course, Goal, LegYawController, Target
 from chilopod.trials import NONE, Store, Trial, claims, run, trial
+from chilopod.trials.folder import Kept, groups
 
 ROBOT = load_robot("aoi2022-planar")
 SOFT = ROBOT.set_from_text(["springs.stiffness[0]=12 N*mm/deg"])
@@ -59,6 +62,12 @@ def test_a_list_groups_what_differs_in_robots_and_seeds(folder, printed):
     groups = [(group["robots"], group["seeds"], group["trials"]) for group in found["groups"]]
     assert groups == [(1, "", 1), (2, "1-2, 4", 6)]
     assert found["foreign"] == ["notes.txt"]
+
+
+def test_trials_of_a_changed_controller_are_rows_of_their_own():
+    shared = {"engine": "planar", "duration": 1.0, "seed": 1, "controller": {"class": "mine:Mine"}}
+    rows = groups([Kept(Path(), 1, "robot", {**shared, "code": each}, True) for each in ("1a2b3c4d", "5e6f7a8b")])
+    assert [_cells(row)[4] for row in rows] == ["Mine (code 1a2b3c)", "Mine (code 5e6f7a)"]
 
 
 def test_a_list_says_how_many_targets_courses_have(tmp_path, printed):

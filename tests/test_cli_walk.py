@@ -107,22 +107,20 @@ def test_walk_refuses(capsys, arguments, words):
     ("arguments", "start"),
     [
         (["walk", ROBOT, "--duration", "abc"], "--duration = 'abc': "),
-        (
-            ["walk", ROBOT, "--duration", "1e6 s"],
-            "--duration = '1e6 s': is out of range; allowed: more than 0, at most",
-        ),
+        (["walk", ROBOT, "--duration", "1e6 s"], "--duration = '1e6 s': is out of range; allowed: more than 0, at m"),
         (["walk", ROBOT, "--initial-joints", "2 kg"], "--initial-joints = '2 kg': "),
         (["walk", ROBOT, "--initial-joints", "120 deg"], "--initial-joints = '120 deg': must be smaller"),
         (["walk", ROBOT, "--set", "1"], "--set = '1': must be an override"),
-        (
-            ["walk", ROBOT, "--set", "springs.stiffness[ 0]=1"],
-            "springs.stiffness[ 0]: must be the path of a parameter; did you mean ",
-        ),
+        (["walk", ROBOT, "--set", "springs.stiffness[ 0]=1"], "springs.stiffness[ 0]: must be the path of a parameter"),
         (["turn", ROBOT, "--target", "170 deg, 1 m"], "--target bearing = '170 deg': "),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--k1", "-3"], "--k1 = '-3': must be positive"),
         (["turn", ROBOT, "--target", "0 deg, 1 m", "--duration", "1e6 s"], "--duration = '1e6 s': is out of range"),
         (["branch", ROBOT, "--between", "1 kg", "2 kg"], "--between springs.stiffness[0] = '1 kg': is a mass"),
-        (["branch", ROBOT, "--parameter", "k1"], "--parameter = 'k1': must be the path of a parameter"),
+        (
+            ["branch", ROBOT, "--parameter", "k1"],
+            "--parameter = 'k1': must be the path of a parameter; allowed: body.l",
+        ),
+        (["branch", ROBOT, "--parameter", "springs.lag"], "--parameter = 'springs.lag': must be a number that the"),
         (["robot", "new", "x.toml", "--modules", "1"], "--modules = '1': "),
         (["robot", "export", "aoi2022", "--out", "x.pdf"], "--out = 'x.pdf': "),
         (["identify", "twin", ROBOT], "twin: must be given in the robot file"),
@@ -389,4 +387,4 @@ def test_choices_are_listed_and_completed(capsys):
     assert "pitchfork|hopf|leg-yaw|open-loop" in out
     out = " ".join(out.split())
     assert f"within {ARRIVAL_RADIUS:g} m of the target" in out
-    assert f"by default {planar.traits.haste:g} (planar) or {twin.traits.haste:g} (twin) times" in out
+    assert f"by default {planar.traits.duration_ratio:g} (planar) or {twin.traits.duration_ratio:g} (twin) times" in out

@@ -150,7 +150,7 @@ def test_override_and_get(robot):
     assert softer.provenance_of("springs.stiffness[1]") == robot.provenance_of("springs.stiffness[1]")
     assert robot.unit_of("springs.stiffness") == "N*mm/deg"
     assert robot.si_unit_of("springs.stiffness") == "N*m/rad"
-    with pytest.raises(ParameterError, match="values differ"):
+    with pytest.raises(ParameterError, match=r"must be one spring, such as springs\.stiffness\[0\], because"):
         softer.get("springs.stiffness")
 
 
@@ -325,6 +325,11 @@ def test_bad_files(tmp_path, content, complaint):
         load_robot(file)
     assert str(caught.value).startswith(f"{file}: ")
     assert complaint in str(caught.value)
+
+
+def test_a_byte_order_mark_is_skipped(tmp_path):
+    (tmp_path / "robot.toml").write_text(load_robot(PRESET).to_toml(), encoding="utf-8-sig")
+    assert load_robot(tmp_path / "robot.toml") == load_robot(PRESET)
 
 
 @given(st.binary(max_size=200))

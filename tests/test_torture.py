@@ -95,7 +95,7 @@ def test_it_finds_edited_controllers_that_are_the_old_ones(tmp_path, monkeypatch
 
 
 def test_it_finds_broken_engines_that_are_believed(tmp_path, monkeypatch):
-    monkeypatch.setattr("chilopod.trials.batch.check_asked", lambda data, *asked: data)
+    monkeypatch.setattr("chilopod.trials.batch.check_record", lambda data, *asked: data)
     assert Kind.WRONG in {kind for kind, _, _ in attacked("broken-engines", tmp_path, 6)}
 
 

@@ -62,6 +62,7 @@ def test_rounds_once():
         ("3 Nmm/deg", STIFFNESS, "did you mean 'N*mm'"),
         ("3 meter", "m", "unknown unit 'meter'"),
         ("3 degg", "rad", "did you mean 'deg'"),
+        ("3 turn", "rad", "unknown unit 'turn'; allowed: an angle"),
         ("3 m*", "m", "incomplete"),
         ("3 (m", "m", "incomplete"),
         ("3 m)", "m", "misplaced"),

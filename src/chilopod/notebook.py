@@ -65,13 +65,13 @@ class Summary(Shown):
         """Heading of the result."""
         raise NotImplementedError
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         """Lines of the sentences above, the table, and the sentences below."""
         raise NotImplementedError
 
     def lines(self) -> list[str]:
         """The whole summary as lines of text."""
-        above, cells, below = self._told()
+        above, cells, below = self._content()
         return [self.title, *(f"  {line}" for line in (*above, *aligned(cells), *below))]
 
     def plot(self, axes: Axes | None = None) -> Axes:
@@ -86,7 +86,7 @@ class Summary(Shown):
         return picture(self.plot, self.title)
 
     def _repr_html_(self) -> str:
-        above, cells, below = self._told()
+        above, cells, below = self._content()
         shown = table(cells[0], cells[1:]) if cells else ""
         return block(self.title, self._picture(), *map(words, above), shown, *map(words, below))
 

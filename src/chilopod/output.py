@@ -10,7 +10,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -68,10 +68,10 @@ def write_atomic(
     *,
     replace: bool = True,
     durable: bool = False,
-    folders: bool = True,
     temporary: str = ".chilopod-",
 ) -> Path:
-    """Write a file so that it never exists half-written, and return its path; where it fails nothing is left behind.
+    """Write a file so that it never exists half-written, and return its path; missing folders are made. Where it fails
+    nothing is left behind.
 
     Parameters
     ----------
@@ -81,15 +81,13 @@ def write_atomic(
         True if an existing regular file may be replaced.
     durable
         True if the content must survive a power failure; :func:`sync_folder` does the same for the name.
-    folders
-        True if a missing folder is created.
     temporary
         Prefix of the name while the file is incomplete; such a file remains if the process is killed.
     """
     path = Path(path)
     try:
         _check_replaceable(path, replace)
-        with made_folder(path.parent) if folders else nullcontext():
+        with made_folder(path.parent):
             # In the same folder, because a rename is atomic only within one file system.
             unfinished = path.parent / f"{temporary}{os.urandom(8).hex()}"
             try:

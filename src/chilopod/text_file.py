@@ -35,6 +35,6 @@ def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
     if not content.strip():
         raise refused("the file is empty", source=source)
     try:
-        return content.decode()
+        return content.decode("utf-8-sig")  # some editors of Windows begin with a byte order mark
     except UnicodeDecodeError:
         raise refused("is not a text file (UTF-8)", source=source) from None

@@ -1,11 +1,14 @@
 """Stability of the straight walk and its bifurcations, in the robot's own terms."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
 from chilopod import stability
 from chilopod.analysis import bifurcations, first_loss, straight_walk
 from chilopod.analysis.parameters import ALL, K1, stiffness
+from chilopod.analysis.straight_walk import family
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
@@ -27,9 +30,19 @@ def test_coefficients_are_those_of_the_joint_angles():
     assert point.error_bound < 1e-8
 
 
-def test_modules_are_no_continuous_parameter():
-    with pytest.raises(ParameterError, match=r"body\.modules"):
+def test_only_continuous_numbers_that_the_model_reads_are_parameters():
+    with pytest.raises(ParameterError, match=r"body\.modules.*continuous"):
         bifurcations(ROBOT, "body.modules", (3.0, 8.0))
+    robot = load_robot("aoi2022").set_from_text(["body.yaw_inertia=0.02", "twin.timestep=0.0005"])
+    for path in set(robot.parameters()) - {"body.modules"}:
+        both = [PlanarModel(each) for each in (robot, robot.with_value(path, 0.5 * robot.get(path) or 0.1))]
+        data = [(m.scalars, m.stiffness, m.damping, m.moments(np.arange(3)), m.schedule.times) for m in both]
+        with (
+            nullcontext()
+            if not all(map(np.array_equal, *data))
+            else pytest.raises(ParameterError, match="that the planar model reads")
+        ):
+            family(robot, path)
 
 
 def test_stability_agrees_with_the_sign_of_the_leading_exponent():

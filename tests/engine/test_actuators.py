@@ -185,7 +185,7 @@ def test_leg_yaw_over_time_is_what_it_was_at_every_moment():
     jumps = np.abs(np.diff(yaw, axis=0)).max(axis=(1, 2)) > 0.05
     at_once = starts[lengths == 0.0]
     assert all(np.abs(at_once - time).min() < 2e-3 for time in times[1:][jumps])
-    acting = actuators.leg_yaw_told(np.array([0.0, starts[4], starts[4] + 1e-9]))
+    acting = actuators.leg_yaw_commanded(np.array([0.0, starts[4], starts[4] + 1e-9]))
     np.testing.assert_array_equal(acting, [np.zeros((2, 2)), goals[3], goals[4]])
 
 

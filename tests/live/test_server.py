@@ -135,10 +135,11 @@ def test_a_port_in_use_is_one_line(page, capsys):
     ("argv", "part"),
     [
         (["live", "--port", "70000"], "--port = 70000"),
-        (["live", "--duration", "-1 s"], "--duration = '-1 s': is no time to walk"),
+        (["live", "--duration", "-1 s"], "--duration = '-1 s': must be a time to walk"),
         (["live", "--out", "/dev/null"], "/dev/null"),
         (["live", "--seed", "18446744073709551615"], "--seed"),
-        (["live", "--host", "256.1.1.1"], "--host = '256.1.1.1': is no address"),
+        (["live", "--host", "256.1.1.1"], "--host = '256.1.1.1': must be an address"),
+        (["live", "--host", "8.8.8.8", "--port", "0"], "--host = '8.8.8.8': must be an address"),
         (["live", "--engine", "twin"], "[twin]"),
         (["live", "--engine", "twn"], "did you mean"),
         (["live", "--strategy", "leg-jaw"], "did you mean 'leg-yaw'"),
@@ -313,7 +314,7 @@ def test_recordings_end_where_there_is_no_room(monkeypatch):
         session.walk_on(1.3)
     assert len(session.records()) == 2
     assert not session.settings.recording
-    assert "room for no more than the 2" in " ".join(session.said())
+    assert "room for no more than the 2" in " ".join(session.messages())
 
 
 def test_what_no_browser_took_is_there_for_the_next(page):

@@ -110,14 +110,14 @@ def test_goes_to_a_target_with_each_strategy_and_is_as_it_was_set_afterwards(law
         assert walking.seen().target == ahead
         walking.walk_on(25.0)
         assert walking.seen().target is None, strategy
-        assert any("arrived" in sentence for sentence in walking.said())
+        assert any("arrived" in sentence for sentence in walking.messages())
         np.testing.assert_allclose(walking.seen().stiffness, PLANAR.springs.stiffness)
         np.testing.assert_allclose(walking.seen().leg_yaw, 0.0, atol=1e-12)
 
 
 def test_without_a_radius_law_legs_steer_alone_and_that_is_said():
     walking = session(wishes.Target((1.0, 0.3)))
-    assert "leg yaw alone" in walking.said()[0]
+    assert "leg yaw alone" in walking.messages()[0]
     walking.walk_on(5.0)
     np.testing.assert_array_equal(walking.seen().stiffness, PLANAR.springs.stiffness)
     assert (walking.seen().leg_yaw != 0.0).any()
@@ -184,10 +184,10 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
 @pytest.mark.parametrize(
     ("asked", "part"),
     [
-        (wishes.Spring(0, float("nan")), "stiffness[0] = nan: is no number"),
+        (wishes.Spring(0, float("nan")), "stiffness[0] = nan: must be a finite number"),
         (wishes.Spring(None, -1.0), "springs.stiffness"),
         (wishes.Spring(0, stiffness(99.0)), "springs.stiffness[0] = "),
-        (wishes.Spring(17, stiffness(9.0)), "there is no such slider"),
+        (wishes.Spring(17, stiffness(9.0)), "must be a slider"),
         (wishes.Set("frictoin", 1.0), "did you mean 'friction'"),
         (wishes.Friction(float("inf")), "friction = inf"),
         (wishes.Friction(7.0), "0.3 to 3"),
@@ -208,7 +208,7 @@ def test_what_cannot_be_is_said_in_a_line_and_changes_nothing(asked, part):
     walking = session()
     before = walking.settings
     wish(walking, asked)
-    (said,) = walking.said()
+    (said,) = walking.messages()
     assert part in said
     assert "\n" not in said
     assert walking.settings == before
@@ -225,7 +225,7 @@ def test_a_slider_is_one_row_of_a_table():
         assert row.from_page(row.at_page(high)) == pytest.approx(high, rel=1e-8)
         wish(begun, wishes.Set(name, 0.5 * (low + high)))
         assert row.read(begun.settings) == pytest.approx(0.5 * (low + high))
-    assert not begun.said()
+    assert not begun.messages()
     begun.walk_on(1.5)
     assert begun.seen().status is Status.WALKED
 

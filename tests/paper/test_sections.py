@@ -85,7 +85,7 @@ def test_one_that_fails_leaves_the_others_alone():
     broken = Section("broken", "chapter", "broken", fail)
     after = Section("after", "chapter", "after", lambda context, report, before: before, needs=(broken,))
     told = []
-    found = reproduce([broken, ONE, after], Context(size=Size.QUICK), told=lambda found, section: told.append(section))
+    found = reproduce([broken, ONE, after], Context(size=Size.QUICK), callback=lambda _, section: told.append(section))
     assert told == [broken, ONE, after]
     assert [str(error) for error in found.failures.values()] == ["no luck"]
     assert found[ONE] == 1

@@ -30,7 +30,7 @@ def test_every_measured_statement_on_both_sides(statement):
 def test_tolerances_are_those_that_the_rows_name():
     """What the table says is asked is what is asked."""
     for each in MEASURED:
-        part, percent, _ = each.said.asked.partition(" %")
+        part, percent, _ = each.said.condition.partition(" %")
         if percent and part.isdigit():
             wanted = each.said.middle if not each.said.words.startswith(("almost", "no ")) else 1.0
             assert each.said.high == pytest.approx(wanted * (1.0 + float(part) / 100.0)), each.quantity

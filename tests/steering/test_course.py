@@ -62,8 +62,8 @@ def test_a_file_is_what_is_typed(tmp_path):
 def test_the_same_place_twice_is_no_target_unless_the_robot_was_elsewhere():
     assert len(course_named("1 m, 0 m; 2 m, 0 m; 1 m, 0 m", 40.0).goals) == 3
     for text, which in (
-        ("1 m, 0 m; 1.1 m, 0.1 m", "target 2 = '1.1 m, 0.1 m': lies where target 1 does"),
-        ("10 cm, 0 m", "target 1 = '0.1 m, 0 m': lies where the robot starts"),
+        ("1 m, 0 m; 1.1 m, 0.1 m", "target 2 = '1.1 m, 0.1 m': must lie apart from target 1"),
+        ("10 cm, 0 m", "target 1 = '0.1 m, 0 m': must lie apart from the start"),
     ):
         with pytest.raises(ParameterError, match=which):
             course_named(text, 40.0)
@@ -145,5 +145,5 @@ def test_patience_view_and_range_within_reason(number):
 
 @pytest.mark.parametrize("place", [(math.nan, 0.0), (math.inf, 0.0), (1e4, 1e4), (0.1, 0.1)])
 def test_goals_too_near_or_too_far(place):
-    with pytest.raises(ParameterError, match="a distance that a robot can walk"):
+    with pytest.raises(ParameterError, match="a distance to walk"):
         Goal(*place, relative=True)

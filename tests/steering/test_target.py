@@ -31,7 +31,7 @@ def test_straight_ahead_is_a_circle_without_end():
 @pytest.mark.parametrize(
     ("bearing", "distance", "match"),
     [
-        (math.radians(91.0), 1.0, "in front"),
+        (45.0, 1.3, "in front.*-90 to 90 deg; a number without a unit is in rad"),
         (-math.pi, 1.0, "in front"),
         (math.nan, 1.0, "in front"),
         (0.5, 0.0, "a distance"),

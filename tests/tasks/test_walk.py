@@ -28,7 +28,7 @@ def test_seeds_count_up_and_walk_as_trials_do():
 def test_what_walks_came_to_needs_no_record(monkeypatch):
     trials = Trial(ROBOT, 2.0).repeated(seed=4, repeats=3)
     came = []
-    found = ends(trials, told=lambda index, record: came.append((index, record.attrs["trial"])))
+    found = ends(trials, callback=lambda index, record: came.append((index, record.attrs["trial"])))
     assert sorted(came) == [(index, trial.text) for index, trial in enumerate(trials)]
     whole = walk(ROBOT, 2.0, seed=4, repeats=3)
     assert found.as_json() == whole.as_json()

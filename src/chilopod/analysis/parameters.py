@@ -1,14 +1,42 @@
-"""The parameters that the paper varies, and the unit in which its springs are written."""
+"""Parameters that the paper varies, the unit of its springs, and the check of a parameter of the planar model."""
 
 from __future__ import annotations
 
 from chilopod import units
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot
 
 K1 = "springs.stiffness[0]"
 ALL = "springs.stiffness"
 PAPER_UNIT = "N*mm/deg"
 
+_READ = (
+    *("body.length", "body.mass", "body.yaw_inertia", "springs.stiffness", "springs.damping", "legs.forward_offset"),
+    *("legs.half_width", "gait.stride", "gait.stance", "gait.swing", "gait.module_phase", "gait.side_phase"),
+    "ground.friction",
+)
+_OF_INERTIA = ("hip_height", "upper_link", "lower_link", "link_mass", "foot_radius", "body_width")
+
 
 def stiffness(value: float) -> float:
     """A spring constant in N*mm/deg as SI."""
     return units.parse(f"{float(value)!r} {PAPER_UNIT}", "N*m/rad")
+
+
+def check_parameter(robot: Robot, parameter: str) -> None:
+    """Refuse, with a ParameterError, anything but the path of a continuous number that the planar model reads.
+
+    Numbers of the twin are read where they set the yaw inertia of a module.
+    """
+    inertia = _OF_INERTIA if robot.twin is not None and robot.body.yaw_inertia is None else ()
+    read = (*_READ, *(f"twin.{name}" for name in inertia))
+    try:
+        robot.unit_of(parameter)
+    except ParameterError as error:
+        error.allowed = error.allowed and ", ".join(read)
+        raise
+    if parameter == "body.modules":
+        raise ParameterError("must be a continuous parameter, not a whole number", field="parameter", value=parameter)
+    if parameter.partition("[")[0] not in read:
+        problem, allowed = "must be a number that the planar model reads", ", ".join(read)
+        raise ParameterError(problem, field="parameter", value=parameter, allowed=allowed)

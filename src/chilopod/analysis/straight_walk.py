@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import stability, units
-from chilopod.analysis.parameters import K1, stiffness
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.analysis.parameters import K1, check_parameter, stiffness
+from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
@@ -87,7 +87,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
         period = f"{self.robot.gait.period:g} s"
         return f"{self.robot.name}: the straight walk is {self.verdict} (period {period})"
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         rows: list[Sequence[str]] = [("|multiplier|", "exponent (1/s)", "joint angles of the mode, front to rear")]
         for modulus, exponent, components in zip(
             self.moduli, self.exponents.values, self.joint_components, strict=True
@@ -154,7 +154,7 @@ class WalkBifurcation(Summary, ReadOnlyArrays):
         unit = self.unit.replace("*", "·")
         return f"{self.point.kind.label} at {self.parameter} = {self.value:.12g} {unit} (± {self.error_bound:.1e})"
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         point, above = self.point, [f"{self.point.kind.sentence}."]
         if point.criticality.known:
             above.append(f"{point.criticality.label}: {point.criticality.sentence}.")
@@ -219,11 +219,9 @@ def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
     Raises
     ------
     ParameterError
-        If the parameter does not vary continuously.
+        If the parameter does not vary continuously, or the planar model does not read it.
     """
-    robot.unit_of(parameter)  # refuses an unknown parameter
-    if parameter == "body.modules":
-        raise ParameterError("must be a continuous parameter, not a whole number", field="parameter", value=parameter)
+    check_parameter(robot, parameter)
     # Where the symmetry of the gait itself changes, only the full period means the same on both sides.
     symmetric = parameter != "gait.side_phase"
     return lambda value: PlanarModel(robot.with_value(parameter, value), use_symmetry=symmetric)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import units
+from chilopod.analysis.parameters import check_parameter
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.notebook import Summary, axes_for
@@ -63,7 +64,7 @@ class TransitionCurve(Summary):
         """Kind and number of points in words."""
         return f"{self.curve.kind.label} in two parameters: {len(self.curve.points)} points"
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         rows = [
             (each.kind.label, *map(bounded, self.shown(each.values), np.abs(self.shown(each.error_bound))))
             for each in self.curve.special
@@ -77,14 +78,12 @@ def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float
     Raises
     ------
     ParameterError
-        If one does not vary continuously, or both are the same.
+        If one does not vary continuously or the planar model does not read it, or both are the same.
     """
     if parameters[0] == parameters[1]:
         raise ParameterError("must be two parameters", field="parameters", value=parameters)
     for parameter in parameters:
-        robot.unit_of(parameter)  # refuses an unknown parameter
-        if parameter == "body.modules":
-            raise ParameterError("must be continuous, not a whole number", field="parameters", value=parameter)
+        check_parameter(robot, parameter)
     symmetric = "gait.side_phase" not in parameters
     first, second = parameters
     return lambda p, q: PlanarModel(robot.with_value(first, p).with_value(second, q), use_symmetry=symmetric)

@@ -57,11 +57,10 @@ def _root(
 
 
 def _check_completion() -> None:
-    asked = os.environ.get(_COMPLETION, "")
-    if asked and not re.fullmatch(r"(complete|source)_(bash|zsh|fish|powershell|pwsh)", asked):
-        raise ParameterError(
-            "is none of the instructions of shells", field=_COMPLETION, value=asked, allowed="complete_bash, or unset"
-        )
+    instruction = os.environ.get(_COMPLETION, "")
+    if instruction and not re.fullmatch(r"(complete|source)_(bash|zsh|fish|powershell|pwsh)", instruction):
+        problem, allowed = "must be the instruction of a shell", "complete_bash, or unset"
+        raise ParameterError(problem, field=_COMPLETION, value=instruction, allowed=allowed)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -111,7 +110,7 @@ def _help_of(error: Exception) -> str:
 
 
 def _not_imported(error: Exception) -> str | None:
-    """The package of somebody else's that could not be imported, if that is what went wrong."""
+    """Name of another project's package that could not be imported, if the import failed."""
     frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__))
     loading = (frame.f_globals.get("__name__", "") for frame in frames if frame.f_code.co_name == "<module>")
     packages = (name.partition(".")[0] for name in loading)

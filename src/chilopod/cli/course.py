@@ -71,10 +71,10 @@ def course(
     ] = None,
     out: OutOption = None,
 ) -> None:
-    """Let a robot walk from target to target, and report what became of each.
+    """Let a robot walk from target to target, and report the outcome of each.
 
     A target is reached where the robot comes within 0.15 m of it; then, or when its time is over, the next has its
-    turn. The robot knows of it what a laser scanner on module 1 sees: within 4.1 m and 120 deg to either side.
+    turn. The robot sees the target as a laser scanner on module 1 does: within 4.1 m and 120 deg to either side.
 
     With --out, draws the way and writes the record, a replay that opens in any browser, and a film.
 
@@ -89,7 +89,7 @@ def course(
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
 
-    def walked(told: Callable[[str], Progress]) -> Driven:
+    def results(progress: Callable[[str], Progress]) -> Driven:
         from chilopod.tasks.course import Driver, drive, driver, patience_of
         from chilopod.trials import check_fits
 
@@ -97,7 +97,7 @@ def course(
         how = options.steering
         # What cannot be driven is refused before the radius law takes its time.
         check_fits(Driver(described, chosen, law=None, **how).trial(goals).repeated(options.seed, options.repeats))
-        ready = driver(described, chosen, spring, **how, folder=options.trials, progress=told("radius law"))
-        return drive(ready, goals, **options.runs(told("course")))
+        ready = driver(described, chosen, spring, **how, folder=options.trials, progress=progress("radius law"))
+        return drive(ready, goals, **options.runs(progress("course")))
 
-    options.walk_into(out, "course", walked)
+    options.walk_into(out, "course", results)

@@ -1,4 +1,4 @@
-"""``chilopod doctor``: is everything here that chilopod needs, and what mends it if not?"""
+"""``chilopod doctor``: check of the installation, with the command that repairs each fault."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _PACKAGES = {
     "mujoco": "mujoco-core",
     **{name: name for name in ("xarray", "matplotlib", "av")},
 }
-"""Packages that are imported, and their names where they come from."""
+"""Names of packages in imports, and in package registries."""
 
 BROKEN = 3
-"""Exit code where something is missing that nothing works without."""
+"""Exit code where an essential part is missing."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Result of a check, and the line that mends what is missing; it is essential if nothing works without it."""
+    """Result of a check, and the line that repairs a missing part; it is essential if nothing works without it."""
 
     name: str
     says: str
@@ -43,16 +43,16 @@ class Finding:
         return "✗" if self.mend else "✓" if self.looked else "?"
 
     def as_json(self) -> dict[str, object]:
-        """Plain values; null for what was not found, and where nothing is to be mended."""
+        """Plain values; null for a missing part, and where no repair is needed."""
         found, mend = self.says if self.looked else None, self.mend or None
         return {"name": self.name, "found": found, "mend": mend, "essential": self.essential}
 
 
 def doctor(as_json: JsonOption = False) -> None:
-    """Check that everything is here that chilopod needs, and show the line that mends what is missing.
+    """Check that all parts that chilopod needs are installed, and print the command that repairs a missing one.
 
-    The exit code is 0, or 3 if something is missing that nothing works without. Without OpenGL or an encoder all but
-    films and pictures in 3-D works.
+    The exit code is 0, or 3 if an essential part is missing. OpenGL and the encoder are needed only for films and
+    pictures in 3-D.
     """
     with progress_bar("doctor"):
         found = [*_versions(), *(_guarded(name, look) for name, look in _LOOKS.items())]
@@ -89,7 +89,7 @@ def _versions() -> list[Finding]:
 
 
 def settings(module: str) -> list[str]:
-    """Variables of the environment by which a package is told something, such as a backend that it may not have."""
+    """Environment variables that configure a package, such as the name of a backend."""
     return sorted(name for name in os.environ if name.startswith(f"{module.upper()}_"))
 
 
@@ -175,7 +175,7 @@ _LOOKS: dict[str, Callable[[], tuple[str, ...]]] = {
     "mp4 encoder": _encoder,
     "fonts": _fonts,
 }
-"""Further checks: what is found, and, where something is missing, what mends it."""
+"""Further checks: finding, and the line that repairs a missing part."""
 
 
 def _again(package: str) -> str:
@@ -183,7 +183,7 @@ def _again(package: str) -> str:
 
 
 def _guarded(name: str, look: Callable[[], tuple[str, ...]]) -> Finding:
-    """Finding of a check, even where a package that it takes is not there."""
+    """Finding of a check, even where a package that it uses is missing."""
     try:
         says, *mend = look()
         return Finding(name, says, "".join(mend))

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import webbrowser
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import EngineOption, ForceOption, SetOption, free, read_robot, reading
-from chilopod.live.wishes import LARGEST_SEED
+from chilopod.cli.options import EngineOption, ForceOption, SetOption, free, read_robot, reading, with_options
+from chilopod.live.wishes import LARGEST_SEED, check_port
 
 if TYPE_CHECKING:
     from chilopod.live import Live
@@ -45,60 +46,70 @@ TokenOption = Annotated[
 ]
 
 
-def live(
+@dataclass(frozen=True)
+class LiveOptions:
+    """Argument and options of ``live``, as they were typed."""
+
     robot: Annotated[
         str, typer.Argument(metavar="[ROBOT]", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
-    ] = "aoi2022-planar",
-    engine: EngineOption = "planar",
-    strategy: StrategyOption = "variable",
+    ] = "aoi2022-planar"
+    engine: EngineOption = "planar"
+    strategy: StrategyOption = "variable"
     seed: Annotated[
         int,
         typer.Option(metavar="N", min=0, max=LARGEST_SEED, help="Seed of the start and of the nudges of the floor."),
-    ] = 1,
-    host: HostOption = "127.0.0.1",
-    port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any that is free.")] = 8080,
-    token: TokenOption = False,
+    ] = 1
+    host: HostOption = "127.0.0.1"
+    port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any free port.")] = 8080
+    token: TokenOption = False
     duration: Annotated[
         str | None, typer.Option(metavar="TIME", help='Time after which the page ends by itself, such as "10 min".')
-    ] = None,
-    browser: Annotated[bool, typer.Option("--open", help="Open the page in a browser too.")] = False,
-    overrides: SetOption = None,
+    ] = None
+    browser: Annotated[bool, typer.Option("--open", help="Open the page in a browser too.")] = False
+    overrides: SetOption = None
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FOLDER", help="Folder for recordings, besides the downloads of the browser."),
-    ] = None,
-    force: ForceOption = False,
-) -> None:
+    ] = None
+    force: ForceOption = False
+
+
+@with_options
+def live(options: LiveOptions) -> None:
     """Show a robot that walks in the browser while you change it.
 
     Drag the first spring below the pitchfork and the robot bends; click on the floor and it goes there; drag a joint.
     Requests of other web sites are refused. Ctrl-C ends the page and keeps a recording that is under way. Needs: pip
     install "chilopod[live]".
     """
+    seconds, out = _duration(options.duration), options.out
+    check_port(options.port)
+    if out is not None:
+        earlier = out.glob("chilopod-live-*") if out.is_dir() else ()
+        free([*_files(out, "chilopod-live-1"), *earlier], options.force)
+    described = read_robot(options.robot, options.overrides)
+    from chilopod.live import Live
+
+    named = {name: getattr(options, name) for name in ("engine", "seed", "strategy", "host", "port", "token")}
+    page = Live(described, **named, kept=None if out is None else partial(_keep, out, options.force))
+    try:
+        typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
+        if options.browser and not webbrowser.open(page.address):
+            typer.echo(f"no browser could be started: open {page.address} in one", err=True)
+        page.wait(seconds)
+    finally:
+        _end(page, options.force)
+
+
+def _duration(typed: str | None) -> float:
     from chilopod import units
     from chilopod.errors import ParameterError
 
     with reading("duration"):
-        seconds = math.inf if duration is None else units.parse(duration, "s")
+        seconds = math.inf if typed is None else units.parse(typed, "s")
         if not seconds > 0.0:
-            raise ParameterError("is no time to walk", value=seconds, allowed="more than 0 s")
-    if not 0 <= port < 65536:
-        raise ParameterError("is no port", field="port", value=port, allowed="1 to 65535, or 0 for any that is free")
-    if out is not None:
-        free([*_files(out, "chilopod-live-1"), *(out.glob("chilopod-live-*") if out.is_dir() else ())], force)
-    described = read_robot(robot, overrides)
-    from chilopod.live import Live
-
-    there: dict[str, Any] = {"host": host, "port": port, "token": token}
-    kept = None if out is None else partial(_keep, out, force)
-    page = Live(described, engine, seed=seed, strategy=strategy, **there, kept=kept)
-    try:
-        typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
-        if browser and not webbrowser.open(page.address):
-            typer.echo(f"no browser could be started: open {page.address} in one", err=True)
-        page.wait(seconds)
-    finally:
-        _end(page, force)
+            raise ParameterError("must be a time to walk", value=seconds, allowed="more than 0 s")
+    return seconds
 
 
 def _keep(folder: Path, replace: bool, name: str, record: bytes, page: str) -> None:

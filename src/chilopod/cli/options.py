@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 import typer
 from typer.core import TyperCommand
 
-from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
+from chilopod.cli.user_code import own_code, own_controller
 from chilopod.errors import ChilopodError
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def _as_typed(error: ChilopodError, ctx: Any) -> None:
 
 @contextmanager
 def reading(option: str) -> Iterator[None]:
-    """Errors in this block are errors of what was typed for an option (its name in Python)."""
+    """Give errors in this block the name of an option (its name in Python) as their field."""
     try:
         yield
     except ChilopodError as error:
@@ -161,8 +161,8 @@ def reading(option: str) -> Iterator[None]:
 
 
 class _App(typer.Typer):
-    def command(self, name: str | None = None, **told: Any) -> Any:
-        return super().command(name, cls=_Command, **told)
+    def command(self, name: str | None = None, **settings: Any) -> Any:
+        return super().command(name, cls=_Command, **settings)
 
 
 def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
@@ -198,7 +198,7 @@ def walking_on(cluster: str | None) -> Iterator[None]:
 
 
 def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
-    """Load a robot and apply what ``--set`` asked for."""
+    """Load a robot and apply the overrides of ``--set``."""
     from chilopod.robot import load_robot
 
     described = load_robot(robot)
@@ -257,7 +257,7 @@ class WalkOptions(RobotOptions):
         return {"engine": self.engine, "controller": own_controller(self.controller)}
 
     def runs(self, progress: Progress) -> tasks.RunOptions:
-        """Options of every task, which tells how far it is."""
+        """Options of every task, with the function that shows its progress."""
         return {"seed": self.seed, "repeats": self.repeats, "folder": self.trials, "progress": progress}
 
     def spring(self, path: str | None, k1: str) -> float:
@@ -276,14 +276,14 @@ class WalkOptions(RobotOptions):
     def walk_into(self, out: Path | None, what: str, walk: Callable[[Callable[[str], Progress]], Found]) -> None:
         """Walk a ``turn`` or a ``course``, write its files into the folder, if there is one, and print it."""
         if out:
-            from chilopod.show.walked import files_of_walks
+            from chilopod.show.walk_files import files_of_walks
 
             free(files_of_walks(what, out), self.force)
-        with self.walking(what) as told:
-            done = walk(told)
+        with self.walking(what) as progress:
+            done = walk(progress)
 
         def write() -> Iterable[Path]:
-            from chilopod.show.walked import write_walks
+            from chilopod.show.walk_files import write_walks
 
             return write_walks(what, done, out or "", replace=self.force)
 
@@ -309,7 +309,7 @@ class WalkOptions(RobotOptions):
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Let typer see the fields of the options that come as a command's first argument, beside those of its own."""
+    """Decorator that shows typer the fields of a command's first argument, a dataclass, beside its other arguments."""
     first, *own = (
         each.replace(kind=Parameter.KEYWORD_ONLY) for each in signature(command, eval_str=True).parameters.values()
     )
@@ -373,10 +373,12 @@ def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> No
 def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:
     """Read the interval of a parameter, in SI units, and refuse one that is reversed or that the robot cannot have."""
     from chilopod import units
+    from chilopod.analysis.parameters import check_parameter
     from chilopod.errors import ParameterError
 
     with reading("parameter"):
-        unit = robot.si_unit_of(parameter)
+        check_parameter(robot, parameter)
+    unit = robot.si_unit_of(parameter)
     with reading(f"between {parameter}"):
         low, high = (units.parse(text, unit) for text in between)
         for text in between:

@@ -15,22 +15,22 @@ _BETWEEN_LINES = 5.0  # s
 
 _ONCE = "compiling, once on this machine"
 
-_Told = dict[str, tuple[float, str]]
+_States = dict[str, tuple[float, str]]
 """By title: the part done, and words."""
 
 
 @contextmanager
 def progress_bar(doing: str) -> Iterator[Callable[[str, float, str], None]]:
-    """Show progress on stderr while the block runs, if that takes a moment: what is done until the work calls the
-    function it gets with a title, the part done (0 to 1), and a few words about the current step."""
-    told: _Told = {}
+    """Show progress on stderr while the block runs, if that takes a moment. The block gets a function to call with a
+    title, the fraction done (0 to 1), and a few words about the current step."""
+    states: _States = {}
     over = threading.Event()
 
     def tell(title: str, done: float, words: str) -> None:
-        told[title] = done, words
+        states[title] = done, words
 
     show = _bars if sys.stderr.isatty() else _lines
-    showing = threading.Thread(target=show, args=(doing, told, over), name="progress", daemon=True)
+    showing = threading.Thread(target=show, args=(doing, states, over), name="progress", daemon=True)
     showing.start()
     try:
         yield tell
@@ -39,12 +39,12 @@ def progress_bar(doing: str) -> Iterator[Callable[[str, float, str], None]]:
         showing.join()
 
 
-def _lines(doing: str, told: _Told, over: threading.Event) -> None:
-    begun, shown = time.monotonic(), _Told()
+def _lines(doing: str, states: _States, over: threading.Event) -> None:
+    begun, shown = time.monotonic(), _States()
     wait, said = _UNTIL_LINE, False
     while not over.wait(wait):
         wait, seconds = _BETWEEN_LINES, f"{time.monotonic() - begun:.0f} s"
-        now = dict(told)
+        now = dict(states)
         if not said and _compiling():
             said = True
             print(f"{doing}: {_ONCE}", file=sys.stderr, flush=True)
@@ -64,7 +64,7 @@ def _compiling() -> bool:
     return numba is not None and clock is not None and bool(clock.seconds() > numba.NOTICED)
 
 
-def _bars(doing: str, told: _Told, over: threading.Event) -> None:
+def _bars(doing: str, states: _States, over: threading.Event) -> None:
     if over.wait(_UNTIL_BAR):
         return
     from rich.console import Console
@@ -82,7 +82,7 @@ def _bars(doing: str, told: _Told, over: threading.Event) -> None:
         last = False
         while not last:
             last = over.wait(_BETWEEN_LOOKS)
-            for title, (done, words) in dict(told).items():
+            for title, (done, words) in dict(states).items():
                 if title not in tasks:
                     tasks[title] = bar.add_task(title, total=1.0, words="")
                 bar.update(tasks[title], completed=done, words=words)

@@ -85,11 +85,9 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
     if options.overrides:
         from chilopod.errors import ParameterError
 
-        raise ParameterError(
-            "reproduce changes nothing about the robot: the paper's numbers are those of the paper's",
-            value=options.overrides[0],
-            allowed="no --set; stability, bifurcation, branch, walk and turn take any robot",
-        )
+        problem = "must not be given, because the paper's numbers are those of its own robot"
+        allowed = "no --set; stability, bifurcation, branch, walk and turn take any robot"
+        raise ParameterError(problem, field="--set", value=options.overrides[0], allowed=allowed)
     sections = chosen(options.only, options.quick or options.tiny, options.paper)  # refuses an unknown section
     from chilopod.errors import in_words
 
@@ -199,8 +197,8 @@ def planar(
 
     free([*files_of("identification", out), *_identified(out)], force)
     with progress_bar("identification") as progress:
-        told = partial(progress, "identification")
-        found = identify_planar(described, critical_mode_data(), points, variant_settings(), told)
+        step = partial(progress, "identification")
+        found = identify_planar(described, critical_mode_data(), points, variant_settings(), step)
     lines = [*found.lines(), f"profile, figure and robot file are in {out}"]
     result, more = {"robot": described.name, **found.as_json()}, identification_files(found, out)
     _deliver(out, result, found.best, lines, more, force=force, as_json=as_json)
@@ -251,8 +249,8 @@ def twin(
     from chilopod.tasks.identify import identify_twin
 
     with progress_bar("identification") as progress:
-        kept, told = check_folder(out / "evaluations"), partial(progress, "identification")
-        found = identify_twin(described, base_series_data(), starts, generations, seed, kept, fresh, told)
+        kept, step = check_folder(out / "evaluations"), partial(progress, "identification")
+        found = identify_twin(described, base_series_data(), starts, generations, seed, kept, fresh, step)
     result = {"robot": described.name, **found.as_json()}
     constants = result["constants"].items()
     lines = [

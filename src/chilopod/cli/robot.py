@@ -52,7 +52,7 @@ def new(
     with reading("modules"):
         robot = robot.set_from_text([f"body.modules={modules}"] if modules is not None else [])
     robot = robot.set_from_text(overrides or []).with_(name=file.stem)
-    write_atomic(file, robot.to_toml(), replace=force, folders=False)
+    write_atomic(file, robot.to_toml(), replace=force)
     if as_json:
         print_json({"robot": robot.name, "file": str(file)})
     else:
@@ -100,7 +100,7 @@ def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fal
 
 @app.command()
 def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
-    """Say whether a robot is valid, and what is unusual about it."""
+    """Check that a robot is valid, and list its unusual numbers."""
     from chilopod.robot import remarks
 
     described = read_robot(robot, overrides)
@@ -129,7 +129,7 @@ def export(
 
     name, write = format_of(out.suffix)
     described = read_robot(robot, overrides)
-    write_atomic(out, write(described), replace=force, folders=False)
+    write_atomic(out, write(described), replace=force)
     if as_json:
         print_json({"robot": described.name, "file": str(out), "format": name})
     else:

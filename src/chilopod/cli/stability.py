@@ -37,7 +37,7 @@ def bifurcation(
     ] = 60.0,
     out: OutOption = None,
 ) -> None:
-    """Values of one number of the robot at which the straight walk gains or loses stability, and how.
+    """Bifurcations of the straight walk: values of one number of the robot at which its stability changes.
 
     Every bifurcation in the interval has its kind, its error bound, the mode that grows, and its direction: new walks
     set in gently (supercritical) or by a jump (subcritical).

@@ -1,4 +1,4 @@
-"""``chilopod trials``: what is in a folder of trials, whether it is whole, and what may go."""
+"""``chilopod trials``: list, check and clean a folder of trials."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from chilopod.trials.folder import Group
 
 BROKEN = 2
-"""Exit code where a file is not what it should be."""
+"""Exit code where a file is damaged."""
 
 app = new_app("List, check and clean a folder in which trials are kept.")
 
@@ -34,7 +34,8 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     """List the trials in a folder: robots, durations, targets and seeds.
 
     Only the front of every file is read; `chilopod trials check` reads all of it. The column robots counts robots of
-    one name that differ in their numbers.
+    one name that differ in their numbers. A controller of your own has its code in brackets: trials from before and
+    after a change of it are rows of their own.
     """
     from chilopod.memory import in_words
     from chilopod.notebook import aligned
@@ -44,7 +45,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     with progress_bar("trials") as show:
         trials, wrong = kept(there.trials, lambda part, words: show("list", part, words))
     rows, size = groups(trials), sum(each.size for each in trials)
-    others = sum(not each.found for each in trials)
+    others = sum(not each.current for each in trials)
     if as_json:
         found = {"trials": len(trials), "bytes": size, "of_other_versions": others}
         files = {
@@ -82,13 +83,14 @@ def _as_json(row: Group) -> dict[str, Any]:
         "robots": row.robots,
         "engine": row.engine,
         "controller": row.controller,
+        "code": row.code or None,
         "duration_s": row.duration,
         "target": {"bearing_rad": one[0], "distance_m": one[1]} if one else None,
         "targets": 1 if one else row.target or 0,
         "seeds": _ranges(row.seeds),
         "trials": row.count,
         "bytes": row.size,
-        "of_this_version": row.found,
+        "of_this_version": row.current,
     }
 
 
@@ -99,8 +101,9 @@ def _cells(row: Group) -> tuple[str, ...]:
     if isinstance(row.target, tuple):
         target = f"{math.degrees(row.target[0]):.4g} deg, {row.target[1]:g} m"
     controller = row.controller.rpartition(":")[2] if row.controller else "-"
+    controller += f" (code {row.code[:6]})" if row.code else ""
     numbers = str(row.robots), _ranges(row.seeds) or "-", str(row.count)
-    size = f"{in_words(row.size)}{'' if row.found else ', another version'}"
+    size = f"{in_words(row.size)}{'' if row.current else ', another version'}"
     return row.robot, row.engine, f"{row.duration:g} s", target, controller, *numbers, size
 
 
@@ -110,13 +113,13 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
 
     All of every file is read. Each damaged file is a line; the exit code is 0, or 2 if there is one. A command that
     walks sets such a file aside and walks the trial again. Trials of another version of chilopod or MuJoCo are counted:
-    they are whole, but walk again too.
+    they are whole, but are walked again too.
     """
     from chilopod.trials.folder import checked, contents
 
     with progress_bar("trials") as show:
         whole, wrong = checked(contents(folder).trials, lambda part, words: show("check", part, words))
-    others = sum(not each.found for each in whole)
+    others = sum(not each.current for each in whole)
     if as_json:
         print_json(
             {

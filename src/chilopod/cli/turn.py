@@ -44,11 +44,11 @@ def turn(
     ] = None,
     out: OutOption = None,
 ) -> None:
-    """Pick the spring that leads to a target, walk there, and say how well it went.
+    """Pick the spring that leads to a target, walk there, and report the outcome.
 
-    The robot arrives where it comes within 0.15 m of the target. The criteria are the paper's: what is left of the
-    distance (epsilon 1) and the angle between heading and target (epsilon 2) when the first walk arrives, and until
-    then the leg yaw squared, over time (epsilon 3, what steering cost).
+    The robot arrives where it comes within 0.15 m of the target. The criteria are the paper's. Epsilon 1 is the
+    distance to the target and epsilon 2 the angle between heading and target when the first walk arrives. Epsilon 3 is
+    the cost of steering until then, the integral of the squared leg yaw.
 
     With --out, draws the way and writes the record, and a replay that opens in any browser.
     """
@@ -61,10 +61,10 @@ def turn(
     with reading("duration"):
         seconds = None if duration is None else units.parse(duration, "s")
 
-    def walked(told: Callable[[str], Progress]) -> Turn:
+    def results(progress: Callable[[str], Progress]) -> Turn:
         from chilopod.tasks import turn as walk_there
 
         how = {"duration": seconds, **options.steering}
-        return walk_there(described, goal, chosen, spring, **how, **options.runs(told("turn")))
+        return walk_there(described, goal, chosen, spring, **how, **options.runs(progress("turn")))
 
-    options.walk_into(out, "turn", walked)
+    options.walk_into(out, "turn", results)

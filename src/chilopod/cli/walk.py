@@ -54,14 +54,14 @@ def walk(
     from chilopod.trials import Trial
 
     with ExitStack() as stack:
-        with options.walking("walk") as told:
+        with options.walking("walk") as progress:
             one = Trial(
                 described, seconds, 0, angles, rate=RATE if rate is None else rate, forces=forces, **options.steering
             )
             trials = one.repeated(options.seed, options.repeats)
             file = stack.enter_context(_record_file(out, trials)) if out else None
             add = file.add if file else lambda index, record: None
-            done = ends(trials, options.trials, told("walk"), add)
+            done = ends(trials, options.trials, progress("walk"), add)
         hint = '--seed 1, or --initial-joints "2 deg"'
         options.deliver(lambda: file.write(replace=options.force) if file else [], done, hint)
 

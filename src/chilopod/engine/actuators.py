@@ -179,7 +179,7 @@ class Actuators:
         """Leg yaw on its ramps at any rising times of the walk, rad, shape (times, robots, 2)."""
         return self._leg_yaw.over(times)
 
-    def leg_yaw_told(self, times: Array) -> Array:
+    def leg_yaw_commanded(self, times: Array) -> Array:
         """Setpoint of leg yaw at any rising times of the walk, rad, shape (times, robots, 2)."""
         setpoints = np.concatenate(
             [np.zeros((1, *self.leg_yaw.shape)), self._logged("command").reshape(-1, *self.leg_yaw.shape)]

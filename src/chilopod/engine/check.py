@@ -52,7 +52,8 @@ def _traits(trial: Trial) -> None:
     traits = trial.engine.traits
     expect(isinstance(traits, Traits), f"traits are a {type(traits).__name__}")
     expect(traits.name and traits.sentence, "name and sentence must not be empty")
-    expect(traits.a_core >= 1 and traits.a_round >= 1 and traits.haste > 0.0, "numbers of traits must be positive")
+    positive = min(traits.robots_per_core, traits.walks_per_round) >= 1 and traits.duration_ratio > 0.0
+    expect(positive, "numbers of traits must be positive")
     expect(trial.engine.common(trial.robot) == trial.engine.common(trial.robot), "common changes from call to call")
     hash(trial.engine.common(trial.robot))
 

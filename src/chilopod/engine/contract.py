@@ -260,11 +260,11 @@ class Traits:
         True if its sensors have noise of their own, drawn from ``seeds``.
     poses
         True if it can record the positions of all joints, to be drawn.
-    a_core
+    robots_per_core
         Number of robots that one core should walk at a time: a few seconds of work.
-    a_round
+    walks_per_round
         Number of walks that a search may spend on one round of trials.
-    haste
+    duration_ratio
         Ratio of a task's duration to its duration at the speed of the straight walk without slip.
     version
         Version of the software besides chilopod that determines the records; empty if there is none.
@@ -275,9 +275,9 @@ class Traits:
     exact: bool = False
     noisy: bool = False
     poses: bool = False
-    a_core: int = 1
-    a_round: int = 8
-    haste: float = 2.0
+    robots_per_core: int = 1
+    walks_per_round: int = 8
+    duration_ratio: float = 2.0
     version: str = ""
 
 

@@ -58,9 +58,7 @@ class Actions:
         the axis to that spring. Raises ParameterError if a spring has no actuator, or an empty range.
         """
         if springs not in SPRINGS:
-            raise ParameterError(
-                "must be one of the sets of springs", field="springs", value=springs, allowed=" or ".join(SPRINGS)
-            )
+            raise ParameterError(f"must be {' or '.join(SPRINGS)}", field="springs", value=springs)
         own = robot.springs
         if own.adjustable is None:
             every = springs == "all"
@@ -69,10 +67,7 @@ class Actions:
         joints = (0,) if springs == "first" else tuple(joint for joint, each in enumerate(can) if each)
         if not any(can) or not all(can[joint] for joint in joints):
             raise ParameterError(
-                "must be true: the action sets the first spring",
-                field="springs.adjustable[0]",
-                value=False,
-                allowed="true",
+                "must be true: the action sets the first spring", field="springs.adjustable[0]", value=False
             )
         most = max(own.stiffness)
         softest = tuple(own.softest[joint] if own.softest else _SOFTEST * most for joint in joints)
@@ -97,18 +92,18 @@ class Actions:
         events = self.legs.events(self.robot.gait)
         return tuple(sorted((each.phase, each.window, SIDES.index(each.name)) for each in events))
 
-    def checked(self, actions: ArrayLike, robots: int) -> Array:
-        """Actions of a batch, each its own copy, shape (robots, len(names)). Raises ParameterError for a wrong shape,
-        NaN, or values out of range."""
-        array, shape = as_array("action", actions), (robots, len(self.names))
+    def checked(self, actions: ArrayLike, *robots: int) -> Array:
+        """Copy of actions of shape (len(names),), or (robots, len(names)) for a batch. Raises ParameterError for a
+        wrong shape, NaN, or values out of range."""
+        array, shape = as_array("action", actions), (*robots, len(self.names))
         if array.shape != shape:
-            raise ParameterError("has the wrong shape", field="action", value=array.shape, allowed=str(shape))
+            problem = f"must be {shape}, the numbers {', '.join(self.names)}"
+            raise ParameterError(problem, field="action.shape", value=array.shape)
         inside = np.abs(array) <= 1.0 + _ROUNDING
         if not inside.all():
-            robot, number = (int(each) for each in np.argwhere(~inside)[0])
-            problem, value = f"the {self.names[number]} is out of range", float(array[robot, number])
-            where = f"action[{number}]" if robots == 1 else f"action[{robot}, {number}]"
-            raise ParameterError(problem, field=where, value=value, allowed="-1 to 1")
+            place = np.argwhere(~inside)[0].tolist()
+            problem, value = f"the {self.names[place[-1]]} is out of range", float(array[tuple(place)])
+            raise ParameterError(problem, field=f"action{place}", value=value, allowed="-1 to 1")
         return np.clip(array, -1.0, 1.0)
 
     def stiffness(self, actions: Array) -> Array:

@@ -114,7 +114,7 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
 
 
 class RobotEnv(gymnasium.Env[Row, Row]):
-    """One robot of :class:`RobotVectorEnv`, whose parameters these are."""
+    """One robot; the parameters are those of :class:`RobotVectorEnv`."""
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS}  # noqa: RUF012
 
@@ -144,10 +144,8 @@ class RobotEnv(gymnasium.Env[Row, Row]):
     def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
         """Walk for a gait cycle."""
         if self._over:
-            raise ParameterError(
-                "must not be called after the end of an episode", field="step", allowed="reset() first"
-            )
-        step = self.episodes.step(np.asarray(action)[None])
+            raise ParameterError("must not follow the end of an episode", field="step", allowed="reset() first")
+        step = self.episodes.step(self.episodes.actions.checked(action)[None])
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         self._over = terminated or truncated
         return step.observation[0], float(step.reward[0]), terminated, truncated, _info(step)

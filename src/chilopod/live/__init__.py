@@ -1,9 +1,9 @@
-"""The live page: a robot that walks in the browser, and everything that can be done to it while it does.
+"""Live page: a robot that walks in the browser and obeys the user.
 
-``wishes`` are what somebody wants, ``session`` owns the walk and does it, ``state`` is what there is to see of it,
-``theory`` computes beside it where the walk gives way, ``words`` says what is seen, ``body`` is where the robot's parts
-are; nothing of that knows of a browser. ``server`` shows it in one with viser, ``gate`` lets in nobody but the page,
-``controls``, ``scene`` and ``plots`` are parts of it.
+``wishes`` are the user's requests. ``session`` owns the walk and grants them, ``state`` is the visible state of the
+walk, ``theory`` computes the pitchfork and the branch in another process, ``words`` describes the walk, and ``body``
+places the robot's parts; none of them uses a browser. ``server`` serves the page with viser, ``gate`` checks every
+request, and ``controls``, ``scene`` and ``plots`` are the parts of the page.
 """
 
 from typing import TYPE_CHECKING

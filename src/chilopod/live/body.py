@@ -1,4 +1,4 @@
-"""Where the parts of a walking robot are in space, and what they look like: boxes, rods, balls and pins."""
+"""Positions and shapes of the parts of a walking robot: boxes, rods, balls and pins."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Body(Protocol):
     """A robot that can be drawn: its first box is module 1."""
 
     def places(self, seen: Seen) -> Mapping[str, Placed]:
-        """Where its parts are, by kind, always the same ones in the same order."""
+        """Positions of its parts by kind, always the same parts in the same order."""
 
 
 # In parts of the length of a module: the planar robot has no height, and no width but that of its stance.
@@ -84,7 +84,7 @@ def _about_z(angles: Array) -> Array:
 
 
 def _rods(tops: Array, ends: Array, radius: float) -> Placed:
-    """From end to end, turned out of z by the shortest way."""
+    """Parts from one end to the other, turned out of z by the shortest way."""
     way = tops - ends
     length = np.linalg.norm(way, axis=-1)
     x, y, z = (way / length[:, None]).T

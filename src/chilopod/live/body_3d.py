@@ -1,4 +1,4 @@
-"""Where the parts of the three-dimensional robot are: those of its MuJoCo model."""
+"""Positions of the parts of the three-dimensional robot, from its MuJoCo model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Controls of the page: what can be dragged, pressed and typed. Each leaves a wish and does nothing itself."""
+"""Controls of the page: sliders, buttons and keys. Each only leaves a wish."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Controls:
         self._keys(gui)
 
     def reflect(self, settings: Settings, seen: Seen) -> None:
-        """Let the controls show how everything is set, where a wish was refused or the walk itself changed it."""
+        """Show the present settings, after a wish was refused or the walk itself changed one."""
         before, self._settings, self._seen = self._settings, settings, seen
         if settings == before:
             return
@@ -85,9 +85,9 @@ class Controls:
         self._seed.value = settings.seed
 
     def put_back(self, now: Settings) -> None:
-        """Let everything that can be set show how it is set, where a wish was refused or came from elsewhere.
+        """Show the present value of every control, after a wish was refused or came from elsewhere.
 
-        What a browser sets is not set again for it as a rule: a slider that is being dragged would jump back.
+        A browser's own change is not sent back to it, because a dragged slider would jump.
         """
         for name, row in self._rows.items():
             if not row.moves:
@@ -228,7 +228,7 @@ class Controls:
 
 
 async def _do(do: Callable[..., object], *to: object) -> None:
-    """Action of a key; by the thread of the server, as no other may change what browsers show."""
+    """Action of a key, in the server's thread, which alone may change the page."""
     do(*to[:-1])  # the last is the event of the key
 
 

@@ -1,7 +1,8 @@
-"""Who may open the page, and what a browser may say: viser's server, behind a look at every request and message.
+"""Access to the page: viser's server behind a check of every request and message.
 
-viser answers whoever asks, and sets any attribute that a message names. It listens by ``websockets``; here it does so
-by ours, which asks a :class:`Gate` first. All that is used of viser beside its documented interface is in this module.
+viser alone answers every request, and sets any attribute that a message names. It listens by ``websockets``; here it
+does so by ours, which asks a :class:`Gate` first. All that is used of viser beside its documented interface is in this
+module.
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ class Gate:
 
     A browser says by Host which name it looked up, and by Origin which page sends it. On this machine's own addresses
     Host is one of their names, so that a name that leads here later is refused (DNS rebinding), and Origin is the page
-    itself; a handshake without Origin comes from no browser, and is refused. Programs can say what they like: at other
-    addresses, or where wanted (`token`), they need a token. It comes with the link, and stays in a cookie.
+    itself; a handshake without Origin comes from no browser, and is refused. Other programs can send any header: at
+    other addresses, or with `token`, they need a token. It comes with the link, and stays in a cookie.
     """
 
     def __init__(self, host: str, token: bool = False) -> None:
@@ -125,7 +126,7 @@ class Gate:
         return response
 
     def _unwelcome(self, connection: ServerConnection, request: Request, host: str) -> str | None:
-        """Why somebody may not come in."""
+        """Reason to refuse a request."""
         headers, origin = request.headers, _only(request.headers.get_all("Origin"))
         if not _HOST.fullmatch(host) or (self._local and host.lower() not in self._names(connection)):
             return f"for another host than this page's, {ascii(host)[:80]}"
@@ -183,7 +184,7 @@ class Gate:
         return msgspec.msgpack.encode(read) if offered else None
 
     def _offers(self, connection: ServerConnection, message: Any) -> bool:
-        """True if the page has what a message is about."""
+        """True if the page has the element that a message names."""
         server = self._viser
         assert server is not None
         there = list(server._websock_server._live_connections.items())
@@ -205,7 +206,7 @@ class Gate:
 
 
 class _Guarded(ServerConnection):
-    """A browser's connection that gives viser nothing but what the gate lets through, and not too fast."""
+    """Connection of a browser that passes only checked messages to viser, at a limited rate."""
 
     def __init__(self, gate: Gate, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -251,7 +252,7 @@ def _takes(handle: Any, value: Any) -> bool:
 
 
 def _is_local(host: str) -> bool:
-    """True if an address is this machine's own, which nobody else reaches."""
+    """True for an address that only this machine reaches."""
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -268,7 +269,7 @@ def _only(values: list[str]) -> str | None:
 
 
 def _policy(host: str) -> str:
-    """Content policy of a page, and who may frame it: its own two scripts, and nothing from elsewhere."""
+    """Content policy of a page: its own two scripts, nothing from elsewhere, and no frame of another site."""
     return (
         f"default-src 'none'; script-src {_scripts()} 'wasm-unsafe-eval'; worker-src blob:; "
         "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "

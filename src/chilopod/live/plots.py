@@ -66,7 +66,7 @@ class Plots:
             each.clear()
 
     def add(self, seen: Seen, theory: Theory) -> None:
-        """Remember what is seen now."""
+        """Keep the present state of the walk."""
         if self._times and seen.time - self._times[-1] < _SPAN / _POINTS:
             return
         settled = theory.settled(float(seen.stiffness[0]))
@@ -75,7 +75,7 @@ class Plots:
         self._radii.append((_shown(radius_of(seen)), _NOWHERE if settled is None else _shown(settled)))
 
     def show(self, seen: Seen, theory: Theory) -> None:
-        """Draw what is remembered."""
+        """Draw the states that are kept."""
         if len(self._times) >= 2:
             times = np.array(self._times)
             self._angle.data = (times, *np.array(self._angles).T.copy())

@@ -42,7 +42,7 @@ _FRONT = _lit(VERMILLION)
 
 
 class View:
-    """View in three dimensions of a robot of some length (m), whose parts are placed somewhere at the start."""
+    """View in three dimensions of a robot with a length (m) and the first positions of its parts."""
 
     def __init__(self, server: viser.ViserServer, placed: Mapping[str, Placed], length: float) -> None:
         scene = server.scene
@@ -89,16 +89,16 @@ class View:
 
     @property
     def pins(self) -> Any:
-        """The yaw joints, for whoever wants to drag one."""
+        """The yaw joints, which can be dragged."""
         return self._batches["pin"]
 
     @property
     def origin(self) -> Array:
-        """Where the floor's origin is in the picture, m, (3,)."""
+        """Position of the floor's origin in the picture, m, (3,)."""
         return np.array(self._world.position)
 
     def forget_way(self) -> None:
-        """Let the way it came begin anew."""
+        """Forget the path."""
         self._points.clear()
 
     def show(self, placed: Mapping[str, Placed], seen: Seen) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import io
 import math
 import socket
@@ -105,7 +106,7 @@ class Live:
         self._theory = Theory()
         self._growth: Growth | None = None
         self._wants_record: viser.ClientHandle | None = None
-        self.frames, self.busy, self._told = 0, 0.0, False
+        self.frames, self.busy, self._wished = 0, 0.0, False
         self.gate = Gate(host, token)
         free = _free_port(host, port)
         with _quiet():
@@ -139,9 +140,9 @@ class Live:
         server.on_client_connect(self._send_undelivered)
 
     def wish(self, wish: wishes.Wish) -> None:
-        """Leave a wish, from any thread, as if somebody had done it at the page."""
+        """Leave a wish, from any thread, as the page does."""
         self._session.box.put(wish)
-        self._told = True
+        self._wished = True
 
     def wait(self, seconds: float | None = None) -> None:
         """Wait so long, or until the thread of the walk fails, and raise its error then."""
@@ -228,7 +229,7 @@ class Live:
     def _obey(self) -> bool:
         """Grant wishes and take answers; True if there was a wish."""
         session, before = self._session, self._session.settings
-        told, self._told = self._told, False
+        wished, self._wished = self._wished, False
         obeyed = session.obey()
         if obeyed:
             if session.settings.robot != before.robot:
@@ -236,10 +237,10 @@ class Live:
             if session.seen().time < self.seen.time:
                 self._view.forget_way()
                 self._plots.forget()
-        said = session.said()
-        for sentence in said:
+        messages = session.messages()
+        for sentence in messages:
             self._at_server(partial(self._notify, sentence))
-        if said or told:
+        if messages or wished:
             self._at_server(partial(self._controls.put_back, session.settings))
         for answer in self._beside.answers():
             if isinstance(answer, Theory):
@@ -254,7 +255,7 @@ class Live:
             client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
 
     def _ask(self, before: Robot | None = None) -> None:
-        """Ask what is not known of the robot as it is now."""
+        """Ask for the unknown theory of the present robot."""
         robot = self._session.settings.robot
         if engine_named(self._session.engine).traits.exact:
             self._beside.ask_growth(robot)
@@ -267,11 +268,11 @@ class Live:
 
     def _tell(self, rate: float) -> None:
         session, seen = self._session, self.seen
-        told = sentences(seen, session.settings, self._theory, self._growth)
+        words = sentences(seen, session.settings, self._theory, self._growth)
         settings = session.settings
         slow = "" if settings.paused or rate > 0.8 * settings.speed else f", as fast as it goes: {rate:.1f} times"
         recording = ", recording" if settings.recording else ""
-        text = f"{' '.join(told)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
+        text = f"{' '.join(words)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
         if self._controls.words.content != text:
             self._controls.words.content = text
 
@@ -310,7 +311,7 @@ class Live:
             client.send_file_download(f"{name}.html", page.encode(), save_immediately=True)
 
     async def _send_undelivered(self, client: viser.ClientHandle) -> None:
-        """Give a browser what was recorded while there was none."""
+        """Give a browser the recordings that ended while none was connected."""
         while self.undelivered and not self._over.is_set():
             self._send(*self.undelivered.pop(0), client)
 
@@ -336,7 +337,7 @@ class Live:
 
 
 class _Rate:
-    """Seconds walked a second, of late."""
+    """Seconds walked in a second of the clock, lately."""
 
     def __init__(self) -> None:
         self.value = 0.0
@@ -365,8 +366,7 @@ def _quiet() -> contextlib.AbstractContextManager[object]:
 
 def _free_port(host: str, port: int) -> int:
     """Make sure that the page can listen at a port, and nowhere else."""
-    if not 0 <= port < 65536:
-        raise ParameterError("is no port", field="port", value=port, allowed="1 to 65535, or 0 for any that is free")
+    wishes.check_port(port)
     try:
         family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, socket.SOCK_STREAM) as trial:
@@ -374,10 +374,10 @@ def _free_port(host: str, port: int) -> int:
             trial.bind(address)
             free: int = trial.getsockname()[1]
             return free
-    except (socket.gaierror, UnicodeError) as error:
-        allowed = "an address or a name of this machine, or 0.0.0.0 for all of them"
-        raise ParameterError("is no address of this machine", field="host", value=host, allowed=allowed) from error
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
+        if not isinstance(error, OSError) or isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
+            problem, allowed = "must be an address of this machine", "an address or a name of it, or 0.0.0.0 for all"
+            raise ParameterError(problem, field="host", value=host, allowed=allowed) from error
         raise ParameterError(
             f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
         ) from error

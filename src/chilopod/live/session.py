@@ -1,4 +1,4 @@
-"""A walk that goes on while somebody changes what it is: everything of the live page but the page."""
+"""Walk of the live page, which goes on while the user changes the robot."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Session:
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
         self._recorded, self._bytes = 0, 0
-        self._said: deque[str] = deque(maxlen=_MOST_WORDS)
+        self._messages: deque[str] = deque(maxlen=_MOST_WORDS)
         self._begin()
 
     # -- what there is
@@ -123,10 +123,10 @@ class Session:
             walk.states()[0],
         )
 
-    def said(self) -> list[str]:
-        """Sentences on what happened since the last call."""
-        sentences = list(self._said)
-        self._said.clear()
+    def messages(self) -> list[str]:
+        """Messages about events since the last call."""
+        sentences = list(self._messages)
+        self._messages.clear()
         return sentences
 
     def records(self) -> list[xr.Dataset]:
@@ -143,7 +143,7 @@ class Session:
             try:
                 self._obey(wish)
             except ChilopodError as error:
-                self._said.append(str(error))
+                self._messages.append(str(error))
         return bool(waiting)
 
     def walk_on(self, seconds: float) -> None:
@@ -163,7 +163,7 @@ class Session:
                 until = self._walk.time + left
 
     def stop_recording(self) -> None:
-        """End what is being written down, if anything is."""
+        """End the recording, if there is one."""
         self.settings = replace(self.settings, recording=False)
         self._keep_record()
 
@@ -196,7 +196,7 @@ class Session:
     def _start(self, robot: Robot, states: Array) -> None:
         if self.settings.recording and not self._may_record:
             self.settings = replace(self.settings, recording=False)
-            self._said.append(f"recording has ended: there is room for no more than the {self._recorded} so far")
+            self._messages.append(f"recording has ended: there is room for no more than the {self._recorded} so far")
         self._written = self._has_record = self.settings.recording
         self._walk: Walk = self._engine.start(
             [robot],
@@ -213,7 +213,7 @@ class Session:
         away = float(np.hypot(*(self._walk.pose()[0, :2] - self._target)))
         if away < ARRIVAL_RADIUS:
             took = self._before + self._walk.time - self._reached
-            self._said.append(f"arrived after {took:.0f} s")
+            self._messages.append(f"arrived after {took:.0f} s")
             self._let_go()
 
     def _look(self) -> None:
@@ -232,7 +232,7 @@ class Session:
     def _between_cycles(self) -> None:
         """Changes that are possible between two gait cycles only."""
         if self._written and self._walk.time > _LONGEST:
-            self._said.append(f"the recording ended by itself, after {_LONGEST / 60.0:g} minutes")
+            self._messages.append(f"the recording ended by itself, after {_LONGEST / 60.0:g} minutes")
             self.stop_recording()
         wanted = self.settings
         as_wanted = but_springs(wanted.robot) == but_springs(self._walk.robots[0])
@@ -278,7 +278,7 @@ class Session:
         self._walk.command(Command(stiffness=[self.settings.robot.springs.stiffness]))
 
     def _let_go(self) -> None:
-        """Walk nowhere in particular, with the springs as they are set and straight legs."""
+        """Walk without a target, with the springs as set and straight legs."""
         self._target, self._controller, self._steering = None, None, ""
         self._walk.aim((np.nan, np.nan))
         self._walk.command(Command(leg_yaw=[(0.0, 0.0)], within=self._period))
@@ -317,7 +317,7 @@ class Session:
         slider = self.sliders.get(name)
         if slider is None:
             near, allowed = nearest_name(name, self.sliders), ", ".join(self.sliders)
-            raise ParameterError("there is no such slider", field="slider", value=name, allowed=allowed, nearest=near)
+            raise ParameterError("must be a slider", field="slider", value=name, allowed=allowed, nearest=near)
         number, before = as_within(name, value, slider.limits, slider.si), self.settings.robot
         settings = slider.apply(self.settings, number)
         self._engine.common(settings.robot)
@@ -325,7 +325,7 @@ class Session:
         if settings.robot.springs == before.springs:
             return
         if self._steers_springs:
-            self._said.append("your springs are back when the target is reached")
+            self._messages.append("your springs are back when the target is reached")
         else:
             self._set_springs()
 
@@ -338,7 +338,7 @@ class Session:
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
         strategy = ON_THE_WAY[self.settings.strategy]
         if strategy.needs_law and self.law is None:
-            self._said.append(f"the radius law is not known (yet): leg yaw alone steers, not {strategy.name}")
+            self._messages.append(f"the radius law is not known (yet): leg yaw alone steers, not {strategy.name}")
             strategy = LEG_YAW
         controller, steering = strategy.prepare(self.settings.robot, self.law).controller, strategy.name
         if self._target is not None:
@@ -350,13 +350,13 @@ class Session:
     def _pull_at(self, joint: int, torque: float, time: float) -> None:
         own = self.file.springs.stiffness
         if joint not in range(len(own)):
-            raise ParameterError("there is no such joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
+            raise ParameterError("must be a joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
         strongest = _STRONGEST * own[joint]
         self._pull[joint] = np.clip(as_finite("pull", torque), -strongest, strongest)
         self._pulled_until[joint] = self._before + self._walk.time + time
         self._push()
         if isinstance(self._controller, ActuatedAxis):
-            self._said.append("the strategy actuated drives the joints, so they cannot be pulled")
+            self._messages.append("the strategy actuated drives the joints, so they cannot be pulled")
 
 
 def _with_springs(robot: Robot, stiffness: Sequence[float]) -> Robot:

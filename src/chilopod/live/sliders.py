@@ -43,7 +43,7 @@ class Slider:
         return float(f"{units.from_si(value, self.unit):.9g}")
 
     def from_page(self, value: float) -> float:
-        """A value of the page in SI units."""
+        """Convert a value of the page to SI units."""
         return units.parse(f"{float(value)!r} {self.unit}", self.unit)
 
 

@@ -1,4 +1,4 @@
-"""States of a live walk that can be seen, its settings, and checks of numbers that somebody wishes."""
+"""Visible state of a live walk, its settings, and checks of numbers in wishes."""
 
 from __future__ import annotations
 
@@ -63,8 +63,7 @@ def as_seed(seed: object) -> int:
     """A whole number, 0 to :data:`chilopod.live.wishes.LARGEST_SEED`; a ParameterError if it is not."""
     number = as_finite("seed", seed)
     if number != int(number) or not 0 <= number <= LARGEST_SEED:
-        allowed = f"a whole number, 0 to {LARGEST_SEED}"
-        raise ParameterError("is no seed", field="seed", value=seed, allowed=allowed)
+        raise ParameterError("must be a whole number", field="seed", value=seed, allowed=f"0 to {LARGEST_SEED}")
     return int(number)
 
 
@@ -75,7 +74,7 @@ def as_finite(field: str, value: object) -> float:
     except OverflowError:  # an int may have any number of digits
         number = math.inf
     if not math.isfinite(number):
-        raise ParameterError("is no number", field=field, value=value, allowed="a finite number")
+        raise ParameterError("must be a finite number", field=field, value=value)
     return number
 
 

@@ -1,4 +1,4 @@
-"""Where the walk gives way and how tightly it then turns, computed beside the walk by a process of its own.
+"""Pitchfork and curved walks of the robot on the page, computed in a process of their own.
 
 The page asks anew whenever springs, floor or steps change; only the last question is answered.
 """
@@ -32,7 +32,7 @@ _GROWTH = 30.0  # s that a short question may take
 
 @dataclass(frozen=True)
 class Theory:
-    """Theory of a robot with any first spring; None where something is not known, with a remark that says why."""
+    """Theory of a robot with any first spring; None for unknown parts, with a remark that gives the reason."""
 
     robot: Robot | None = None
     pitchfork: float | None = None  # first spring below which the straight walk gives way, N*m/rad
@@ -63,35 +63,37 @@ class Growth:
 
 
 def growth_of(robot: Robot) -> Growth:
-    """Growth about the straight walk in the planar theory."""
+    """Rate of growth of a small bend about the straight walk, by the planar theory."""
     from chilopod.analysis import straight_walk
 
     exponents = straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"]
     return Growth(robot, max(real for real, _ in exponents))
 
 
-def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None:
-    """Compute the theory of a robot, and call a function with what is known so far; what that raises ends the work.
+def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> None:
+    """Compute the theory of a robot, and call a function with each intermediate result; its exceptions end the work.
 
     In an engine whose walks are not those of the planar theory, some are walked. The first spring does not matter.
     """
     known = Theory(robot)
     try:
         if engine_named(engine).traits.exact:
-            _exact(known, told)
+            _exact(known, callback)
         else:
             from chilopod.tasks import radius_law
 
             law = radius_law(
-                robot, engine, progress=lambda done, words: told(replace(known, remark=_share(done, "how it turns")))
+                robot,
+                engine,
+                progress=lambda done, words: callback(replace(known, remark=_share(done, "how it turns"))),
             )
             stable = np.ones(len(law.values), dtype=np.bool_)
-            told(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
+            callback(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
     except ChilopodError as error:
-        told(replace(known, remark=error.problem))
+        callback(replace(known, remark=error.problem))
 
 
-def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
+def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
     from chilopod.analysis import curved_walks, first_loss
     from chilopod.stability import Kind
     from chilopod.tasks.radius_law import that_holds
@@ -100,13 +102,13 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
     assert robot is not None
     # As the radius law has it, but for the first spring, which is what varies.
     low, high = (part * max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]) for part in _BETWEEN)
-    told(replace(known, remark="looking for the pitchfork"))
+    callback(replace(known, remark="looking for the pitchfork"))
     loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
     known = replace(known, pitchfork=loss.point.value)
-    told(replace(known, remark="following the curved walks"))
+    callback(replace(known, remark="following the curved walks"))
 
     def follow(done: float, words: str) -> None:
-        told(replace(known, remark=_share(done, "following the curved walks")))
+        callback(replace(known, remark=_share(done, "following the curved walks")))
 
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=follow)
     possible = walks.verdict.values != Status.OUT_OF_RANGE.label
@@ -121,7 +123,7 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
         known = replace(known, law=that_holds(law, robot))
     except ChilopodError as error:
         known = replace(known, remark=error.problem)
-    told(known)
+    callback(known)
 
 
 def _share(done: float, what: str) -> str:
@@ -168,7 +170,7 @@ class Beside:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Ctrl-C is the page's: a process that is started here does not hear it, not even while it loads."""
+    """Block in which new processes ignore Ctrl-C, which only the page obeys."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -180,7 +182,7 @@ def _deaf() -> Iterator[None]:
 
 
 class _Stale(Exception):
-    """Another question has come."""
+    """Exception that ends the work on a question when another has come."""
 
 
 def _answer(pipe: Connection, engine: str) -> None:

@@ -1,4 +1,4 @@
-"""Wishes of somebody at a page, and the box in which they wait for the thread that owns the walk."""
+"""Wishes of users of the page, and the box in which they wait for the thread that owns the walk."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ import threading
 from collections.abc import Hashable
 from dataclasses import dataclass
 
+from chilopod.errors import ParameterError
+
 LARGEST_SEED = 2**53 - 1
 """Largest whole number that a browser holds exactly."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """Something that is wanted; of several of the same kind only the last counts."""
+    """Base of the wishes; of several of the same kind only the last counts."""
 
     @property
     def kind(self) -> Hashable:
@@ -40,7 +42,7 @@ def Spring(joint: int | None, stiffness: float) -> Set:
 
 
 def Friction(factor: float) -> Set:
-    """Another floor: friction as a factor on that of the robot file."""
+    """Another floor: factor on the friction of the robot file."""
     return Set("friction", factor)
 
 
@@ -56,7 +58,7 @@ def Speed(times: float) -> Set:
 
 @dataclass(frozen=True)
 class Target(Wish):
-    """A place on the floor to go to, m; None to go nowhere in particular."""
+    """Target on the floor, m; None for no target."""
 
     place: tuple[float, float] | None
 
@@ -136,3 +138,9 @@ class Box:
             wishes = list(self._waiting.values())
             self._waiting.clear()
         return wishes
+
+
+def check_port(port: int) -> None:
+    """Refuse a number that is not a port with a ParameterError."""
+    if not 0 <= port < 65536:
+        raise ParameterError("must be a port", field="port", value=port, allowed="1 to 65535, or 0 for any free port")

@@ -1,4 +1,5 @@
-"""How tightly a variant of a robot turns, like with like: at an equal distance from where its own curved walks set in.
+"""Radius of a variant of a robot beside that of the robot, at equal distances from the onset: at an equal distance from
+where its own curved walks set in.
 
 By the square-root law the bend is A sqrt(1/k1 - 1/k*): two robots of equal A that set in at different k* turn alike at
 equal 1/k1 - 1/k*. The ratio of the amplitudes A of two fits would do if the law held, but the bend saturates. So the
@@ -73,7 +74,7 @@ def change(ratio: float, error: float = 0.0) -> str:
 
 
 def _spread(values: Sequence[float]) -> float:
-    """Standard deviation of what is not NaN."""
+    """Standard deviation of the numbers that are not NaN."""
     finite = np.array(values)[np.isfinite(values)]
     return float(finite.std(ddof=1)) if finite.size > 1 else float("nan")
 

@@ -45,7 +45,7 @@ def base_series_data() -> BaseSeries:
 
 
 def walking_speed() -> float:
-    """How fast the robot walked, m/s; the paper prints no speed, but the time at which it was there.
+    """Speed of the robot, m/s; the paper prints no speed, but the time at which it was there.
 
     In task A the target is R = 1.3 m away, psi = 45 deg to the side. The circle to it has the radius R / (2 sin psi)
     and turns by 2 psi on the way, 1.444 m in all. The robot was within 0.15 m of the target after 23 s at the earliest:

@@ -98,8 +98,8 @@ def shares(data: xr.Dataset) -> xr.Dataset:
 
 
 def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
-    """Mask of the trials with an angle and a radius that count: curved ones that have settled (or not, as they say), at
-    springs at which most curve; shape (springs, repeats)."""
+    """Mask of the trials that curve, and have settled if ``settled``, at springs at which most curve; shape (springs,
+    repeats)."""
     most = is_curved(data).mean(axis=1) > 0.5
     return (in_settled_curve(data) if settled else is_curved(data)) & most[:, None]
 
@@ -130,8 +130,8 @@ def onset_with_error(data: xr.Dataset, settled: bool = True) -> tuple[float, flo
 
 
 def radius_at(data: xr.Dataset, spring: float, settled: bool = True) -> tuple[float, float]:
-    """Mean radius of the trials at a spring that curve and have settled (or not, as they say), and its standard error,
-    m; NaN if there are fewer than two."""
+    """Mean radius of the trials at a spring that curve and have settled (all without ``settled``), and its standard
+    error, m; NaN if there are fewer than two."""
     at = data.sel(spring=spring)
     radii = at.axis_radius.values[in_settled_curve(at) if settled else is_curved(at)]
     return mean_and_error(radii) if len(radii) > 1 else (float("nan"), float("nan"))

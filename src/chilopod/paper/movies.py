@@ -1,4 +1,4 @@
-"""The walks of the paper's two movies: what the springs do, and three attempts at a turn."""
+"""The walks of the paper's two movies: effect of the springs, and three attempts at a turn."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _BEND = tuple(float(angle) for angle in np.deg2rad([20.0, 10.0, 14.0, 12.0, 4.0]
 
 
 def movies(context: Context, progress: Progress, best: float) -> list[Movie]:
-    """Walk what is filmed of the robot of the planar model.
+    """Walk the films of the planar robot.
 
     The walks of movie 1, one straight, one that curves a little, one that curves a lot, start bent in the shape of the
     critical mode, for from straight it would take them minutes to bend. Movie 2 shows the best first spring for task A

@@ -1,4 +1,4 @@
-"""Printed numbers of the paper, and beside each what is asked of one that is to agree with it.
+"""Printed numbers of the paper, and the condition on a number that agrees with each.
 
 S. Aoi et al., "Advanced turning maneuver of a many-legged robot using pitchfork bifurcation", IEEE Transactions on
 Robotics, 2022: of its planar model, and of its robot. Springs are in N*mm/deg, as it has them.
@@ -17,22 +17,22 @@ from chilopod.steering import Outcome, Target
 
 @dataclass(frozen=True)
 class Said:
-    """Something that is printed: the statement, and what counts as agreement, in words."""
+    """A printed statement, and the condition of agreement, in words."""
 
     words: str
-    asked: str
+    condition: str
 
 
 @dataclass(frozen=True)
 class Band(Said):
-    """Something that is printed and that a number agrees with if it lies between two bounds."""
+    """A printed statement with which a number agrees if it lies between two bounds."""
 
     low: float
     high: float
 
     @property
     def middle(self) -> float:
-        """Between the bounds."""
+        """Middle between the bounds."""
         return 0.5 * (self.low + self.high)
 
     def answer(self, value: float, error: float = 0.0) -> Answer:
@@ -97,8 +97,8 @@ def _spring(value: float, tolerance: float = ONSETS) -> Number:
 def _around(k_hat: float) -> Band:
     """Around it is between the paper's own neighbours of 21."""
     low, high = 17.0 / 21.0 * k_hat, 28.0 / 21.0 * k_hat
-    asked = f"{low:.3g} to {high:.3g} {PAPER_UNIT}, with all that are no worse"
-    return Band(f"around k1 = {k_hat:g} {PAPER_UNIT}", asked, low, high)
+    condition = f"{low:.3g} to {high:.3g} {PAPER_UNIT}, with all that are no worse"
+    return Band(f"around k1 = {k_hat:g} {PAPER_UNIT}", condition, low, high)
 
 
 ANALYSIS = "section Verification by Floquet analysis"
@@ -109,7 +109,7 @@ MODE = tuple(Number(value, "", 0.005) for value in (0.64, 0.36, 0.48, 0.46, 0.16
 """Joint components of the planar model's critical mode, with two decimals."""
 
 MODE_ORDER = tuple(sorted(range(1, 6), key=lambda joint: -MODE[joint - 1].value))
-"""Joints by how far they bend in it, the most first."""
+"""Joints in order of their bend in it, largest first."""
 
 KIND, UNIFORM_KIND = "pitchfork", "Neimark-Sacker"
 """Kinds of bifurcation of the planar model: with k1 alone, and with all springs alike."""

@@ -35,7 +35,7 @@ REGISTRY: dict[str, str] = {
     "robot-courses": "courses.sections.ROBOT_COURSES",
     "courses-movie": "courses.sections.COURSES_FILM",
 }
-"""Module and constant of each section, by its name: the paper's own experiments, then what goes beyond them."""
+"""Module and constant of each section, by its name: the paper's own experiments, then the studies beyond them."""
 
 
 def load_sections() -> tuple[Section[Any], ...]:
@@ -46,20 +46,21 @@ def load_sections() -> tuple[Section[Any], ...]:
 
 def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool = False) -> list[Section[Any]]:
     """The sections asked for, by default all but those that are computed on request, in the order they are computed; a
-    quick report leaves out some that are not named, and one of the paper what goes beyond its own experiments.
+    quick report leaves out some that are not named, and a report of the paper leaves out studies beyond its
+    experiments.
 
-    A ParameterError if one of them does not exist, or goes beyond though only the paper's are asked for.
+    Raises ParameterError if one of them does not exist, or goes beyond the paper in a report of the paper.
     """
     sections = {section.name: section for section in load_sections()}
     if only is None:
         found = [each for each in sections.values() if not each.on_request and not (quick and each.full)]
         return [section for section in found if not (paper and section.beyond)]
-    asked = list(only)
-    for name in asked:
+    names = list(only)
+    for name in names:
         if name not in sections:
             near, allowed = nearest_name(name, sections), ", ".join(sections)
-            raise ParameterError("no such section", field="only", value=name, allowed=allowed, nearest=near)
-    found = [section for name, section in sections.items() if name in asked]
+            raise ParameterError("must be a section", field="only", value=name, allowed=allowed, nearest=near)
+    found = [section for name, section in sections.items() if name in names]
     for section in found:
         if paper and section.beyond:
             raise ParameterError("goes beyond the paper's own experiments", field="only", value=section.name)

@@ -65,14 +65,15 @@ def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Dif
 
 
 def spread_difference(one: ArrayLike, other: ArrayLike) -> Difference:
-    """How much farther trials scatter than others: the difference of the mean distances from the median (the test of
-    Brown and Forsythe)."""
+    """Ratio of the scatter of trials to that of others: the difference of the mean distances from the median (the test
+    of Brown and Forsythe)."""
     distances = [np.abs(each - np.nanmedian(each)) for each in (np.asarray(one), np.asarray(other))]
     return difference(*distances)
 
 
 def mean_and_error(values: ArrayLike) -> tuple[float, float]:
-    """Mean and standard error of what is not NaN; the error is NaN for fewer than two values, the mean for none."""
+    """Mean and standard error of the numbers that are not NaN; the error is NaN for fewer than two values, the mean for
+    none."""
     finite = np.asarray(values, dtype=np.float64)
     finite = finite[np.isfinite(finite)]
     mean = float(finite.mean()) if finite.size else float("nan")

@@ -1,4 +1,4 @@
-"""Sections of the report, what they find, and how they are computed."""
+"""Sections of the report, their results, and their computation."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Section(Generic[T]):
     full: bool = False  # left out of a quick report unless it is asked for by name
 
     def figures(self, found: Found) -> list[Panel]:
-        """Figures of what was found."""
+        """Figures of the results."""
         drawn = self.panels(found[self], *found.of(self.beside))
         return [drawn] if isinstance(drawn, Panel) else list(drawn)
 
@@ -133,7 +133,7 @@ class Found:
         return {chapter: rows for chapter, rows in found.items() if rows}
 
     def robot_rows(self) -> list[RobotRow]:
-        """The table robot | twin | planar model."""
+        """Rows of the table robot | twin | planar model."""
         return robot_rows((row for rows in self.rows.values() for row in rows), ORDER)
 
 
@@ -141,12 +141,12 @@ def reproduce(
     sections: Sequence[Section[Any]],
     context: Context | None = None,
     progress: SectionProgress = lambda what, done, words: None,
-    told: Callable[[Found, Section[Any]], None] = lambda found, section: None,
+    callback: Callable[[Found, Section[Any]], None] = lambda found, section: None,
 ) -> Found:
     """Compute sections of the report; one that fails does not keep the others from being computed.
 
     ``sections`` are those of :func:`chilopod.paper.registry.chosen`, the context by default that of the paper's robots.
-    ``progress`` is called as the work goes on, ``told`` after every section with all that is found by then, and the
+    ``progress`` is called as the work goes on, ``callback`` after every section with all that is found by then, and the
     section. An OutputError is raised if trials cannot be kept.
     """
     found = Found(context or Context())
@@ -165,5 +165,5 @@ def reproduce(
             found.failures[section] = error
         found.seconds[section] = time.perf_counter() - started
         progress(section.sentence, 1.0, "failed" if section in found.failures else "done")
-        told(found, section)
+        callback(found, section)
     return found

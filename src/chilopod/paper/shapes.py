@@ -1,4 +1,4 @@
-"""Shapes that figures of the paper have in common: trials over the compliance 1/k1, beside what the paper prints."""
+"""Shapes that figures of the paper have in common: trials over the compliance 1/k1, beside the paper's numbers."""
 
 from __future__ import annotations
 
@@ -118,8 +118,8 @@ def draw_joints(axes: Axes, data: xr.Dataset, here: NDArray[np.bool_] | bool, al
     finish(axes, legend="upper left", ylabel="mean absolute angle (deg)")
 
 
-def draw_asked(axes: Axes, asked: Sequence[tuple[str, float, Band]]) -> None:
-    """Band of what agrees with the paper's robot, a row for each printed number, under its name."""
+def draw_bands(axes: Axes, asked: Sequence[tuple[str, float, Band]]) -> None:
+    """Band that agrees with the paper's robot, a row for each printed number, under its name."""
     for row, (_, paper, band) in enumerate(asked):
         axes.plot([band.low, band.high], [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")
         axes.plot(paper, row, "D", color=style.ORANGE, markersize=8, label=None if row else "robot, paper")

@@ -1,4 +1,4 @@
-"""Statements of the paper on its robot, and what is asked of the twin besides, in the order of the table."""
+"""Statements of the paper on its robot, and further conditions on the twin, in the order of the table."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def _number(quantity: str, number: Number, kind: Kind) -> Statement[Band]:
     return Statement(quantity, number.band, kind)
 
 
-def _said(quantity: str, words: str, asked: str, kind: Kind = _PREDICTED) -> Statement[Said]:
-    return Statement(quantity, Said(words, asked), kind)
+def _said(quantity: str, words: str, condition: str, kind: Kind = _PREDICTED) -> Statement[Said]:
+    return Statement(quantity, Said(words, condition), kind)
 
 
 def _duration(what: str) -> Statement[Said]:

@@ -1,7 +1,7 @@
 """Lines of the two tables: the paper's planar model beside ours, and its robot beside the twin and the planar model.
 
-What the paper says of its robot is a :class:`Statement`. What the twin makes of it and what the planar model does are
-found by different sections, and put into one line by :func:`robot_rows`.
+A statement of the paper on its robot is a :class:`Statement`. Different sections find the results of the twin and of
+the planar model, and :func:`robot_rows` puts them into one line.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Statement(Generic[S]):
-    """Something that the paper says of its robot, or that is asked of the twin besides: subject, statement and
-    condition on the twin, on a number if it is a :class:`Band`, and whether the twin was fitted to it."""
+    """Statement of the paper on its robot, or a further condition on the twin: subject, statement and condition on the
+    twin, on a number if it is a :class:`Band`, and whether the twin was fitted to it."""
 
     quantity: str
     said: S
@@ -105,7 +105,7 @@ class Statement(Generic[S]):
 
 @dataclass(frozen=True)
 class OfTwin:
-    """Result of the twin, its verdict, and the reading of what the paper leaves open, if there are several."""
+    """Result of the twin, its verdict, and the reading of the paper, if it allows several."""
 
     statement: Statement[Said]
     result: Result
@@ -115,7 +115,7 @@ class OfTwin:
 
 @dataclass(frozen=True)
 class OfPlanar:
-    """Result of the planar model where the paper speaks of its robot; nobody says that it should do the same."""
+    """Result of the planar model beside a statement on the robot; it is not judged."""
 
     statement: Statement[Said]
     result: Result
@@ -162,8 +162,8 @@ def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Stateme
         twins = [row for row in rows if isinstance(row, OfTwin) and row.statement == each]
         for twin in twins:
             quantity = f"{each.quantity} ({twin.reading})" if twin.reading else each.quantity
-            lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.asked))
+            lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.condition))
         if planar and not twins:
             none = Verdict.NOT_COMPUTED
-            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.asked))
+            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.condition))
     return lines

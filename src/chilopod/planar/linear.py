@@ -312,8 +312,6 @@ def propagate(
     """
     n, intervals = len(matrix), widths.size
     if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):
-        raise ParameterError(
-            "has the wrong shape", field="upper", value=upper.shape, allowed="the shapes that propagate() documents"
-        )
+        raise ParameterError("must have the shapes of propagate()", field="upper", value=upper.shape)
     error, orders = _propagate_all(widths, upper, decay, frequency, clock, matrix)
     return float(error), int(orders)

@@ -279,12 +279,9 @@ class PlanarModel(ReadOnlyArrays):
         decay = decay[interval]
         steps = linear.steps(widths, decay, frequency)
         if not steps < _MOST_STEPS or not steps * self.dimension**3 < _MOST_WORK:
-            raise AnalysisError(
-                f"motion is too fast to follow from {t0:g} s to {t1:g} s: about {steps:.0e} steps of {self.dimension} "
-                "states",
-                field="springs, ground",
-                allowed="less stiffness, damping or friction, or more mass, or fewer modules",
-            )
+            walked = f"from {t0:g} s to {t1:g} s: about {steps:.0e} steps of {self.dimension} states"
+            allowed = "less stiffness, damping or friction, or more mass, or fewer modules"
+            raise AnalysisError(f"motion is too fast to follow {walked}", field="springs, ground", allowed=allowed)
         return widths, upper, decay, frequency
 
     def _clock(self, t0: float, t1: float) -> float:

@@ -14,9 +14,9 @@ from chilopod.engine.arguments import as_marks, as_robot, as_robots, check_time,
 from chilopod.engine.batch import BatchWalk, Beginning, begin, resumed
 from chilopod.errors import ParameterError
 from chilopod.planar import stretch
-from chilopod.planar.foreseen import check_steps
 from chilopod.planar.model import PlanarModel
 from chilopod.planar.record import foot_forces, planar_record
+from chilopod.planar.step_count import check_steps
 from chilopod.planar.timeline import Timeline
 from chilopod.record import Recording, Samples, bearing_and_distance, check_size, in_range
 from chilopod.robot import Robot
@@ -30,9 +30,9 @@ traits = Traits(
     name="planar",
     sentence="the paper's planar model",
     exact=True,
-    a_core=16,
-    a_round=48,
-    haste=1.6,
+    robots_per_core=16,
+    walks_per_round=48,
+    duration_ratio=1.6,
 )
 
 _STATUS = {
@@ -102,12 +102,7 @@ def start(
     tolerance, expected = in_range("tolerance", tolerance, 1e-2), check_wishes(record, expected)
     given = as_robots(robots)
     if record is not None and record.poses:
-        raise ParameterError(
-            "must be False: the planar model has no poses in space",
-            field="poses",
-            value=True,
-            allowed="False, or the engine twin",
-        )
+        raise ParameterError("must be False: only the engine twin records poses in space", field="poses", value=True)
     if any(common(robot) != common(given[0]) for robot in given[1:]):
         raise ParameterError("must have the same gait and number of modules", field="robots")
     standing_still = initial_states(given[0])
@@ -244,7 +239,7 @@ class PlanarWalk(BatchWalk):
         data = planar_record(self._models[0], times, states, leg_yaw)
         self._actuators.add_to(data)
         if self._record and self._record.forces:
-            acting = self._actuators.leg_yaw_told(times)
+            acting = self._actuators.leg_yaw_commanded(times)
             data["foot_force"] = foot_forces(self._models, times, states, acting, self._friction)
         self._finish(data, times)
         data.attrs["tolerance"] = self._tolerance

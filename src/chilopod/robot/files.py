@@ -54,12 +54,7 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     valid TOML.
     """
     if not isinstance(robot, str | Path):
-        raise RobotFileError(
-            "must be a preset or the path of a robot file",
-            field="robot",
-            value=robot,
-            allowed="a preset or the path of a file",
-        )
+        raise RobotFileError("must be a preset or the path of a robot file", field="robot", value=robot)
     source, path = str(robot), Path(robot)
     names = presets()
     if source in names:

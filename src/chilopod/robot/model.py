@@ -97,8 +97,8 @@ class Robot(Description):
         try:
             return cls(**table)
         except ChilopodError as error:
-            told = {name: getattr(error, name) for name in ("field", "value", "allowed", "nearest")}
-            raise RobotFileError(error.problem, **told, source=source) from None
+            details = {name: getattr(error, name) for name in ("field", "value", "allowed", "nearest")}
+            raise RobotFileError(error.problem, **details, source=source) from None
         except RecursionError:
             raise RobotFileError("is nested too deeply", source=source) from None
 
@@ -195,9 +195,7 @@ class Robot(Description):
         if not place.quantity.each:
             return float(value)
         if place.index is None and any(item != value[0] for item in value):
-            raise ParameterError(
-                "must be a single value, but its values differ", field=path, allowed=f"a single one, such as {path}[0]"
-            )
+            raise ParameterError(f"must be one spring, such as {path}[0], because they differ", field=path)
         return float(value[place.index or 0])
 
     def unit_of(self, path: str) -> str:
@@ -251,8 +249,8 @@ class Robot(Description):
 
     def with_twin_of(self, other: Robot) -> Self:
         """Return this robot with the [twin] of another, and the provenance of its numbers."""
-        told = {path: text for path, text in other.provenance.items() if path.startswith("twin.")}
-        return self.with_(twin=other.twin, provenance={**self.provenance, **told})
+        texts = {path: text for path, text in other.provenance.items() if path.startswith("twin.")}
+        return self.with_(twin=other.twin, provenance={**self.provenance, **texts})
 
     def provenance_of(self, path: str) -> str | None:
         """Return the provenance of a parameter; a spring falls back on that of all springs."""
@@ -337,8 +335,8 @@ class Robot(Description):
             changes["springs"] = self.springs.model_copy(
                 update={key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
             )
-        told = {name: text for name, text in self.provenance.items() if spring_index(name, path) < joints}
-        changes["provenance"] = Table({**told, path: _OVERRIDDEN})
+        texts = {name: text for name, text in self.provenance.items() if spring_index(name, path) < joints}
+        changes["provenance"] = Table({**texts, path: _OVERRIDDEN})
         return self.model_copy(update=changes)
 
 

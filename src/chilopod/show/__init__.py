@@ -10,15 +10,15 @@ logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 if TYPE_CHECKING:
     from chilopod.show.files import files_of, write_branch, write_undulation
-    from chilopod.show.scene.played import Replay, replay
-    from chilopod.show.walked import files_of_walks, write_walks
+    from chilopod.show.scene.replay import Replay, replay
+    from chilopod.show.walk_files import files_of_walks, write_walks
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
             "files": ("files_of", "write_branch", "write_undulation"),
-            "scene.played": ("Replay", "replay"),
-            "walked": ("files_of_walks", "write_walks"),
+            "scene.replay": ("Replay", "replay"),
+            "walk_files": ("files_of_walks", "write_walks"),
         },
     )
 

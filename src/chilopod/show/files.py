@@ -15,13 +15,13 @@ from chilopod.show.panel import Panel
 
 
 def files_of(name: str, folder: str | Path) -> list[Path]:
-    """Files written of the figure of that name alone."""
+    """Files of the figure with this name."""
     return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
 
 
 def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write a branch from :mod:`chilopod.analysis.branch` as ``branch`` with ``.png``, ``.svg``, ``.csv`` (what a
-    reader wants) and ``.nc`` (all that it goes on from); files and errors as of :func:`chilopod.output.write_all`."""
+    """Write a branch from :mod:`chilopod.analysis.branch` as ``branch`` with ``.png``, ``.svg``, ``.csv`` (for readers)
+    and ``.nc`` (to resume it); files and errors as of :func:`chilopod.output.write_all`."""
     return _write_alone(branch.panel(data), folder, replace, branch.table(data), sealed(netcdf(data)))
 
 

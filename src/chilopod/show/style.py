@@ -1,4 +1,4 @@
-"""One look for all figures: colours, type, sizes, and how a figure becomes bytes."""
+"""One look for all figures: colours, type, sizes, and the encoding of figures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GREY: Final = "#767676"
 PALE: Final = "#e8e8e8"
 
 CURVES: Final = (BLUE, GREEN, PURPLE, ORANGE, SKY, GREY)
-"""For curves that are only to be told apart; :data:`VERMILLION` is kept for what loses stability."""
+"""For curves that are only to be told apart; :data:`VERMILLION` is kept for the loss of stability."""
 
 SCENE: Final = {
     "ink": BLACK,
@@ -36,7 +36,7 @@ SCENE: Final = {
     "path": ORANGE,
     "target": GREEN,
 }
-"""For what films and replays show."""
+"""Colours of films and replays."""
 
 SMALL: Final = 9.0
 """Size of the smallest text, pt."""
@@ -122,7 +122,7 @@ def _saved(drawn: Figure, kind: str, metadata: dict[str, None], dpi: float = 100
 
 
 def bare(axes: Axes) -> None:
-    """Turn axes into a drawing: equal scales, no frame, on the left of the space there is, under its title."""
+    """Turn axes into a drawing: equal scales, no frame, at the left of its space, below its title."""
     axes.set_aspect("equal", anchor="W")
     axes.axis("off")
 

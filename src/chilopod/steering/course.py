@@ -61,10 +61,7 @@ class Goal:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
             allowed = f"{near}at most {FARTHEST:g} m"
             raise ParameterError(
-                "must be a distance that a robot can walk",
-                field="target distance",
-                value=f"{distance:g} m",
-                allowed=allowed,
+                "must be a distance to walk", field="target distance", value=f"{distance:g} m", allowed=allowed
             )
 
     @classmethod
@@ -150,13 +147,13 @@ class Course:
             raise ParameterError("must be a radius", field="tightest", value=f"{self.tightest:g} m", allowed=allowed)
         if not 1 <= len(self.goals) <= MOST_GOALS:
             raise _wrong_count(len(self.goals))
-        before, where = Goal(0.0, 0.0, relative=False), "where the robot starts"
+        before, where = Goal(0.0, 0.0, relative=False), "the start"
         for number, goal in enumerate(self.goals, 1):
             apart = math.hypot(goal.x - before.x, goal.y - before.y)
             if not (goal.relative or before.relative or apart > ARRIVAL_RADIUS):
-                allowed = f"more than {ARRIVAL_RADIUS:g} m from it"
-                raise ParameterError(f"lies {where}", field=f"target {number}", value=str(goal), allowed=allowed)
-            before, where = goal, f"where target {number} does"
+                problem, allowed = f"must lie apart from {where}", f"more than {ARRIVAL_RADIUS:g} m from it"
+                raise ParameterError(problem, field=f"target {number}", value=str(goal), allowed=allowed)
+            before, where = goal, f"target {number}"
 
     @property
     def duration(self) -> float:

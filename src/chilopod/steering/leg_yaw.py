@@ -43,9 +43,7 @@ class LegYawController:
             if not 0.0 <= value < 0.5 * math.pi:
                 raise ParameterError("is out of range", field=name, value=value, allowed="0 to a right angle, rad")
         if not 0.0 <= self.start <= self.end <= 1.0:
-            raise ParameterError(
-                "must be fractions of the swing in ascending order", field="start, end", value=(self.start, self.end)
-            )
+            raise ParameterError("must rise from 0 to 1", field="start, end", value=(self.start, self.end))
 
     def events(self, gait: Gait) -> Sequence[Event]:
         """``start`` of the swings of the left and the right leg."""

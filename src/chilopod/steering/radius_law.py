@@ -90,12 +90,8 @@ class RadiusLaw(ReadOnlyArrays):
         if not value >= self.values[0]:
             lowest = units.format(float(self.values[0]), self.unit, digits=4)
             shown = units.format(value, self.unit, digits=4)
-            raise ParameterError(
-                "must be at least the smallest value of the radius law",
-                field="value",
-                value=shown,
-                allowed=f"{lowest} and more",
-            )
+            problem = "must be at least the smallest value of the radius law"
+            raise ParameterError(problem, field="value", value=shown, allowed=f"{lowest} and more")
         return float(1.0 / np.sqrt(self._squared_curvature(value)))
 
     def value(self, radius: float) -> float:
@@ -109,12 +105,8 @@ class RadiusLaw(ReadOnlyArrays):
         if not radius >= self.tightest:
             softest = units.format(float(self.values[0]), self.unit, digits=4)
             allowed = f"{self.tightest:.4g} m (at {softest}) and more"
-            raise AnalysisError(
-                "must be at least the tightest radius of the law",
-                field="radius",
-                value=f"{radius:.4g} m",
-                allowed=allowed,
-            )
+            problem = "must be at least the tightest radius of the law"
+            raise AnalysisError(problem, field="radius", value=f"{radius:.4g} m", allowed=allowed)
         if np.isinf(radius):
             return self.pitchfork
         wanted = 1.0 / radius**2

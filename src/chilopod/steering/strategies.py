@@ -100,9 +100,7 @@ class Strategy:
         if controller is not None:
             return Prepared(walker, controller, remarks)
         if self.needs_law and law is None:
-            raise ParameterError(
-                f"must be the radius law of the robot for strategy {self.name}", field="law", value=None
-            )
+            raise ParameterError(f"must be the radius law of the robot for strategy {self.name}", field="law")
         own, more = self.controller(walker, law)
         return Prepared(walker, own, (*remarks, *more))
 
@@ -173,6 +171,13 @@ ON_THE_WAY: Mapping[str, Strategy] = {each.name: each for each in ON_COURSES.val
 """Strategies for courses without a spring to choose before the walk, by name."""
 
 
+def check_strategy(strategy: object) -> None:
+    """Refuse anything but a strategy with a ParameterError."""
+    if not isinstance(strategy, Strategy):
+        allowed = 'a Strategy, such as chilopod.steering.strategy_named("leg-yaw")'
+        raise ParameterError("must be a strategy", field="strategy", value=strategy, allowed=allowed)
+
+
 def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
     """Return a strategy of :data:`STRATEGIES`, or of other strategies, by its name.
 
@@ -183,7 +188,5 @@ def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Str
     """
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
-        raise ParameterError(
-            "must be one of the strategies", field="strategy", value=name, allowed=allowed, nearest=nearest
-        )
+        raise ParameterError("must be a strategy", field="strategy", value=name, allowed=allowed, nearest=nearest)
     return among[name]

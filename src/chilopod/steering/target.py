@@ -42,16 +42,12 @@ class Target:
 
     def __post_init__(self) -> None:
         if not abs(self.bearing) <= 0.5 * math.pi:
-            value, allowed = f"{math.degrees(self.bearing):g} deg", "-90 to 90 deg"
+            value, allowed = f"{math.degrees(self.bearing):g} deg", "-90 to 90 deg; a number without a unit is in rad"
             raise ParameterError("must lie in front of the robot", field="target bearing", value=value, allowed=allowed)
         if not ARRIVAL_RADIUS < self.distance <= FARTHEST:
             allowed = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, at most {FARTHEST:g} m"
-            raise ParameterError(
-                "must be a distance that a robot can walk",
-                field="target distance",
-                value=f"{self.distance:g} m",
-                allowed=allowed,
-            )
+            value = f"{self.distance:g} m"
+            raise ParameterError("must be a distance to walk", field="target distance", value=value, allowed=allowed)
 
     @classmethod
     def parse(cls, text: str) -> Target:

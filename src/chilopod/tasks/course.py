@@ -12,11 +12,12 @@ import numpy as np
 import xarray as xr
 
 from chilopod.engine import Controller, engine_named
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Short
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Course, RadiusLaw, Strategy, Verdict, random_course
+from chilopod.steering.strategies import check_strategy
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import Trial, finite
@@ -59,6 +60,9 @@ class Driver(Short):
     def trial(self, course: Course, seed: int = 0, *, poses: bool = False, brief: bool = False) -> Trial:
         """Trial of a course, with the disturbance of all studies; the robot's tightest circle replaces that of the
         course if it is known."""
+        if not isinstance(course, Course):
+            allowed = 'a Course, such as chilopod.steering.course_named("slalom", 40.0)'
+            raise ParameterError("must be a course", field="course", value=course, allowed=allowed)
         goals = course if self.law is None else replace(course, tightest=self.law.tightest)
         conditions = self.robot, course.duration, seed, (), goals, self.controller
         return Trial(*conditions, rate=_RATE, engine=self.engine, poses=poses, brief=brief)
@@ -111,7 +115,7 @@ class Driven(Pathed):
         """Robot, engine and strategy in words."""
         return f"{self.who}, {self.strategy.name}: {self.strategy.sentence}"
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         walks, goals = self._found()["walks"], len(self.course.goals)
         above = [f"{goals} target{'s' * (goals > 1)}, {self.course.patience:g} s for each", *self.driver.remarks]
         missed = {each["verdict"]: each["sentence"] for walk in walks for each in walk["targets"]}
@@ -221,6 +225,7 @@ def driver(
         If the strategy needs a spring and has none, or has one and needs none; if the spring has no actuator; if the
         strategy needs the pitchfork and the robot has none.
     """
+    check_strategy(strategy)
     strategy.fitted(robot, spring)  # refuses wrong arguments before the slow law
     unknown: tuple[str, ...] = ()
     try:
@@ -245,7 +250,7 @@ def drive(driver: Driver, course: Course, **options: Unpack[RunOptions]) -> Driv
 
 def patience_of(engine: str) -> float:
     """Patience for one target, s: 40 s in the planar model, more than a minute where feet slip."""
-    return _PATIENCE * engine_named(engine).traits.haste
+    return _PATIENCE * engine_named(engine).traits.duration_ratio
 
 
 def random_courses(seeds: Sequence[int], engine: str = "planar") -> list[Course]:

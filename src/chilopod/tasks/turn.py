@@ -17,6 +17,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.progress import part, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate
+from chilopod.steering.strategies import check_strategy
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import NONE, Trial, check_fits, finite, run, straight, together
@@ -87,7 +88,7 @@ class Turn(Pathed):
         """Robot, engine, target and strategy in words."""
         return f"{self.who}: turn to {self.target} by {self.strategy.name}"
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         found = self.criteria
         above = [
             f"{self.strategy.name}: {self.strategy.sentence}",
@@ -139,7 +140,7 @@ def turn(
         to grow. Without leg yaw an undisturbed robot does not bend, and ``auto`` means ``law``.
     duration
         Duration, s; by default the time for the circle at the speed of the straight walk without slip, multiplied by
-        the engine's ``haste``, see :class:`chilopod.engine.Traits`; at least 5 s.
+        the engine's ``duration_ratio``, see :class:`chilopod.engine.Traits`; at least 5 s.
     engine, controller
         As for :class:`chilopod.trials.Trial`; the controller replaces that of the strategy.
     **options
@@ -150,15 +151,14 @@ def turn(
     AnalysisError
         If no spring turns tightly enough.
     """
+    check_strategy(strategy)
     if spring not in ("auto", "law") and isinstance(spring, str):
-        raise ParameterError(
-            "must be a spring setting", field="spring", value=spring, allowed="auto, law, or a stiffness"
-        )
+        raise ParameterError("must be a spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
     if strategy.springs is None and spring != "auto":
         problem = f"must be auto: strategy {strategy.name} does not set the springs"
         raise ParameterError(problem, field="spring", value=spring, allowed="auto")
     traits = engine_named(engine).traits
-    time = duration if duration is not None else _time_for(robot, target, traits.haste)
+    time = duration if duration is not None else _time_for(robot, target, traits.duration_ratio)
     trial = Trial(robot, time, target=target, controller=controller, engine=engine, poses=traits.poses)
     check_fits(trial.repeated(options.get("seed"), options.get("repeats", 1)))
     folder, progress = options.get("folder"), options.get("progress", silent)
@@ -196,7 +196,7 @@ def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float],
     """Spring of a strategy that comes nearest to the target, by undisturbed trials on successively finer grids,
     N*m/rad."""
     low, high = between
-    tried = engine_named(trial.engine).traits.a_round
+    tried = engine_named(trial.engine).traits.walks_per_round
     trial = replace(trial, disturbance=NONE, rate=20.0, poses=False)
     values = np.geomspace(low, high, tried)
     best = 0
@@ -210,7 +210,7 @@ def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float],
     return float(values[best])
 
 
-def _time_for(robot: Robot, target: Target, haste: float) -> float:
+def _time_for(robot: Robot, target: Target, duration_ratio: float) -> float:
     angle = abs(target.bearing)
     arc = target.distance * (angle / np.sin(angle) if angle > 0.0 else 1.0)
-    return float(max(_LEAST, haste * arc / robot.gait.speed))
+    return float(max(_LEAST, duration_ratio * arc / robot.gait.speed))

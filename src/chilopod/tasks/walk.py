@@ -40,7 +40,7 @@ class Ends(Runs):
             "walks": [{"seed": trial.seed, **end.as_json()} for trial, end in ends],
         }
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         rows: list[Sequence[str]] = [
             ("seed", "x (m)", "y (m)", "radius (m)", "joint angles, mean of the last 5 s (deg)")
         ]
@@ -100,10 +100,10 @@ def ends(
     trials: Sequence[Trial],
     folder: str | Path | None = None,
     progress: Progress = silent,
-    told: Callable[[int, xr.Dataset], None] = lambda index, record: None,
+    callback: Callable[[int, xr.Dataset], None] = lambda index, record: None,
 ) -> Ends:
     """Simulate walks and keep only their summaries, so that memory holds one batch of records, however many walks there
-    are. ``told`` is called with the number of a walk and its record as soon as it is done; for the rest see
+    are. ``callback`` is called with the number of a walk and its record as soon as it is done; for the rest see
     :meth:`chilopod.trials.Trial.repeated` and :class:`chilopod.tasks.RunOptions`."""
     trials = tuple(as_now(trials))
     number = {trial.file_name: index for index, trial in enumerate(trials)}
@@ -113,5 +113,5 @@ def ends(
         index = number[trial.file_name]
         (found[index],) = summaries(trial.robot, record)
         unbent = unbent and straight(record)
-        told(index, record)
+        callback(index, record)
     return Ends(trials, [found[index] for index in range(len(trials))], unbent)

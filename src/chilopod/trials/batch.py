@@ -13,9 +13,9 @@ from chilopod.cores import cores
 from chilopod.engine import Walk, engine_named, event_times, steer
 from chilopod.errors import AnalysisError
 from chilopod.steering import CourseReferee, Target, of_course
-from chilopod.trials.asked import check_asked, check_finite
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
 from chilopod.trials.disturbance import Drawn, conditions, draw
+from chilopod.trials.record_check import check_finite, check_record
 from chilopod.trials.trial import Trial
 
 NOT_KEPT = "not kept"
@@ -41,8 +41,8 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
         groups.setdefault(alike, []).append(trial)
     split = []
     for group in groups.values():
-        a_core = engine_named(group[0].engine).traits.a_core
-        size = max(1, min(a_core * (on_cores or cores()), int(_MOST_BYTES / _bytes_of(group[0]))))
+        robots_per_core = engine_named(group[0].engine).traits.robots_per_core
+        size = max(1, min(robots_per_core * (on_cores or cores()), int(_MOST_BYTES / _bytes_of(group[0]))))
         split += [group[i : i + size] for i in range(0, len(group), size)]
     return split
 
@@ -59,7 +59,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
         raise AnalysisError("must not change its own fields while it steers: they name the trial", field=name)
     if not doubts and _is_own(first) and first.as_now().code != first.code:
         doubts = _KNOWN[_who(first)] = _CHANGES
-    data = check_asked(walk.to_dataset(), walk, trials, drawn)
+    data = check_record(walk.to_dataset(), walk, trials, drawn)
     if referee is not None:
         referee.add_to(data, walk)
     records = _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)

@@ -45,12 +45,9 @@ def plain(value: object, field: str) -> Any:
             "class": path_of(kind),
             "fields": {name: plain(getattr(value, name), f"{field}.{name}") for name in _counted(value)},
         }
-    raise ParameterError(
-        "must be plain data, because its value names the trial",
-        field=field,
-        value=kind.__name__,
-        allowed="numbers, text, None, enums, arrays, and tuples or frozen dataclasses of these",
-    )
+    problem = "must be plain data, because its value names the trial"
+    allowed = "numbers, text, None, enums, arrays, and tuples or frozen dataclasses of these"
+    raise ParameterError(problem, field=field, value=kind.__name__, allowed=allowed)
 
 
 def code_of(value: object) -> tuple[str, str]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
 
 _SECONDS = 2.5  # of work in a batch, about
-_USUAL = 10.0  # s of a walk of which a core walks the engine's ``a_core``, until measured
+_USUAL = 10.0  # s of a walk of which a core walks the engine's ``robots_per_core``, until measured
 _LANES = 8  # robots that a core walks at once in the planar model
 
 
@@ -53,7 +53,9 @@ class Pace:
         done = 0
         while done < len(batch):
             first = batch[done]
-            speed = self._speeds.get(first.engine, engine_named(first.engine).traits.a_core * _USUAL / _SECONDS)
+            speed = self._speeds.get(
+                first.engine, engine_named(first.engine).traits.robots_per_core * _USUAL / _SECONDS
+            )
             most = int(threads * speed * _SECONDS / first.duration)
             unit = threads * _LANES if most >= threads * _LANES else threads
             size = max(threads, most // unit * unit)
@@ -61,7 +63,7 @@ class Pace:
             done += size
 
     def took(self, batch: Sequence[Trial], threads: int, seconds: float) -> None:
-        """Learn how long a batch took, s."""
+        """Record the time that a batch took, s."""
         walks = sum(trial.duration for trial in batch) / min(threads, len(batch))
         self._speeds[batch[0].engine] = walks / max(seconds, 1e-9)
 

@@ -41,14 +41,14 @@ class Contents(NamedTuple):
 
 class Kept(NamedTuple):
     """A kept trial from the header of its file: path and size of the file (bytes), name of the robot, and
-    :attr:`chilopod.trials.Trial.text`. It is ``found`` if this version of chilopod and of the engine would use the
+    :attr:`chilopod.trials.Trial.text`. It is ``current`` if this version of chilopod and of the engine would use the
     file; the version of a user's engine is not checked."""
 
     path: Path
     size: int
     robot: str
-    told: dict[str, Any]
-    found: bool
+    settings: dict[str, Any]
+    current: bool
 
 
 def contents(folder: Path) -> Contents:
@@ -94,7 +94,7 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
     else:
         left += [(path, "a process is walking here") for path in found.unfinished]
     if old:
-        remove += [each.path for each in kept(found.trials)[0] if not each.found and not each.path.is_symlink()]
+        remove += [each.path for each in kept(found.trials)[0] if not each.current and not each.path.is_symlink()]
     for path in () if dry else remove:
         try:
             path.unlink(missing_ok=True)
@@ -107,14 +107,16 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
 class Group:
     """Trials of robots of one name that differ only in the robots' numbers, their seeds, and the targets of a course:
     shared settings, number of robots, seeds of disturbed trials, number of trials, and size of all files, bytes. The
-    target is bearing, rad, and distance, m, or the number of targets of a course."""
+    code is the digest of the code of a user's controller, else empty. The target is bearing, rad, and distance, m, or
+    the number of targets of a course."""
 
     robot: str
     engine: str
     controller: str | None
+    code: str
     duration: float
     target: tuple[float, float] | int | None
-    found: bool
+    current: bool
     robots: int
     seeds: tuple[int, ...]
     count: int
@@ -126,16 +128,17 @@ def groups(trials: Sequence[Kept]) -> list[Group]:
     alike: dict[tuple[Any, ...], list[Kept]] = {}
     for each in trials:
         # Other versions may have other fields.
-        controller, target = each.told.get("controller"), each.told.get("target")
+        controller, target = each.settings.get("controller"), each.settings.get("target")
         name = str(controller.get("class", "")).partition(" ")[0] if isinstance(controller, dict) else None
         if isinstance(target, dict):
             target = len(target.get("goals", ()))
         goal = tuple(target) if isinstance(target, list) else target
-        shared = each.robot, each.told["engine"], name, each.told["duration"], goal, each.found
+        code = each.settings.get("code", "")
+        shared = each.robot, each.settings["engine"], name, code, each.settings["duration"], goal, each.current
         alike.setdefault(shared, []).append(each)
     found = []
     for shared, group in alike.items():
-        texts = [each.told for each in group]
+        texts = [each.settings for each in group]
         robots = len({each.get("robot") for each in texts})
         seeds = sorted({each["seed"] for each in texts if any(each.get("disturbance", {}).values())})
         found.append(Group(*shared, robots, tuple(seeds), len(group), sum(each.size for each in group)))
@@ -168,12 +171,12 @@ def _kept(path: Path, header: Header) -> Kept:
             f"holds another trial, whose name ends in {digest}.nc" if text else "is not the record of a trial"
         )
     try:
-        told = json.loads(text)
+        settings = json.loads(text)
         # TOML begins with what stands in no section.
         robot = tomllib.loads(header.attributes["robot"].partition("\n[")[0])["name"]
-        ours = told["engine"] in ENGINES
-        here = versions_of(told["engine"] if ours else ENGINES[0])
-        found = all(told.get(name) == here[name] for name in here if ours or name != "engine_version")
+        ours = settings["engine"] in ENGINES
+        here = versions_of(settings["engine"] if ours else ENGINES[0])
+        current = all(settings.get(name) == here[name] for name in here if ours or name != "engine_version")
     except (LookupError, TypeError, ValueError, AttributeError):
         raise UnsoundError("is damaged or was edited") from None
-    return Kept(path, header.size, robot, told, found)
+    return Kept(path, header.size, robot, settings, current)

@@ -100,12 +100,7 @@ class Trial:
         in_range("duration", self.duration, LONGEST, "s")
         course, engine = self.course, engine_named(self.engine)
         if self.brief and course is None:
-            raise ParameterError(
-                "must be False: only courses have brief records",
-                field="brief",
-                value=True,
-                allowed="False, or a course as target",
-            )
+            raise ParameterError("must be False: only courses have brief records", field="brief", value=True)
         if course is not None and self.duration != course.duration:
             allowed = f"{course.duration:g} s"
             raise ParameterError("must be that of the course", field="duration", value=self.duration, allowed=allowed)
@@ -172,12 +167,7 @@ class Trial:
         if repeats < 1:
             raise ParameterError("must be positive", field="repeats", value=repeats)
         if repeats > 1 and seed is None:
-            raise ParameterError(
-                "must be 1 without a seed, because the trials would be identical",
-                field="repeats",
-                value=repeats,
-                allowed="1, or a seed",
-            )
+            raise ParameterError("must be 1 without a seed: trials would be equal", field="repeats", value=repeats)
         spread = NONE if seed is None else self.disturbance
         return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 

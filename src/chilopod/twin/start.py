@@ -26,9 +26,9 @@ traits = Traits(
     sentence="the whole robot in three dimensions",
     noisy=True,
     poses=True,
-    a_core=4,
-    a_round=8,
-    haste=2.8,
+    robots_per_core=4,
+    walks_per_round=8,
+    duration_ratio=2.8,
     version=f"MuJoCo {mujoco.__version__}",
 )
 

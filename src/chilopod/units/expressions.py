@@ -186,7 +186,10 @@ def parse(value: object, si_unit: str) -> float:
         try:
             given = unit(unit_text)
         except UnitError as error:
-            raise UnitError(error.problem, value=value, allowed=kind, nearest=error.nearest) from None
+            nearest = error.nearest
+            if nearest and unit_text.isalpha() and unit(nearest).dimension != unit(si_unit).dimension:
+                nearest = None
+            raise UnitError(error.problem, value=value, allowed=kind, nearest=nearest) from None
         if given.dimension != unit(si_unit).dimension:
             raise UnitError(f"is {_kind(given.dimension, example=False)}", value=value, allowed=kind)
         size = given.size

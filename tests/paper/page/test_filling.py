@@ -76,7 +76,7 @@ def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):
     seen = []
     two = replace(TWO, panels=lambda value: seen.append(text(report)) or [panel("two")])
     with Report([ONE, two], CONTEXT, tmp_path) as report:
-        reproduce([ONE, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
+        reproduce([ONE, two], CONTEXT, callback=lambda found, section: report.add(found, [section]))
     (between,) = seen
     assert RELOAD in between
     for expected, html in ((["one"], between), (["one", "two"], text(report))):
@@ -90,7 +90,7 @@ def test_what_is_shown_beside_others_is_drawn_once_more(tmp_path):
     seen = []
     one = replace(ONE, panels=lambda value, two: seen.append(two) or (), beside=(TWO,))
     with Report([one, TWO], CONTEXT, tmp_path) as report:
-        reproduce([one, TWO], CONTEXT, told=lambda found, section: report.add(found, [section]))
+        reproduce([one, TWO], CONTEXT, callback=lambda found, section: report.add(found, [section]))
     assert seen == [None, 2]
     write_report(Found(values={one: 1, TWO: 2}), tmp_path)
     assert seen == [None, 2, 2]
@@ -112,7 +112,7 @@ def test_films_wait_while_there_is_anything_else_to_draw(monkeypatch, tmp_path):
     two = replace(TWO, panels=lambda value: seen.append("two") or ())
     one = replace(ONE, panels=panels, films=lambda value: ["film"], beside=(two,))
     with Report([one, two], CONTEXT, tmp_path) as report:
-        reproduce([one, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
+        reproduce([one, two], CONTEXT, callback=lambda found, section: report.add(found, [section]))
         added.set()
     assert not report.failures
     assert seen == ["two", "film"]
@@ -151,7 +151,7 @@ def test_a_reader_may_delete_everything_meanwhile(tmp_path):
 
     two = replace(TWO, compute=delete)
     with Report([ONE, two], CONTEXT, folder) as report:
-        reproduce([ONE, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
+        reproduce([ONE, two], CONTEXT, callback=lambda found, section: report.add(found, [section]))
     assert not report.failures
     assert "quantity 1" in text(report)
     assert (folder / "figures" / "two.png").is_file()

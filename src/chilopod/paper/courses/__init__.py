@@ -1,1 +1,1 @@
-"""One target after another: a spring that is set on the way, beside what does without."""
+"""One target after another: the variable spring beside other strategies."""

@@ -1,5 +1,5 @@
-"""Courses: how many targets strategies reach, how soon, at what cost, where targets are missed, what each step of the
-spring law brings, and what the variable spring stands."""
+"""Courses: targets reached, times, costs, positions of missed targets, contribution of each step of the spring law, and
+robustness of the variable spring."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chilopod.paper.courses.robust import USUAL, Robust
-from chilopod.paper.courses.rows import percent, said
+from chilopod.paper.courses.rows import decisions, percent
 from chilopod.paper.courses.statistics import Interval
 from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, verdicts
 from chilopod.paper.scatter import Array
@@ -71,7 +71,7 @@ def strategies(data: xr.Dataset) -> Panel:
             "robot as it is, and a body axis bent by torques at all joints. Bars are intervals of 95 %. B has the time "
             "spent on targets that are reached, and on all of them for every one that is reached.",
             f"The spring that is set on the way reaches {percent(ours.targets)} of targets and "
-            f"{percent(ours.courses)} of courses. It {said(verdicts(found))}.",
+            f"{percent(ours.courses)} of courses. It {decisions(verdicts(found))}.",
         ),
         data=data,
     )

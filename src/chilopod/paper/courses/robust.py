@@ -1,4 +1,4 @@
-"""Contribution of each step of the law to the spring that is set on the way, and what disturbances it stands."""
+"""Contribution of each step of the spring law, and robustness of the variable spring to disturbances."""
 
 from __future__ import annotations
 

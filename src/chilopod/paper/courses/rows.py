@@ -26,13 +26,13 @@ def between(found: Interval, unit: str) -> str:
 
 
 def compared_rows(data: xr.Dataset) -> list[Row]:
-    """A line for every strategy, and what the intervals decide between them."""
+    """A line for every strategy, and the comparisons that the intervals decide."""
     found, where = summaries(data), "" if data.attrs["engine"] == "planar" else ", the whole robot"
     count = f"{data.sizes['course']} courses of {data.sizes['goal']} targets{where}"
     return [
         *(unprinted(f"{count}: {each.title}", _words(each), _WHERE, _remark(each)) for each in found.values()),
         unprinted(
-            f"{count}: the variable spring", said(verdicts(found)), _WHERE, "where the intervals of 95 % decide it"
+            f"{count}: the variable spring", decisions(verdicts(found)), _WHERE, "where the intervals of 95 % decide it"
         ),
     ]
 
@@ -57,7 +57,7 @@ def _remark(found: Summary) -> str:
     return remark
 
 
-def said(found: dict[str, list[str]]) -> str:
+def decisions(found: dict[str, list[str]]) -> str:
     """Decisions of :func:`chilopod.paper.courses.summary.verdicts`, in a sentence."""
     return "; ".join(f"{words} {listing(names)}" for words, names in found.items() if names)
 

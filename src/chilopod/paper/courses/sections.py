@@ -1,4 +1,4 @@
-"""One target after another, with a spring that is set on the way: the sections of this chapter."""
+"""Sections of this chapter: courses of targets, with a first spring that is set while the robot walks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How sure a share of trials is, and a difference between trials that belong together."""
+"""Intervals of 95 % for shares of trials, and for differences between paired trials."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Interval:
 
     @property
     def sign(self) -> Answer:
-        """True if it is positive, bounds and all; undecided where zero lies between them."""
+        """Sign of the interval: True if both bounds are positive, undecided if zero lies between them."""
         return self.above(Interval(0.0, 0.0, 0.0))
 
 
@@ -49,7 +49,7 @@ def wilson(successes: int, count: int) -> Interval:
 
 
 def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
-    """Mean of what is not NaN, with the percentile interval of the bootstrap.
+    """Mean of the numbers that are not NaN, with the percentile interval of the bootstrap.
 
     Groups, shape (groups,) or (groups, members), are independent and are drawn anew as a whole; members of one, as the
     targets of one course, need not be.

@@ -42,7 +42,7 @@ class EarlierLaw(SpringLaw):
 
 
 def steps(law: SpringLaw) -> Mapping[str, SpringLaw]:
-    """Laws from the first step to the last, which is the one that is given, by what each has beyond the one before."""
+    """Laws from the first step to the given one, by the part that each adds to the one before."""
     circle = {each.name: getattr(law, each.name) for each in fields(SpringLaw)} | {"ahead": _ALL_THE_WAY}
     return {
         "the spring of the circle to the target, once a cycle": InverseLaw(**circle),

@@ -58,7 +58,7 @@ WHOLE: Mapping[Size, Plan] = {
 
 @dataclass(frozen=True)
 class Case:
-    """Something that drives along courses, under a disturbance besides what a course's seed draws."""
+    """Driver along courses, with a disturbance besides that of the course's seed."""
 
     name: str
     driver: Driver
@@ -150,12 +150,12 @@ def compared(context: Context, variable: Driver, plan: Plan, progress: Progress 
 
 
 def robot_of(context: Context, variable: Driver) -> Robot:
-    """The robot that a driver of :func:`prepared` drives, as it is without a variable spring."""
+    """Robot of a driver of :func:`prepared`, without its variable spring."""
     return context.robot if variable.engine == "planar" else context.whole
 
 
 def prepared(context: Context, engine: str = "planar") -> Driver:
-    """The robot with the variable spring; a tiny report has the law of the planar robot for both, which takes no
+    """Driver of the robot with the variable spring. A tiny report uses the law of the planar robot, which takes no
     walks."""
     if engine == "planar":
         return driver(context.robot, VARIABLE)

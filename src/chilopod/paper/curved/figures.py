@@ -1,4 +1,4 @@
-"""Curved walks as trials, and how sure the paper's square-root fit is: its Fig. "curved", "absolute", "different"."""
+"""Curved walks as trials, and the error of the paper's square-root fit: its Fig. "curved", "absolute", "different"."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def joints(study: CurvedStudy) -> Panel:
 
 
 def onset(study: CurvedStudy) -> Panel:
-    """How far the paper's square-root fit lies from the point, and why."""
+    """Distance of the paper's square-root fit from the point, and its causes."""
     fits, law, exact = study.fits, study.law, study.fits.attrs["exact_k1"]
     wide, near = fits.isel(softest=-1), fits.isel(softest=0)
     kinds = study.comparison.criticality

@@ -1,4 +1,4 @@
-"""Curved walks: the sections of this chapter, and what the tables say beside the paper's model and its robot."""
+"""Curved walks: the sections of this chapter, and their rows beside the paper's model and its robot."""
 
 from __future__ import annotations
 

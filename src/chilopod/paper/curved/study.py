@@ -86,14 +86,14 @@ def curved_study(context: Context, progress: Progress = silent) -> CurvedStudy:
 
 
 def bend_order(trials: xr.Dataset) -> tuple[int, ...]:
-    """Joints by how far they bend in trials that curve, the most first."""
+    """Joints in order of their bend in trials that curve, largest first."""
     angles = np.abs(trials.mean_angle.values[is_curved(trials)]).mean(axis=0)
     return tuple(int(joint) + 1 for joint in np.argsort(-angles))
 
 
 def fluctuation(trials: xr.Dataset) -> tuple[Difference, float, float]:
-    """How much farther the angle of joint 1 scatters among trials at the softest spring than at the stiffest that
-    curves, and these springs, N*mm/deg."""
+    """Ratio of the scatter of joint 1 among trials at the softest spring to that at the stiffest spring that curves,
+    and these springs, N*mm/deg."""
     curved = trials.isel(spring=is_curved(trials).any(axis=1))
     angles = np.where(is_curved(curved), np.abs(curved.mean_angle.sel(joint=1).values), np.nan)
     return spread_difference(angles[0], angles[-1]), float(curved.spring[0]), float(curved.spring[-1])
@@ -135,8 +135,8 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
 
 
 def law_along_branch(branch: xr.Dataset, count: int = 25) -> xr.Dataset:
-    """How far the square-root law is off by itself: fits to exact walks, evenly spread in 1/k, from the pitchfork to a
-    softest spring.
+    """Error of the square-root law itself: fits to exact walks, evenly spread in 1/k, from the pitchfork to a softest
+    spring.
 
     Returns
     -------

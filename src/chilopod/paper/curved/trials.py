@@ -92,7 +92,7 @@ def curved_trials(
 
 
 def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataArray:
-    """How far the walks ended from the periodic orbit of the branch at their very spring.
+    """Distance of the final walks from the branch's periodic orbit with the same spring.
 
     The orbit is solved anew at every spring, from the points beside it of a branch that turns right; a left turn is
     compared with the mirror image of the right one half a period later. The trials, from :func:`curved_trials`, are

@@ -1,4 +1,4 @@
-"""Page of the report: draws what the paper's sections found, computes nothing."""
+"""Page of the report: draws the results of the paper's sections, computes nothing."""
 
 from chilopod.paper.page.report import Report, check_report, write_report
 

@@ -24,7 +24,7 @@ from chilopod.show.panel import Panel
 from chilopod.show.scene.encoder import has_encoder
 from chilopod.show.scene.film import filmed
 from chilopod.show.scene.film_3d import film_3d, stills
-from chilopod.show.scene.played import replay
+from chilopod.show.scene.replay import replay
 
 T = TypeVar("T")
 
@@ -40,9 +40,9 @@ class Report:
     ``movies/NAME.mp4`` and ``.html``, and ``data/robot.toml`` and ``robot-3d.toml``. Files of these names are replaced,
     each as a whole. Where films cannot be encoded, the replays are there without them.
 
-    Used as a context: the page is there as soon as it is entered, and complete when it is left. What is drawn is drawn
-    in a thread beside the computation of what comes next, and ``progress`` is told how much is. The folder is created
-    where there is none.
+    Used as a context: the page is there as soon as it is entered, and complete when it is left. Figures are drawn in a
+    thread beside the computation of the next section, and ``progress`` receives the fraction drawn. The folder is
+    created where there is none.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def write_report(found: Found, folder: str | Path) -> Path:
 
 
 def _again(draw: Callable[[], T]) -> T:
-    """Draw, and once more if somebody deleted the folder meanwhile."""
+    """Draw, and once more if the folder was deleted meanwhile."""
     try:
         return draw()
     except OutputError:
@@ -233,7 +233,7 @@ def write_movie(shown: Movie, folder: Path) -> Film:
 
 
 def _rendered(path: Path, render: Callable[[], bytes]) -> bool:
-    """Write what graphics here can render. The film from above needs none; `chilopod doctor` says what is missing."""
+    """Write the picture if OpenGL can render it; return False if not. The film from above needs no OpenGL."""
     try:
         write_atomic(path, render())
     except OutputError:

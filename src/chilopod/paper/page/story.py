@@ -33,19 +33,19 @@ class Fact:
 
 
 def facts(found: Found) -> list[Fact]:
-    """The numbers that matter, of what was computed."""
-    told, mode = [], found[MODE]
+    """The most important numbers of the results."""
+    facts, mode = [], found[MODE]
     if mode is not None:
         about = "front spring at which the straight walk gives way, in the planar model"
-        told.append(Fact(spring(mode.attrs["value"], 5), about, typeset(str(printed.CRITICAL_K1))))
+        facts.append(Fact(spring(mode.attrs["value"], 5), about, typeset(str(printed.CRITICAL_K1))))
     twins = {row.statement: row.twin for row in found.robot_rows() if row.twin}
     for statement, about in _TOLD.items():
         if twin := twins.get(statement):
-            told.append(Fact(typeset(twin.words), typeset(about), typeset(statement.said.words)))
+            facts.append(Fact(typeset(twin.words), typeset(about), typeset(statement.said.words)))
     if predicted := _predictions(found):
         about = "statements about the robot met by its twin that it was not fitted to"
-        told.append(Fact(f"{predicted.count(Verdict.WITHIN)} of {len(predicted)}", about))
-    return told
+        facts.append(Fact(f"{predicted.count(Verdict.WITHIN)} of {len(predicted)}", about))
+    return facts
 
 
 def _predictions(found: Found) -> list[Verdict]:

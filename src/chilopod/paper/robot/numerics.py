@@ -19,7 +19,7 @@ SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
 """k1 of the walks, N*mm/deg."""
 
 CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, TOLERANCE), "tight": (2e-3, 1e-13)}
-"""Step (s) and tolerance of the contact solver, the first what all studies have."""
+"""Step (s) and tolerance of the contact solver; all studies use the first."""
 
 
 def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:

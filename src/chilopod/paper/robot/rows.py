@@ -28,7 +28,7 @@ PAPER_SPRING = printed.TASKS["A"].k_hat.value
 
 
 def walk_rows(found: RobotWalks) -> list[OfTwin]:
-    """Where walks curve, how tightly and how fast, and what of it hangs on how long they last."""
+    """Onset, radius and speed of curved walks, and their dependence on the duration."""
     base, uniform = found.base, found.uniform.attrs
     speed, error = mean_and_error(base.speed.sel(spring=PAPER_SPRING).values)
     rows = [
@@ -71,7 +71,7 @@ def _curved(base: xr.Dataset) -> OfTwin:
 
 
 def _most(base: xr.Dataset, what: str, springs: tuple[float, ...]) -> tuple[str, bool]:
-    """How many walks at each of some springs are curved or straight, in words, and whether most at each are."""
+    """Numbers of curved or straight walks at some springs, in words, and True if they are most at each spring."""
     share, repeats = shares(base)[what].sel(spring=list(springs)).values, base.sizes["repeat"]
     pairs = zip(springs, repeats * share, strict=True)
     counts = ", ".join(f"{count:.0f} of {repeats} at {spring:g}" for spring, count in pairs)

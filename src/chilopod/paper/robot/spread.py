@@ -1,4 +1,4 @@
-"""How far to trust the twin's predictions: the same predictions by other sets of constants that fit as well.
+"""Spread of the twin's predictions: the same predictions by other sets of constants that fit as well.
 
 ``twin_fits.json`` holds what ``chilopod identify twin`` found: the sets of constants that meet the base series within
 its tolerance. Those that differ most from each other predict what the paper prints of other experiments, each with few

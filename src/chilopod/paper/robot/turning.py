@@ -49,11 +49,11 @@ def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning
     same: dict[str, Any] = {"duration": duration, "engine": "twin", "folder": context.folder}
     tasks = {}
     for index, (letter, task) in enumerate(printed.TASKS.items()):
-        told = part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}")
-        tasks[letter] = turning_task(robot, task.target, springs, repeats, shown=SHOWN, progress=told, **same)
-    first, told = tasks["A"], part(progress, 0.7, 0.9, "uniform springs")
+        share = part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}")
+        tasks[letter] = turning_task(robot, task.target, springs, repeats, shown=SHOWN, progress=share, **same)
+    first, share = tasks["A"], part(progress, 0.7, 0.9, "uniform springs")
     how = {"strategy": "hopf", "time": first.time, **same}
-    hopf = turning_task(robot, first.target, HOPF_SPRINGS, repeats, progress=told, **how)
-    one, told = {"paper's spring": printed.TASKS["A"].k_hat.value}, part(progress, 0.9, 1.0, "without leg yaw")
-    without = without_leg_yaw(robot, first.target, one, progress=told, **same)
+    hopf = turning_task(robot, first.target, HOPF_SPRINGS, repeats, progress=share, **how)
+    one, share = {"paper's spring": printed.TASKS["A"].k_hat.value}, part(progress, 0.9, 1.0, "without leg yaw")
+    without = without_leg_yaw(robot, first.target, one, progress=share, **same)
     return RobotTurning(robot, tasks, hopf, without)

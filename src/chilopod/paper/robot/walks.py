@@ -75,8 +75,8 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     springs = size.of(VARIANT_SPRINGS, VARIANT_SPRINGS[1::2], VARIANT_SPRINGS[1::4])
     uniform_springs = size.of(UNIFORM_SPRINGS, UNIFORM_SPRINGS[:4], UNIFORM_SPRINGS[:4:2])
     duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (12.0, 8.0))
-    told = part(progress, 0.0, 0.31, "as built")
-    records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=told)
+    share = part(progress, 0.0, 0.31, "as built")
+    records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=share)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}
     strides = [name for name, each in robots.items() if each.gait.stride != robot.gait.stride]
@@ -89,8 +89,8 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
         walked = walk_records(variant, springs, fewer, duration=longer, folder=folder, progress=shown)
         found.append(walk_ends(walked, variant, springs))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(strides, found[len(robots) :], strict=True))
-    told = part(progress, 0.91, 1.0, "uniform springs")
-    uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=told)
+    share = part(progress, 0.91, 1.0, "uniform springs")
+    uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=share)
     examples = measures.example_walks(robot, _EXAMPLES, duration, measures.spring_seeds(_EXAMPLES), "twin", folder)
     return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
 
@@ -163,7 +163,7 @@ def undulations(
     folder: measures.Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Walks with all springs alike: how far the body swings once it has settled.
+    """Walks with all springs alike: amplitude of the settled undulation.
 
     Returns
     -------

@@ -142,7 +142,7 @@ def _fitted(axes: Axes, x: Array, values: Array, title: str, label: str) -> None
 
 
 def _mark(axes: dict[str, Axes], robot: Robot, residuals: Array, marker: str, **look: Any) -> None:
-    """Where a robot lies in the three panels of what is fitted."""
+    """Position of a robot in the three panels of the fit."""
     offset, values = 1e3 * robot.legs.forward_offset, (robot.ground.friction, 1e3 * robot.legs.half_width)
     for letter, value in zip("ABC", (np.abs(residuals).max(), *values), strict=True):
         axes[letter].plot(offset, value, marker, markeredgewidth=1.6, markersize=6.5, zorder=5, **look)

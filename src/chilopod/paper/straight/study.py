@@ -89,7 +89,7 @@ def critical_mode(context: Context, progress: Progress = silent) -> xr.Dataset:
 
 
 def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
-    """Critical k1 for the paper's variants (panel C) beside what the paper says of the robot.
+    """Critical k1 for the paper's variants (panel C) beside the paper's statements on the robot.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Where the paper's criteria of turning tasks are smallest, and how its two strategies compare: a pitchfork by one soft
+"""Minima of the paper's criteria of turning tasks, and comparison of its two strategies: a pitchfork by one soft
 spring, Hopf by springs all alike."""
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def in_words(pitchfork: TurningTask, hopf: TurningTask) -> str:
 
 
 def counted(pitchfork: TurningTask, hopf: TurningTask) -> str:
-    """How many minima of the pitchfork are lower, how many higher, how many undecided."""
+    """Numbers of minima of the pitchfork that are lower, higher and undecided."""
     answers = [each.lower for each in differences(pitchfork, hopf).values()]
     named = {"lower": True, "higher": False, "undecided": None}
     counts = {word: sum(each is answer for each in answers) for word, answer in named.items()}
@@ -128,7 +128,7 @@ def saturated(time: float) -> float:
 
 
 def saturation(*tasks: TurningTask) -> str:
-    """How near the third criterion of all springs is to where it saturates: near it at every spring it says little."""
+    """Ratio of the third criterion of all springs to its limit: near it at every spring it says little."""
     full, unit = saturated(tasks[0].time), SCALES["effort"][1]
     means = np.concatenate([task.criteria.effort_mean.isel(instant=0).values for task in tasks])
     return (

@@ -75,7 +75,7 @@ def turning(found: Turning) -> Panel:
             f"{number(task.target.radius)}\u00a0m (the paper prints {typeset(str(entry.radius))}). The "
             f"robot starts straight; {k(1)} is chosen before it walks, the legs of module 1 yaw towards the target by "
             f"at most 5°. {task.criteria.sizes['repeat']} walks with each of three springs, each with its own small "
-            f"disturbance: {became(task)}. Lines are pale after the target has been reached.",
+            f"disturbance: {usual_outcomes(task)}. Lines are pale after the target has been reached.",
             f"The paper shows the same of its robot with {listed(list(entry.outcomes.values()))}\u00a0{SPRING_UNIT}, "
             f"around the {entry.k_hat.value:g} that its radius law gives. The planar model bends at softer springs "
             f"(its pitchfork is at {number(point, 2)} instead of {printed.ONSET.value:g}) and its law gives "
@@ -86,7 +86,7 @@ def turning(found: Turning) -> Panel:
     )
 
 
-def became(task: TurningTask) -> str:
+def usual_outcomes(task: TurningTask) -> str:
     """Outcome of most walks with each spring that is shown."""
     by_outcome = springs_by_outcome(task.criteria).items()
     shown = [float(each) for each in task.paths.shown.values]

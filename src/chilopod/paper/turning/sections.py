@@ -1,4 +1,4 @@
-"""Turning to a target: the sections of this chapter, and what the tables say beside the paper's robot."""
+"""Turning to a target: the sections of this chapter, and their rows beside the paper's robot."""
 
 from __future__ import annotations
 

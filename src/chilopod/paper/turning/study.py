@@ -1,4 +1,4 @@
-"""Turning tasks: all of them together, and why the best spring is not the law's."""
+"""Turning tasks together, and the causes of the difference between the best spring and the law's."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}
     for index, (letter, said) in enumerate(printed.TASKS.items()):
-        told = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
-        tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=told)
+        share = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
+        tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=share)
     task = tasks["A"]
     same: dict[str, Any] = {"folder": folder, "progress": part(progress, 0.5, 0.65, "uniform springs")}
     uniform = UNIFORM_SPRINGS[::3] if quick else UNIFORM_SPRINGS
@@ -78,8 +78,8 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
     rough_springs = QUICK_SPRINGS if quick else ROUGH_SPRINGS
     rough = turning_task(robot, task.target, rough_springs, disturbance=rougher, **same)
     springs_ = {"best spring": task.best, "spring of the law": laws.k_hat(task.target.radius)[0]}
-    told = part(progress, 0.85, 0.9, "with and without leg yaw")
-    without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=told)
+    share = part(progress, 0.85, 0.9, "with and without leg yaw")
+    without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=share)
     settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
     distances = FARTHER[:2] if quick else FARTHER
     farther = farther_targets(robot, laws, task.target.bearing, distances, folder=folder)
@@ -138,14 +138,14 @@ def farther_targets(
     springs: Sequence[float] = FARTHER_SPRINGS,
     folder: Folder = None,
 ) -> xr.Dataset:
-    """Targets in one direction, farther and farther: what the time that a bend needs to grow makes of the task.
+    """Results for targets in one direction at growing distances, with the effect of the time that a bend needs to grow.
 
     One undisturbed trial each, with leg yaw, as much longer as the way is.
 
     Returns
     -------
     Dataset over (away, spring): ``nearest`` (m), ``effort`` until the earliest arrival of that distance, and
-    ``effort_part`` of what legs at their limit all the time would make of it (1); over away: ``earliest`` (s),
+    ``effort_part``, its ratio to the effort of legs at their limit all the time (1); over away: ``earliest`` (s),
     ``k_hat`` by the law (N*mm/deg).
     """
     limit, both, found = LegYawController().limit, ("spring",), []

@@ -183,7 +183,7 @@ def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Se
 
 
 def springs_by_outcome(criteria: xr.Dataset) -> dict[Outcome, list[float]]:
-    """Springs (N*mm/deg) by what became of most of their trials."""
+    """Springs (N*mm/deg) by the outcome of most of their trials."""
     found: dict[str, list[float]] = {outcome.label: [] for outcome in Outcome}
     for spring, labels in zip(criteria.spring.values, criteria.outcome.values, strict=True):
         names, counts = np.unique(labels.astype(str), return_counts=True)
@@ -213,14 +213,14 @@ class LegYaw:
     helped: xr.Dataset
 
     def __str__(self) -> str:
-        """How many arrive."""
+        """Number of walks that arrive."""
         (few, without), (many, with_) = (arrivals(each) for each in (self.alone, self.helped))
         left = int((self.alone.turned > 0.0).sum())
         return f"{few} of {without} arrive ({left} turn left), with it {many} of {with_}"
 
 
 def arrivals(walks: xr.Dataset) -> tuple[int, int]:
-    """How many of some walks arrive, and how many there are."""
+    """Number of walks that arrive, and number of walks."""
     return int(np.nansum(walks.arrived)), int(np.isfinite(walks.arrived).sum())
 
 

@@ -114,7 +114,7 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
 
 
 def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
-    """Rings; those of the walk that is told of with a number."""
+    """Rings; those of the highlighted walk have a number."""
     places = walk.goal_place.transpose("goal", "axis").values
     for index, (x, y) in enumerate(places):
         if not np.isfinite([x, y]).all():

@@ -1,4 +1,4 @@
-"""One turn to a target: the way over the floor with the body on it, and how near the target came."""
+"""One turn to a target: the path over the floor with the body on it, and the distance to the target."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Undulating walks below the Neimark-Sacker point: how far and how fast the body swings, beside the normal form."""
+"""Undulating walks below the Neimark-Sacker point: amplitude and frequency of the body's swing, beside the normal
+form."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _STAGES = 12
 
 
 def play(robot: Robot, progress: Progress = silent) -> str:
-    """The page: a robot that walks, its first spring as a slider, and the signed bend over the spring.
+    """Page with a walking robot, a slider of its first spring, and the signed bend over the spring.
 
     The page is one HTML file. It loads nothing else and opens from disk.
 
@@ -47,7 +47,7 @@ def play(robot: Robot, progress: Progress = silent) -> str:
     Raises
     ------
     AnalysisError
-        If the straight walk has no pitchfork in the first spring, or the walks beside it are no law.
+        If the straight walk has no pitchfork in the first spring, or the branch gives no radius law.
     """
     folder = files("chilopod.show.play")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)

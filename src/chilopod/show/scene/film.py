@@ -65,12 +65,12 @@ def filmed(
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
     """Times of the frames of a film, s; errors as of :func:`filmed` if it cannot be encoded like this."""
     if not 1 <= fps <= 120:
-        raise ParameterError("is no frame rate", field="fps", value=fps, allowed="1 to 120 per second")
+        raise ParameterError("must be a frame rate", field="fps", value=fps, allowed="1 to 120 per second")
     if not _SLOWEST <= speed <= FASTEST:
-        raise ParameterError("is no speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
+        raise ParameterError("must be a speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
     if any(side % 2 or not _SMALLEST <= side <= LARGEST for side in size):
         allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
-        raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
+        raise ParameterError("must be the size of a film", field="size", value=size, allowed=allowed)
     if not has_encoder():
         raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
     recorded = record["time"].values.astype(np.float64)
@@ -89,7 +89,7 @@ def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> 
 
 
 class Stage:
-    """The panels, and what moves in them drawn anew over what does not."""
+    """Frames of the panels: moving parts are drawn anew over the fixed ones."""
 
     def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float) -> None:
         self.shown, self.size = shown, size
@@ -188,7 +188,10 @@ class Stage:
 
     def _panels(self, bottom: float, top: float) -> None:
         """Lay the panels out, all of one size, in the middle of the room there is."""
-        said, width = zip(self.shown.titles, map(says, self.shown.outcomes), strict=True), self.size[0] - 2.0 * GAP
+        said, width = (
+            zip(self.shown.titles, map(caption_of, self.shown.outcomes), strict=True),
+            self.size[0] - 2.0 * GAP,
+        )
         captions = [[self._text(0.0, 0.0, each, weight="bold", va="top") for each in both] for both in said]
         longest = max(sum(map(self._extent, both)) for both in captions) + self.font
         across, tall, columns, lines = self._layout(width, top - bottom, longest)
@@ -231,7 +234,7 @@ class FilmPanel:
 
     def __init__(self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text) -> None:
         self.shown, self.robot, self.label = shown, robot, label
-        self.outcome, self.told = shown.outcomes[robot], label.get_text()
+        self.outcome, self.outcome_text = shown.outcomes[robot], label.get_text()
         self.rings: list[tuple[Circle, Line2D]] = []
         floor, frames = shown.floor, shown.frames
         axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1), xticks=[], yticks=[])
@@ -275,7 +278,7 @@ class FilmPanel:
     def tell(self, now: float) -> None:
         """Show the outcome, or that there is none yet, and the targets so far."""
         known, *reached = self.known(now)
-        self.label.set_text(self.told if known else "walking")
+        self.label.set_text(self.outcome_text if known else "walking")
         self.label.set_color(_MARKS[self.outcome.kind][1] if known else "#555555")
         self.label.set_fontweight("bold" if known else "normal")
         for index, (ring, cross) in enumerate(self.rings):
@@ -317,8 +320,8 @@ class FilmPanel:
         axes.text(x + bar + 6.0 / zoom, y, f"{bar:g} m", va="center_baseline", fontsize=small, path_effects=halo)
 
 
-def says(outcome: Outcome) -> str:
-    """An outcome in words, behind its mark."""
+def caption_of(outcome: Outcome) -> str:
+    """Caption of an outcome: its mark and its name."""
     return _MARKS[outcome.kind][0] + outcome.text
 
 

@@ -88,10 +88,11 @@ def stills(
     outside = ~((wanted >= recorded[0] - 1e-9) & (wanted <= recorded[-1] + 1e-9))
     if outside.any():
         allowed = f"{recorded[0]:g} to {recorded[-1]:g} s"
-        raise ParameterError("is not in the record", field="times", value=float(wanted[outside][0]), allowed=allowed)
+        value = float(wanted[outside][0])
+        raise ParameterError("must be a time of the record", field="times", value=value, allowed=allowed)
     if any(not _NARROWEST <= side <= LARGEST for side in size):
         allowed = f"{_NARROWEST} to {LARGEST} pixels"
-        raise ParameterError("is no size of a picture", field="size", value=size, allowed=allowed)
+        raise ParameterError("must be the size of a picture", field="size", value=size, allowed=allowed)
     walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
     with gl.context(*size), style.house_style():
         studio = Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)
@@ -195,7 +196,7 @@ class _Panel3D(FilmPanel):
         self, stage: _Stage3D, robot: int, size: tuple[int, int], corner: tuple[int, int], label: Text
     ) -> None:
         self.stage, self.shown, self.robot, self.size, self.label = stage, stage.shown, robot, size, label
-        self.outcome, self.told, self.rings = stage.shown.outcomes[robot], label.get_text(), []
+        self.outcome, self.outcome_text, self.rings = stage.shown.outcomes[robot], label.get_text(), []
         (left, above), (width, height) = corner, size
         self.box = (slice(above, above + height), slice(left, left + width), slice(0, 3))
         self.whole = stage.walks.view(size)

@@ -1,4 +1,4 @@
-"""Where every module and every foot of a recorded walk is, and what else a replay or a movie of it shows.
+"""Positions of all modules and feet of a recorded walk, and the other contents of its replay or film.
 
 A *record* is a dataset over ``time`` (s), ``robot``, ``axis`` (x, y), ``joint`` and ``side`` (left, right) with
 ``position`` (m, centre of module 1), ``heading`` (rad), ``joint_angle`` (rad, heading of a module less that of the one
@@ -94,7 +94,7 @@ def bodies(
 
 
 def robot_of(record: xr.Dataset) -> Robot:
-    """The robot that a record says it is of; a ParameterError if it says nothing, or has other joints."""
+    """Robot of a record, from its attribute; ParameterError without the attribute, or for other joints."""
     if "robot" not in record.attrs:
         raise ParameterError("has no robot", field="record", allowed="the text of a robot file in attrs['robot']")
     robot = Robot.from_toml(record.attrs["robot"])
@@ -174,7 +174,7 @@ class Scene:
 
 
 def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: ArrayLike | None = None) -> Scene:
-    """Everything that is drawn of a record at some times (s), by default those of the record; titles are by the labels
+    """Contents of the pictures of a record at some times (s), by default those of the record; titles are by the labels
     of the robots, or in their order. A ParameterError if it does not go with its robot, or a robot has no title."""
     frames = body_frames(record, times)
     aims = aims_of(record)
@@ -194,7 +194,7 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
     if isinstance(titles, Mapping):
         missing = [label for label in labels if label not in titles]
         if missing:
-            raise ParameterError(f"has none for robot {missing[0]!r}", field="titles", allowed="one for each robot")
+            raise ParameterError(f"must name robot {missing[0]!r} too", field="titles", allowed="one for each robot")
         return tuple(titles[label] for label in labels)
     if len(titles) != len(labels):
         raise ParameterError(f"has {len(titles)} titles", field="titles", allowed=f"{len(labels)}, one for each robot")

@@ -18,7 +18,7 @@ _PIN: Final = (0.16, 1.06)  # radius of a drawn yaw joint over the width of a mo
 
 
 def drawn(model: mujoco.MjModel) -> dict[int, str]:
-    """The geoms of a robot and what they are: box, capsule, cylinder or sphere; without the pole it walks to."""
+    """Geoms of a robot and their kinds: box, capsule, cylinder or sphere; without the pole it walks to."""
     kinds = {geom: _SHAPES.get(int(model.geom_type[geom])) for geom in range(model.ngeom)}
     return {geom: kind for geom, kind in kinds.items() if kind and model.geom_group[geom] != POLE_GROUP}
 

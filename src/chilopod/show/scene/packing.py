@@ -15,7 +15,7 @@ _NOWHERE: Final = -32768  # stands for NaN
 
 
 def packed(values: NDArray[np.float64], origin: NDArray[np.float64], step: NDArray[np.float64] | float) -> NDArray[Any]:
-    """Whole numbers of steps from an origin, clipped to what they hold."""
+    """Whole numbers of steps from an origin, clipped to their range."""
     with np.errstate(over="ignore"):
         steps = np.round((values - origin) / step).clip(-LARGEST, LARGEST)
     return np.where(np.isnan(steps), _NOWHERE, steps).astype("<i2")

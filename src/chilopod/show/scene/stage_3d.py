@@ -105,7 +105,7 @@ class Studio:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self.context)
 
     def close(self) -> None:
-        """Give back what OpenGL holds."""
+        """Release the resources of OpenGL."""
         self.context.free()
 
     def picture(self, look: Look, view: View) -> Pixels:

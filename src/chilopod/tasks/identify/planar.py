@@ -117,7 +117,7 @@ class Identification(Summary):
         largest = np.abs(self.residuals).max()
         return f"{self.given.name}: largest residual {largest:.2f}; 1 is what the tolerances of the data allow"
 
-    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         constants = self.as_json()["constants"].items()
         rows = [(path, each["text"], each["allowed_text"]) for path, each in constants]
         cut = [path for path, each in constants if any(each["cut_by_the_search"])]
@@ -167,7 +167,7 @@ def identify_planar(
     variants: Mapping[str, Sequence[str]] = MappingProxyType({}),
     progress: Progress = silent,
 ) -> Identification:
-    """Fit the free constants to the data and draw how well these determine them.
+    """Fit the free constants to the data and draw their ranges.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def identify_planar(
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     if (best[1] == _NO_PITCHFORK).all():
-        problem = "must have a pitchfork on its straight walk, and none of the constants tried gives one"
+        problem = "must have a pitchfork on its straight walk with some of the constants tried"
         raise AnalysisError(problem, field="robot", value=robot.name)
     ranges, cut = _ranges(robot, data, best[0])
     progress(0.4, "ranges")

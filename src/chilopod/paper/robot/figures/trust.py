@@ -1,5 +1,5 @@
-"""Why the robot bends earlier than the planar model says, how far to trust what the twin predicts, and what other
-structures of the robot predict."""
+"""Figures on the robot's earlier onset, the reliability of the twin's predictions, and the predictions of other
+structures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from chilopod.paper.robot.spread import printed_number
 from chilopod.paper.robot.structures import TOLERANCE
 from chilopod.paper.robot.walks import SPRINGS
 from chilopod.paper.robot.why import SPRINGS as TRIED
-from chilopod.paper.shapes import DASHED, draw_asked, finish, legend_below
+from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
@@ -160,7 +160,7 @@ def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
     rows = [(name, paper.value, paper.band) for name, paper in (*asked, ("all springs alike", printed.UNIFORM))]
     for task in map(str, data.task.values):
         rows.append((f"best spring, task {task}", printed.TASKS[task].k_hat.value, printed.TASKS[task].minima))
-    draw_asked(axes["B"], rows)
+    draw_bands(axes["B"], rows)
     for row, values in enumerate([*data.onset.values.T, data.uniform.values, *data.best.values.T]):
         for index, value in enumerate(values):
             place, label = row + 0.12 * (index - 0.5 * (len(values) - 1)), "preset" if row == index == 0 else None

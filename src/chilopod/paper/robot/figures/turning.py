@@ -43,7 +43,7 @@ def turning(found: RobotTurning) -> Panel:
         text=(
             "The twin sees the target with its scanner, as the robot does, and yaws the legs of module 1 towards it; "
             f"nothing of this was fitted but the walking speed. {task.criteria.sizes['repeat']} walks with each of "
-            f"three springs: {planar.became(task)}. The paper's robot {listing(paper)}\u00a0{SPRING_UNIT}. The "
+            f"three springs: {planar.usual_outcomes(task)}. The paper's robot {listing(paper)}\u00a0{SPRING_UNIT}. The "
             f"earliest arrival, when the criteria are taken, is at {number(task.time)}\u00a0s; the robot took "
             f"{typeset(str(printed.ARRIVAL))}.",
         ),
@@ -92,7 +92,7 @@ def without(found: RobotTurning) -> Panel:
 
 
 def comparison(found: RobotTurning) -> Panel:
-    """Fig. "comparison"."""
+    """Comparison of the two strategies (the paper's Fig. "comparison")."""
     task = found.tasks["A"]
     return Panel(
         name="robot-hopf",

@@ -105,7 +105,7 @@ def different(found: RobotWalks) -> Panel:
         text=(
             "Nothing here was fitted. Where curved walks set in by the paper's method, in "
             f"{SPRING_UNIT}: {listing(said)}. "
-            f"Bars in C are what counts as within, {printed.ONSET.band.asked}; with all springs alike the body "
+            f"Bars in C are what counts as within, {printed.ONSET.band.condition}; with all springs alike the body "
             "undulates. At equal springs (A) a variant that sets in at a softer spring turns more widely by that "
             f"alone; so the table compares radii at equal distance from each one's own onset {k(1)}* (B)."
             + (
@@ -214,7 +214,7 @@ def _draw_onsets(axes: Axes, found: RobotWalks) -> None:
         *((title, printed.onset(name), onset_with_error(data)[0]) for title, (name, data) in _variants(found).items()),
         ("all springs alike", printed.UNIFORM, found.uniform.attrs["critical_k"]),
     ]
-    shapes.draw_asked(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
+    shapes.draw_bands(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
     twin = [at for *_, at in found_at]
     axes.plot(twin, range(len(twin)), "o", color=style.BLUE, markersize=7, label="twin")
     axes.set(xlim=(0.0, 45.0), xlabel=f"onset ({SPRING_UNIT})", title="C  Onset of curved walks")

@@ -7,7 +7,7 @@ from chilopod import load_robot
 from chilopod.analysis import straight_walk
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar import PlanarModel
-from chilopod.planar.foreseen import MOST_STEPS, check_steps
+from chilopod.planar.step_count import MOST_STEPS, check_steps
 
 PRESET = load_robot("aoi2022-planar")
 

@@ -14,7 +14,7 @@ from chilopod.output import Content, write_all
 from chilopod.show import style
 from chilopod.show.scene.encoder import has_encoder
 from chilopod.show.scene.film import FASTEST, filmed
-from chilopod.show.scene.played import SHOWN, replay
+from chilopod.show.scene.replay import SHOWN, replay
 
 _LONGEST_FILM = 15.0  # s: it takes half as long to make
 _FILM_SIZE = (960, 640)
@@ -35,7 +35,7 @@ def write_walks(what: str, done: Any, folder: str | Path, *, replace: bool = Tru
 
 
 def _contents(figure: Any, done: Any, files: list[Path]) -> Iterator[tuple[Path, Content]]:
-    """Contents in the order of writing: what cannot be made again comes first."""
+    """Contents in the order of writing: files that cannot be made again come first."""
     pixels, vector, record, page, *film = files
     yield record, netcdf(done.record)
     with style.house_style():

@@ -1,4 +1,4 @@
-"""Controllers and engines of a user's own on the command line: where they are found, and what their time is."""
+"""Controllers and engines of users on the command line: search path, progress and share of the time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def own_controller(path: str | None) -> Controller | None:
 @contextmanager
 def own_code(show: Callable[[str, float, str], None]) -> Iterator[None]:
     """Find modules in the current folder too, after all others; show how far walks are that are under way; and say at
-    the end if controllers took most of the time. What own code prints goes to stderr, for stdout has the result."""
+    the end if controllers took most of the time. Output of user code goes to stderr, because stdout has the result."""
     from chilopod.engine import watched
 
     here = os.getcwd()

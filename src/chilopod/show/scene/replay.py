@@ -86,7 +86,7 @@ def replay(
 
 
 def _page(name: str, shown: Scene, heading: str, view: str, data: Mapping[str, Any], **words: str) -> str:
-    """A template with what is seen, and the data that its scripts read; they have an entry ``robots`` with one mapping
+    """A template with its contents, and the data that its scripts read; they have an entry ``robots`` with one mapping
     a robot."""
     folder, time, floor = files("chilopod.show.scene"), shown.frames.time, shown.floor
     environment = Environment(

@@ -24,7 +24,7 @@ _SAME_INSTANT = 1e-9  # s
 _MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing", "seen_distance")
 
 
-def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
+def check_record(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
     """Return the record that an engine gave of a batch. Raises AnalysisError, which names the engine and the fault, if
     it does not fit these trials and their drawn disturbances."""
     if not isinstance(data, xr.Dataset):
