@@ -23,9 +23,10 @@ Array = NDArray[np.float64]
 
 _WIDE = style.Layout("ABC;DEF", 6.2)
 _NARROW = style.Layout("A;B;C;D;E;F", 17.0)
-_COLUMNS = (
-    "friction", "half_width", "largest_residual", "critical_k1", "uniform", "uniform_frequency", "coefficient", "verdict"
-)  # fmt: skip
+_COLUMNS = {
+    *("friction", "half_width", "largest_residual", "critical_k1"),
+    *("uniform", "uniform_frequency", "coefficient", "verdict"),
+}
 """Columns of a profile that are no variants."""
 
 
@@ -160,7 +161,9 @@ def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
         place, away, ha, va = len(x) // 3, -5, "left", "top"
         if name == max(names, key=lambda each: float(data[each].mean())):
             place, away, ha, va = int(0.75 * len(x)), 5, "right", "bottom"
-        style.note(axes, typeset(name), (x[place], values[place]), (0, away), ha=ha, va=va)
+        style.note(
+            axes, typeset(name) if _variants_of(data) else "", (x[place], values[place]), (0, away), ha=ha, va=va
+        )
     values = np.array([data[name].values for name in names])
     axes.set(ylim=(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5), ylabel=f"critical k₁ ({SPRING_UNIT})")
 
