@@ -206,7 +206,7 @@ def planar(
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
     from chilopod.show import files_of
-    from chilopod.show.figures.identification import identification_files
+    from chilopod.show.files import identification_files
 
     measured, variants = (critical_mode_data(), variant_settings()) if data is None else (CriticalMode.load(data), {})
 

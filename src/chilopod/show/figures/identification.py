@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ from numpy.typing import NDArray
 
 from chilopod.robot import Robot
 from chilopod.show import style
-from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
 from chilopod.tasks.identify import Identification
@@ -28,11 +25,6 @@ _COLUMNS = {
     *("uniform", "uniform_frequency", "coefficient", "verdict"),
 }
 """Columns of a profile that are no variants."""
-
-
-def identification_files(found: Identification, folder: Path) -> Iterator[tuple[Path, bytes]]:
-    """Files of the profile, its figure and the data, see :func:`chilopod.show.files.panel_files`."""
-    return panel_files(panel(found), folder, folder)
 
 
 def panel(fit: Identification) -> Panel:
