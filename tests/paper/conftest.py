@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
+from chilopod.paper.fit_data import critical_mode_data
 from chilopod.paper.registry import chosen
 from chilopod.paper.section import Context, Found, Movie, Size, reproduce
 from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES
@@ -69,7 +70,11 @@ def fit() -> Identification:
     robot = load_robot("aoi2022-planar")
     ranges = np.array([[231.0, 250.0], [0.06, 0.085], [0.04, 0.06]])
     off, given = np.full(6, 0.5), np.full(6, -1.02)
-    return Identification(robot, robot, off, np.zeros((1, 3)), given, ranges, np.zeros((3, 2), dtype=bool), profile)
+    return Identification(
+        given=robot, data=critical_mode_data(), best=robot, residuals=off, starts=np.zeros((1, 3)),
+        preset_residuals=given, ranges=ranges, cut=np.zeros((3, 2), dtype=bool),
+        valley=(np.ones(3), 3.0), profile=profile,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -175,30 +175,42 @@ def _print_row(verdict: str, quantity: str, said: dict[str, str]) -> None:
             typer.echo(f"{'':<12}   {who + ':':<{width}} {words}")
 
 
-@identify_app.command(short_help="Constants of the planar model from printed numbers.")
+@identify_app.command(short_help="Constants of the planar model from a critical spring and its mode.")
 def planar(
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = PRESET,
     overrides: SetOption = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path("identification"),
     force: ForceOption = False,
     points: Annotated[int, typer.Option(metavar="N", help="Points of the profile.", min=3, max=200)] = 25,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
+    ] = None,
+    template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Friction, half-width and forward offset of the feet from the paper's printed numbers, and how sure they are.
+    """Friction, half-width and forward offset of the feet from the critical k1 and its mode, and how sure they are.
 
-    Writes the profile over the forward offset as a figure and as data, and the robot with the best constants.
+    Writes the profile over the forward offset as a figure and as data, and the robot with the best constants. The
+    data are the numbers that the paper prints, or your own.
+
+    For example: chilopod identify planar --template > mine.toml; chilopod identify planar robot.toml --data mine.toml
     """
+    from chilopod.tasks.identify import TEMPLATE, CriticalMode, identify_planar
 
+    if template:
+        typer.echo(TEMPLATE, nl=False)
+        return
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
-    from chilopod.paper.straight.identification import identification_files
     from chilopod.show import files_of
-    from chilopod.tasks.identify import identify_planar
+    from chilopod.show.files import identification_files
+
+    measured, variants = (critical_mode_data(), variant_settings()) if data is None else (CriticalMode.load(data), {})
 
     free([*files_of("identification", out), *_identified(out)], force)
     with progress_bar("identification") as progress:
-        step = partial(progress, "identification")
-        found = identify_planar(described, critical_mode_data(), points, variant_settings(), step)
+        found = identify_planar(described, measured, points, variants, partial(progress, "identification"))
     lines = [*found.lines(), f"profile, figure and robot file are in {out}"]
     result, more = {"robot": described.name, **found.as_json()}, identification_files(found, out)
     _deliver(out, result, found.best, lines, more, force=force, as_json=as_json)

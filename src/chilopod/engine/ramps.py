@@ -27,7 +27,7 @@ class Ramps:
         begun = np.array(start, dtype=np.float64)
         # Start and end of each ramp, and their times; never written into, only replaced.
         self._ramps = np.stack([begun, begun, 0.0 * begun, 0.0 * begun])
-        self._told: list[tuple[float, Array]] | None = [(0.0, self._ramps)] if keep else None
+        self._history: list[tuple[float, Array]] | None = [(0.0, self._ramps)] if keep else None
 
     @property
     def goal(self) -> Array:
@@ -41,8 +41,8 @@ class Ramps:
             begun = np.empty_like(self._ramps)
             begun[0], begun[1], begun[2], begun[3] = _at(self._ramps, now), goal, now, now + within
             self._ramps = np.where(changed, begun, self._ramps)
-            if self._told is not None:
-                self._told.append((now, self._ramps))
+            if self._history is not None:
+                self._history.append((now, self._ramps))
 
     def at(self, times: Array) -> Array:
         """Values at times (T,) since the last command, shape (T, ...)."""
@@ -56,7 +56,7 @@ class Ramps:
 
     def over(self, times: Array) -> Array:
         """Values at any rising times (T,), shape (T, ...); at the time of a command, the values before it."""
-        history = self._told or [(0.0, self._ramps)]
+        history = self._history or [(0.0, self._ramps)]
         values = np.empty((len(times), *self.goal.shape))
         ends = np.searchsorted(times, [when for when, _ in history[1:]] + [np.inf], side="right")
         first = 0
@@ -68,16 +68,16 @@ class Ramps:
 
     def state(self) -> dict[str, Array]:
         """Complete state, for :meth:`restore`."""
-        if self._told is None:
+        if self._history is None:
             return {"now": self._ramps}
-        history = np.array([each for _, each in self._told])
-        return {"now": self._ramps, "times": np.array([when for when, _ in self._told]), "history": history}
+        history = np.array([each for _, each in self._history])
+        return {"now": self._ramps, "times": np.array([when for when, _ in self._history]), "history": history}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Take over the state of other ramps."""
         self._ramps = state["now"]
-        if self._told is not None:
-            self._told = list(zip(state["times"].tolist(), state["history"], strict=True))
+        if self._history is not None:
+            self._history = list(zip(state["times"].tolist(), state["history"], strict=True))
 
 
 def _at(ramps: Array, times: Any) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from chilopod.analysis.parameters import stiffness
 from chilopod.paper import printed
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks.identify import BaseSeries, CriticalMode
@@ -12,11 +13,11 @@ from chilopod.tasks.identify import BaseSeries, CriticalMode
 def critical_mode_data() -> CriticalMode:
     """Critical mode of the planar model: six numbers, of which half the last digit is left open."""
     return CriticalMode(
-        k1=printed.CRITICAL_K1.value,
+        k1=stiffness(printed.CRITICAL_K1.value),
         components=tuple(each.value for each in printed.MODE),
-        k1_tolerance=printed.CRITICAL_K1.tolerance,
+        k1_tolerance=stiffness(printed.CRITICAL_K1.tolerance),
         component_tolerance=printed.MODE[0].tolerance,
-        between=(4.0, 40.0),
+        between=(stiffness(4.0), stiffness(40.0)),
     )
 
 

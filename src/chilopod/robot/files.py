@@ -8,10 +8,13 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
-from chilopod.errors import RobotFileError, nearest_name
+from chilopod.errors import ChilopodError, RobotFileError, nearest_name
 from chilopod.text_file import read_text
+from chilopod.units import Description
+
+Described = TypeVar("Described", bound=Description)
 
 _PRESETS: Final = Path(__file__).parent.parent / "robots"
 _MOST_DOTS: Final = 200
@@ -68,27 +71,41 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     if missing:
         allowed, nearest = f"a robot file or one of the presets {', '.join(names)}", nearest_name(source, names)
         raise RobotFileError("must be a preset or an existing file", value=source, allowed=allowed, nearest=nearest)
-    text = read_text(path, "robot file", RobotFileError)
+    return parsed(read_text(path, "robot file", RobotFileError), source), source
+
+
+def read_file(cls: type[Described], path: str | Path, kind: str) -> Described:
+    """Read a TOML file of the keys of a description; `kind` is the expected content, such as ``robot file``.
+
+    RobotFileError names the file, the key and the fault of an invalid one.
+    """
+    return described(cls, parsed(read_text(path, kind, RobotFileError), str(path)), str(path))
+
+
+def described(cls: type[Described], table: Mapping[str, Any], source: str) -> Described:
+    """Make a description of a table; RobotFileError names the source, the key and the fault of an invalid one."""
     try:
-        return parsed(text), source
-    except RobotFileError as error:
-        error.source = source
-        raise
+        return cls(**table)
+    except ChilopodError as error:
+        named = {name: getattr(error, name) for name in ("field", "value", "allowed", "nearest")}
+        raise RobotFileError(error.problem, **named, source=source) from None
+    except RecursionError:
+        raise RobotFileError("is nested too deeply", source=source) from None
 
 
-def parsed(text: str) -> dict[str, Any]:
+def parsed(text: str, source: str | None = None) -> dict[str, Any]:
     """Read TOML text from any source; RobotFileError if it is not valid, or would take very long to read."""
     # The time of Python's reader grows with the square of the number of parts of one key. Between two of
     # these characters there is a key at most, or part of a text; and no text of a robot is that long.
     dots = max(between.count(".") for between in _BETWEEN_KEYS.split(text))
     if dots > _MOST_DOTS:
-        raise RobotFileError(f"has {dots} dots in a key or a text", allowed=f"up to {_MOST_DOTS}")
+        raise RobotFileError(f"has {dots} dots in a key or a text", allowed=f"up to {_MOST_DOTS}", source=source)
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise RobotFileError("is nested too deeply") from None
+        raise RobotFileError("is nested too deeply", source=source) from None
     except ValueError as error:  # TOMLDecodeError, and integers of more digits than Python converts
-        raise RobotFileError(f"is not valid TOML: {error}") from None
+        raise RobotFileError(f"is not valid TOML: {error}", source=source) from None
 
 
 def to_toml(table: Mapping[str, Any]) -> str:

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import PlainValidator, model_validator
 
 from chilopod import units
-from chilopod.errors import ChilopodError, ParameterError, RobotFileError
+from chilopod.errors import ChilopodError, ParameterError
 from chilopod.gait import Gait
 from chilopod.ground import GRAVITY, Ground
-from chilopod.robot.files import Table, parsed, read_table, to_toml
+from chilopod.robot.files import Table, described, parsed, read_table, to_toml
 from chilopod.robot.inertia import module_yaw_inertia
 from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
 from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
@@ -93,14 +93,7 @@ class Robot(Description):
     def load(cls, robot: str | Path) -> Self:
         """Read a robot file, or a preset by its name; RobotFileError names the place and the fault of an invalid
         one."""
-        table, source = read_table(robot)
-        try:
-            return cls(**table)
-        except ChilopodError as error:
-            details = {name: getattr(error, name) for name in ("field", "value", "allowed", "nearest")}
-            raise RobotFileError(error.problem, **details, source=source) from None
-        except RecursionError:
-            raise RobotFileError("is nested too deeply", source=source) from None
+        return described(cls, *read_table(robot))
 
     @classmethod
     def from_toml(cls, text: str) -> Self:

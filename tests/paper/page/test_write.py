@@ -19,9 +19,9 @@ from chilopod.paper.registry import load_sections
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found
 from chilopod.paper.straight import schematic
-from chilopod.paper.straight.identification import identification_files
 from chilopod.paper.straight.sections import IDENTIFICATION, MODE
 from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Row, Statement, Verdict, within
+from chilopod.show.files import identification_files
 from helpers.html_page import Page
 
 

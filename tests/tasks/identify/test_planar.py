@@ -1,16 +1,14 @@
 """The planar model's constants from the critical spring and its mode."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import bifurcations
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import CriticalMode, planar
+from chilopod.tasks.identify import TEMPLATE, CriticalMode, planar
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
@@ -56,13 +54,16 @@ def test_ranges_hold_the_constants_of_a_robot_of_another_size():
     interval = (stiffness(0.1), stiffness(5.0))
     *_, point = bifurcations(planar.with_constants(robot, true), K1, interval, normal_form=False)
     mode = point.joint_components.real * np.sign(point.joint_components.real.sum())
-    rounded = CriticalMode(round(point.value, 2), tuple(np.round(mode, 2)), 0.005, 0.005, (0.1, 5.0))
+    rounded = CriticalMode(
+        k1=stiffness(round(point.value, 2)), k1_tolerance=stiffness(0.005), between=interval,
+        components=np.round(mode, 2), component_tolerance=0.005,
+    )  # fmt: skip
     ranges, _ = planar._ranges(robot, rounded, true)
     assert ((ranges[:, 0] <= true) & (true <= ranges[:, 1])).all()
 
 
 def test_data_that_contradict_each_other_allow_nothing():
-    data = dataclasses.replace(DATA, components=DATA.components[::-1])
+    data = CriticalMode(**{**dict(DATA), "components": DATA.components[::-1]})
     ranges, _ = planar._ranges(ROBOT, data, np.array([ROBOT.get(path) for path in planar.FREE]))
     assert np.isnan(ranges).all()
 
@@ -78,9 +79,38 @@ def test_data_that_contradict_each_other_allow_nothing():
     ],
 )
 def test_data_that_are_none_are_refused(field, value):
-    with pytest.raises(ParameterError, match=field):
-        dataclasses.replace(DATA, **{field: value})
+    with pytest.raises((ParameterError, UnitError), match=field):
+        CriticalMode(**{**dict(DATA), field: value})
 
 
 def test_a_mode_is_a_direction():
-    assert dataclasses.replace(DATA, components=tuple(-each for each in DATA.components)) == DATA
+    assert CriticalMode(**{**dict(DATA), "components": [-each for each in DATA.components]}) == DATA
+
+
+def test_the_template_is_read_as_the_papers_data(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(TEMPLATE)
+    assert CriticalMode.load(file) == DATA
+    file.write_text(TEMPLATE.replace("12 N*mm/deg", "50 N*mm/deg"))
+    with pytest.raises(RobotFileError, match=r"mine.toml: between = .* must hold k1; allowed: two rising springs"):
+        CriticalMode.load(file)
+    file.write_text(TEMPLATE.replace("component_tolerance", "component_tolerances"))
+    with pytest.raises(RobotFileError, match="unknown key; did you mean 'component_tolerance'"):
+        CriticalMode.load(file)
+
+
+def test_no_direction_changes_the_residuals_less_than_the_valley():
+    best = np.array([ROBOT.get(path) for path in planar.FREE])
+    scale, (along, flatter) = planar._scale(ROBOT, DATA), planar._valley(ROBOT, DATA, best)
+    off = planar.residuals(planar.with_constants(ROBOT, best), DATA)
+
+    def change(direction):
+        there = best + 1e-4 * scale * direction / np.linalg.norm(direction)
+        return np.linalg.norm(planar.residuals(planar.with_constants(ROBOT, there), DATA) - off)
+
+    least = change(along / scale)
+    others = np.random.default_rng(1).normal(size=(40, 3))
+    valley = along / scale / np.linalg.norm(along / scale)
+    across = [change(each - each @ valley * valley) for each in others]
+    assert min(across) == pytest.approx(flatter * least, rel=0.1)
+    assert min(across) > 0.99 * flatter * least

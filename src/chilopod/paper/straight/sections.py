@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
@@ -10,8 +12,9 @@ from chilopod.paper import printed, statements
 from chilopod.paper.printed import ANALYSIS
 from chilopod.paper.scatter import every
 from chilopod.paper.section import Section
-from chilopod.paper.straight import exponents, figures, identification, study
+from chilopod.paper.straight import exponents, figures, study
 from chilopod.paper.table import OfPlanar, Result, Row, agreement, unprinted
+from chilopod.show.figures import identification
 from chilopod.tasks.identify import Identification
 
 CHAPTER = "The straight walk and where it bends"
@@ -133,6 +136,6 @@ IDENTIFICATION: Section[Identification] = Section(
     "the constants the paper does not print",
     study.identified,
     identification_rows,
-    identification.panel,
+    lambda found: replace(identification.panel(found), letter="G", title="The constants the paper does not print"),
     beyond=True,
 )

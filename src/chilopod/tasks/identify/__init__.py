@@ -5,20 +5,21 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
-    from chilopod.tasks.identify.data import BaseSeries, CriticalMode
+    from chilopod.tasks.identify.data import TEMPLATE, BaseSeries, CriticalMode
     from chilopod.tasks.identify.planar import Identification, identify_planar
     from chilopod.tasks.identify.twin import TwinIdentification, identify_twin
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "data": ("BaseSeries", "CriticalMode"),
+            "data": ("TEMPLATE", "BaseSeries", "CriticalMode"),
             "planar": ("Identification", "identify_planar"),
             "twin": ("TwinIdentification", "identify_twin"),
         },
     )
 
 __all__ = [
+    "TEMPLATE",
     "BaseSeries",
     "CriticalMode",
     "Identification",

@@ -2,56 +2,74 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import model_validator
 
-from chilopod.engine.arguments import as_number
+from chilopod import units
 from chilopod.errors import ParameterError
+from chilopod.robot.files import read_file
+from chilopod.units import Description, Quantity
 
 Array = NDArray[np.float64]
 
-_UNIT = 0.1  # that rounding may leave of the norm of a mode
+_STIFFNESS: Final = Quantity("N*m/rad", "N*mm/deg")
+_UNIT: Final = 0.1  # that rounding may leave of the norm of a mode
+
+TEMPLATE: Final = """\
+# Data for `chilopod identify planar ROBOT --data FILE`: the spring k1 at which the straight walk of your robot loses
+# its stability, and the shape of its bend there. These are the numbers of Aoi et al. (2022).
+k1 = "12 N*mm/deg"
+k1_tolerance = "0.5 N*mm/deg"     # largest error of k1
+between = ["4 N*mm/deg", "40 N*mm/deg"]     # interval of k1 in which the walk loses its stability once
+components = [0.64, 0.36, 0.48, 0.46, 0.16]     # joint angles front to rear, of unit norm; the sign is free
+component_tolerance = 0.005     # largest error of each
+"""
+"""Template of the file that :meth:`CriticalMode.load` reads."""
 
 
-@dataclass(frozen=True)
-class CriticalMode:
+class CriticalMode(Description):
     """Pitchfork in k1 of a robot: the data that the constants are fitted to.
 
     Attributes
     ----------
-    k1, k1_tolerance, between
-        Critical spring, its tolerance, and the interval in which it is located, N*mm/deg.
+    k1, k1_tolerance
+        Critical spring and its tolerance, N*m/rad.
+    between
+        Interval in which it is located, N*m/rad.
     components, component_tolerance
         Joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,), and tolerance.
     """
 
-    k1: float
-    components: tuple[float, ...]
-    k1_tolerance: float
-    component_tolerance: float
-    between: tuple[float, float]
+    k1: Annotated[float, _STIFFNESS]
+    k1_tolerance: Annotated[float, _STIFFNESS]
+    between: Annotated[tuple[float, ...], replace(_STIFFNESS, each=True)]
+    components: Annotated[tuple[float, ...], Quantity("", "", at_least=-10.0, at_most=10.0, each=True)]
+    component_tolerance: Annotated[float, Quantity("", "")]
 
-    def __post_init__(self) -> None:
-        for name in ("k1", "k1_tolerance", "component_tolerance"):
-            value = as_number(name, getattr(self, name))
-            if not 0.0 < value < math.inf:
-                raise ParameterError("must be positive and finite", field=name, value=value)
-        low, high = (as_number("between", each) for each in self.between)
-        if not 0.0 < low < self.k1 < high < math.inf:
-            raise ParameterError(
-                "must hold k1", field="between", value=self.between, allowed="two rising springs, N*mm/deg"
-            )
-        mode = np.array([as_number("components", each) for each in self.components])
-        if not (mode.size and abs(np.linalg.norm(mode) - 1.0) < _UNIT):
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a TOML file of the data, see :data:`TEMPLATE`; RobotFileError, in one line, names the fault."""
+        return read_file(cls, path, "file of data")
+
+    @model_validator(mode="after")
+    def _is_a_critical_mode(self) -> Self:
+        if not (len(self.between) == 2 and self.between[0] < self.k1 < self.between[1]):
+            shown = [units.format(each, _STIFFNESS.display) for each in self.between]
+            raise ParameterError("must hold k1", field="between", value=shown, allowed="two rising springs")
+        mode = np.array(self.components)
+        if abs(np.linalg.norm(mode) - 1.0) > _UNIT:
             raise ParameterError(
                 "must have the norm 1", field="components", value=self.components, allowed="cosines, one for each joint"
             )
         # A mode is a direction: both signs are the same mode.
         object.__setattr__(self, "components", tuple((mode * np.sign(mode.sum() or 1.0)).tolist()))
+        return self
 
 
 @dataclass(frozen=True)

@@ -60,8 +60,8 @@ class Identification(Summary):
 
     Attributes
     ----------
-    given, best
-        The given robot, and the robot with the best constants.
+    given, data, best
+        The given robot, the data, and the robot with the best constants.
     residuals, preset_residuals
         Critical k1 and the components of the mode less the data, in units of their tolerance, shape (N,), at the best
         constants and for ``given``.
@@ -72,24 +72,41 @@ class Identification(Summary):
         NaN if there is none.
     cut
         True where a bound of the search ends a range, shape (3, 2).
+    valley
+        Change of the constants, SI, for a metre of forward offset along the direction in which the residuals change
+        least, shape (3,), and how many times less they change than in the next direction.
     profile
         Dataset over ``forward_offset``: the fitted constants, the largest residual, and the predictions of each point
         for numbers that were not fitted.
     """
 
     given: Robot
+    data: CriticalMode
     best: Robot
     residuals: Array
     starts: Array
     preset_residuals: Array
     ranges: Array
     cut: NDArray[np.bool_]
+    valley: tuple[Array, float]
     profile: xr.Dataset
 
     def allowed(self, path: str) -> tuple[float, float] | None:
         """Range of a constant of :data:`FREE` within which every datum is met, SI; None if there is none."""
         low, high = self.ranges[FREE.index(path)].tolist()
         return None if np.isnan(low) else (low, high)
+
+    def groups(self) -> dict[str, tuple[float, float, float]]:
+        """Groups without unit that the critical spring and its mode depend on: value of the best constants, least and
+        greatest value that the data allow, NaN where they allow none."""
+        robot, (friction, *lengths) = self.given, self.ranges
+        unit, size = _scale(robot, self.data)[:2] / (4.0, 1.0)
+        best = [self.best.get(path) for path in FREE]
+        return {
+            "k1/(friction*speed*duty*module_length)": tuple((unit / [best[0], *friction[::-1]]).tolist()),
+            "half_width/module_length": tuple((np.array([best[1], *lengths[0]]) / size).tolist()),
+            "forward_offset/module_length": tuple((np.array([best[2], *lengths[1]]) / size).tolist()),
+        }
 
     def as_json(self) -> dict[str, Any]:
         """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
@@ -106,6 +123,9 @@ class Identification(Summary):
             }
         return {
             "constants": constants,
+            "valley_si_for_a_metre_of_forward_offset": dict(zip(FREE, self.valley[0].tolist(), strict=True)),
+            "valley_flatter_by": self.valley[1],
+            "groups": self.groups(),
             "residuals": self.residuals.tolist(),
             "largest_residual": float(np.abs(self.residuals).max()),
             "constants_from_every_start_si": self.starts.tolist(),
@@ -122,6 +142,15 @@ class Identification(Summary):
         rows = [(path, each["text"], each["allowed_text"]) for path, each in constants]
         cut = [path for path, each in constants if any(each["cut_by_the_search"])]
         said = [f"a bound of the search ends the range of {path}: the data allow more" for path in cut]
+        (friction, half_width, _), flatter = self.valley
+        said.append(
+            f"10 mm of forward offset with {1e-2 * friction:+.3g} N*s/m of friction and {10.0 * half_width:+.3g} mm of "
+            f"half-width change the residuals least, {flatter:.1f} times less than any combination across it"
+        )
+        if np.isnan(self.ranges).any():
+            names = ["k1", *(f"component {joint}" for joint in range(1, len(self.residuals)))]
+            off = ", ".join(f"{name} {each:+.1f}" for name, each in zip(names, self.residuals, strict=True))
+            said.append(f"no constants meet all data; the best are off by, in tolerances: {off}")
         return [], [("constant", "best", "allowed by the data"), *rows], said
 
     def plot(self, axes: Axes | None = None) -> Axes:
@@ -139,9 +168,8 @@ def residuals(robot: Robot, data: CriticalMode) -> Array:
     if robot.body.modules != count:
         problem = f"must be {count}, the number of modules in the mode of the data"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules)
-    low, high = data.between
     try:
-        points = bifurcations(robot, K1, (stiffness(low), stiffness(high)), normal_form=False)
+        points = bifurcations(robot, K1, (data.between[0], data.between[1]), normal_form=False)
     except AnalysisError:
         points = []
     points = [each for each in points if each.point.kind is Kind.PITCHFORK]
@@ -150,7 +178,7 @@ def residuals(robot: Robot, data: CriticalMode) -> Array:
     components = points[-1].joint_components.real
     components = components * np.sign(components.sum())
     off = (components - np.array(data.components)) / data.component_tolerance
-    return np.concatenate([[(points[-1].value - data.k1) / data.k1_tolerance], off])
+    return np.concatenate([[(points[-1].point.value - data.k1) / data.k1_tolerance], off])
 
 
 def with_constants(robot: Robot, constants: Array) -> Robot:
@@ -197,12 +225,14 @@ def identify_planar(
     progress(0.4, "ranges")
     return Identification(
         given=robot,
+        data=data,
         best=with_constants(robot, best[0]),
         residuals=best[1],
         starts=np.array([fit[0] for fit in fits]),
         preset_residuals=residuals(robot, data),
         ranges=ranges,
         cut=cut,
+        valley=_valley(robot, data, best[0]),
         profile=_profile(robot, data, best[0], ranges[2], points, variants, progress),
     )
 
@@ -211,7 +241,7 @@ def _scale(robot: Robot, data: CriticalMode) -> Array:
     """Units of the constants, SI: only k/(c v duty L), half-width/L and offset/L enter the mode of a slow robot, with
     the critical spring k, speed v and module length L. The paper's robot has the friction 1.0 in them."""
     length, gait = robot.module_length, robot.gait
-    return np.array([4.0 * stiffness(data.k1) / (gait.speed * gait.duty * length), length, length])
+    return np.array([4.0 * data.k1 / (gait.speed * gait.duty * length), length, length])
 
 
 class _Residuals:
@@ -265,6 +295,15 @@ def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArr
             limit = (_LEAST, _MOST)[side][constant]
             cut[constant, side] = abs(found[constant] - limit) <= _STEP * abs(limit)
     return ranges, cut
+
+
+def _valley(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, float]:
+    """Direction in which the residuals change least, SI for a metre of forward offset, and how many times less than in
+    the next direction, from the singular values of the derivative over the constants in units of :func:`_scale`."""
+    scale = _scale(robot, data)
+    _, values, directions = np.linalg.svd(_Residuals(robot, data).jacobian(best / scale))
+    along = directions[-1] * scale
+    return along / along[2], float(values[-2] / values[-1])
 
 
 def _fit(robot: Robot, data: CriticalMode, start: Array) -> tuple[Array, Array]:

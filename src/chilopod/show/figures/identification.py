@@ -1,9 +1,7 @@
-"""G: how well the printed numbers determine the constants that the paper does not print."""
+"""How well a critical spring and its mode determine the constants of the planar model."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chilopod.paper import printed
 from chilopod.robot import Robot
 from chilopod.show import style
-from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
 from chilopod.tasks.identify import Identification
@@ -24,33 +20,33 @@ Array = NDArray[np.float64]
 
 _WIDE = style.Layout("ABC;DEF", 6.2)
 _NARROW = style.Layout("A;B;C;D;E;F", 17.0)
-
-
-def identification_files(found: Identification, folder: Path) -> Iterator[tuple[Path, bytes]]:
-    """Files of the profile, its figure and the data, see :func:`chilopod.show.files.panel_files`."""
-    return panel_files(panel(found), folder, folder)
+_COLUMNS = {
+    *("friction", "half_width", "largest_residual", "critical_k1"),
+    *("uniform", "uniform_frequency", "coefficient", "verdict"),
+}
+"""Columns of a profile that are no variants."""
 
 
 def panel(fit: Identification) -> Panel:
     """The profile of a fit, with the robot it was given beside."""
-    data, best = fit.profile, fit.best
+    data, best, count = fit.profile, fit.best, len(fit.residuals)
     inside = data.largest_residual.values <= 1.0
     largest, ours = (float(np.abs(each).max()) for each in (fit.residuals, fit.preset_residuals))
     return Panel(
         name="identification",
-        letter="G",
-        title="The constants the paper does not print",
+        title="The constants of the feet",
         draw=lambda narrow: _draw(fit, narrow),
         alt="Six profiles over the forward offset of the feet: largest residual, friction, half-width, predictions for "
         "the variants and for uniform springs, and the coefficient of the pitchfork with its change of sign.",
         text=(
             "How hard the feet hold on the floor (friction), how far they stand to the side (half-width) and how far "
-            "ahead of the middle of their module (forward offset) is not printed. They are fitted to six printed "
-            "numbers, the critical spring and the five components of the mode. A residual of 1 is half of the last "
-            "printed digit: below 1, a computed number rounds to the printed one.",
+            f"ahead of the middle of their module (forward offset) is fitted to {count} numbers: the critical spring "
+            f"and the {count - 1} components of the mode. A residual of 1 is the tolerance of a number; for printed "
+            "numbers that is half of the last digit, so that below 1 a computed number rounds to the printed one. The "
+            "curves have, at each forward offset, the friction and the half-width whose largest residual is smallest.",
             f"The best fit has {best.ground.friction:.1f} N·s/m, {1e3 * best.legs.half_width:.1f} mm and "
-            f"{1e3 * best.legs.forward_offset:.1f} mm, with a largest residual of "
-            f"{number(largest, 2)}: {'all six are met' if largest <= 1.0 else 'not all six are met'}. "
+            f"{1e3 * best.legs.forward_offset:.1f} mm, the least squares of the residuals, with a largest residual of "
+            f"{number(largest, 2)}: {'all' if largest <= 1.0 else 'not all'} {count} are met. "
             + f"This robot, with {1e3 * fit.given.legs.forward_offset:.1f} mm, has {number(ours, 3)}. "
             + _valley(fit),
             _predicted(data, inside),
@@ -63,15 +59,15 @@ def panel(fit: Identification) -> Panel:
 def _valley(fit: Identification) -> str:
     allowed = fit.allowed("legs.forward_offset")
     if allowed is None:
-        return "No constants meet all six."
+        return "No constants meet all of them."
     return (
         f"The valley is flat: for every forward offset between {1e3 * allowed[0]:.0f} and {1e3 * allowed[1]:.0f} mm "
-        "(shaded) there are values of the other two with which all six printed numbers come out."
+        "(shaded) there are values of the other two with which all of the numbers come out."
     )
 
 
 def _variants_of(data: xr.Dataset) -> list[str]:
-    return [name for name in printed.VARIANTS if name in data]
+    return [str(name) for name in data if name not in _COLUMNS]
 
 
 def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
@@ -82,12 +78,11 @@ def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
         values = data[name].values[inside]
         return f"{number(float(np.nanmin(values)))} to {number(float(np.nanmax(values)))}"
 
+    variants = listing(f"{span(name)} for {typeset(name)}" for name in _variants_of(data))
+    others = f"Along the shaded valley the critical spring of variants, which were not fitted, is {variants}. "
     return (
-        "What does that leave open? Along the shaded valley the variants, which were not fitted, move little: "
-        + listing(f"{span(name)} for {typeset(name)}" for name in _variants_of(data))
-        + f" (all in {SPRING_UNIT}). The critical spring of a uniform body moves much more: "
-        f"{span('uniform')} {SPRING_UNIT}. That one number, had it been printed for the planar "
-        "model, would narrow the forward offset."
+        f"{others if variants else ''}The critical spring of a uniform body, which was not fitted, is "
+        f"{span('uniform')} along the valley (all in {SPRING_UNIT})."
     )
 
 
@@ -98,7 +93,7 @@ def _verdict(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
         return (
             "The direction of the pitchfork changes within the valley: its coefficient passes zero near a forward "
             f"offset of {listing(f'{1e3 * x:.1f} mm' for x in where)}, from {data.verdict.values[0]} on the left to "
-            f"{data.verdict.values[-1]} on the right. So the printed numbers do not decide whether the bend of this "
+            f"{data.verdict.values[-1]} on the right. So the data do not decide whether the bend of this "
             "model sets in gently or with a jump."
         )
     if len(words) == 1:
@@ -120,9 +115,9 @@ def _draw(fit: Identification, narrow: bool) -> Figure:
     allowed = fit.allowed("legs.forward_offset")
     for one in axes.values():
         if allowed is not None:
-            one.axvspan(1e3 * allowed[0], 1e3 * allowed[1], color=style.PALE, lw=0, label="rounding allows")
+            one.axvspan(1e3 * allowed[0], 1e3 * allowed[1], color=style.PALE, lw=0, label="tolerances allow")
         one.set(xlim=(x[0], x[-1]), xlabel="forward offset (mm)")
-    _fitted(axes["A"], x, data.largest_residual.values, "How well the six fit", "largest residual")
+    _fitted(axes["A"], x, data.largest_residual.values, "How well the data are met", "largest residual")
     axes["A"].axhline(1.0, color=style.BLACK, lw=1.0, linestyle=":")
     axes["A"].set_ylim(0.0, 1.15 * max(data.largest_residual.values.max(), 1.0))
     _fitted(axes["B"], x, data.friction.values, "Friction fitted", "friction (N·s/m)")
@@ -149,16 +144,19 @@ def _mark(axes: dict[str, Axes], robot: Robot, residuals: Array, marker: str, **
 
 
 def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
-    axes.set_title("Not fitted: variants")
-    for index, name in enumerate(_variants_of(data)):
+    names = _variants_of(data) or ["critical_k1"]
+    axes.set_title("Not fitted: variants" if _variants_of(data) else "Critical spring")
+    for index, name in enumerate(names):
         values = data[name].values
         axes.plot(x, values, color=style.CURVES[index], linestyle=("-", "--", "-.")[index % 3])
         # Curves rise: there is room above the left of the highest and below the right of the others.
         place, away, ha, va = len(x) // 3, -5, "left", "top"
-        if name == max(_variants_of(data), key=lambda each: float(data[each].mean())):
+        if name == max(names, key=lambda each: float(data[each].mean())):
             place, away, ha, va = int(0.75 * len(x)), 5, "right", "bottom"
-        style.note(axes, typeset(name), (x[place], values[place]), (0, away), ha=ha, va=va)
-    values = np.array([data[name].values for name in _variants_of(data)])
+        style.note(
+            axes, typeset(name) if _variants_of(data) else "", (x[place], values[place]), (0, away), ha=ha, va=va
+        )
+    values = np.array([data[name].values for name in names])
     axes.set(ylim=(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5), ylabel=f"critical k₁ ({SPRING_UNIT})")
 
 
