@@ -141,13 +141,6 @@ def test_an_unwritable_folder_is_refused_before_any_work(capsys, tmp_path):
     assert len(err.splitlines()) == 1
 
 
-def test_an_unknown_section_of_the_report_offers_the_nearest(capsys, tmp_path):
-    code, out, err = call(capsys, "reproduce", "--only", "variant", "--out", tmp_path / "report")
-    assert (code, out) == (2, "")
-    assert "variants" in err
-    assert not (tmp_path / "report").exists()
-
-
 def test_a_search_without_time_says_so(capsys):
     code, out, err = bifurcation(capsys, "--seconds", "0")
     assert code == 0

@@ -32,7 +32,7 @@ def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records():
 
 def test_what_walks_loads_the_twin_only_where_it_walks():
     code = "from chilopod.tasks import turn, radius_law\nfrom chilopod.trials import NONE, Trial, run, together"
-    assert loaded(code, "mujoco", "matplotlib", "cmaes") == set()
+    assert loaded(code, "mujoco", "matplotlib", "cmaes", "distributed") == set()
 
 
 def test_the_live_page_and_the_environments_know_no_paper():
