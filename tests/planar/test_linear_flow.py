@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from planar_reference import EXTENDED, LD, coordinates, fine_flow
-from planar_strategies import log_floats, nonlinear_flow, robots
 
 from chilopod import load_robot
 from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.planar.linear import joint_bound, mass_matrix
+from helpers.planar_reference import EXTENDED, LD, coordinates, fine_flow
+from helpers.planar_strategies import log_floats, nonlinear_flow, robots
 
 import peer_model
 

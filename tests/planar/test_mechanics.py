@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_strategies import energy_rate, mid_interval, robots, state_of
 from scipy.integrate import solve_ivp
 
 from chilopod import Robot, load_robot
@@ -14,6 +13,7 @@ from chilopod.planar import PlanarModel, energy, powers
 from chilopod.planar.energy import module_motion
 from chilopod.planar.linear import mass_matrix
 from chilopod.stability import multipliers
+from helpers.planar_strategies import energy_rate, mid_interval, robots, state_of
 
 PRESET = load_robot("aoi2022-planar")
 fractions = st.floats(0.0, 0.999)
@@ -117,10 +117,7 @@ def test_other_units_of_length_mass_and_time_change_nothing_else(robot, a, b, c)
             "stiffness": [k * torque for k in robot.springs.stiffness],
             "damping": [d * torque * time for d in robot.springs.damping],
         },
-        legs={
-            "forward_offset": robot.legs.forward_offset * length,
-            "half_width": robot.legs.half_width * length,
-        },
+        legs={"forward_offset": robot.legs.forward_offset * length, "half_width": robot.legs.half_width * length},
         gait={
             "stride": gait.stride * length,
             "stance": gait.stance * time,

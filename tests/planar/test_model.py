@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_strategies import robots, state_of
 
 from chilopod import load_robot
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.stability import PeriodicSystem, SystemLike
+from helpers.planar_strategies import robots, state_of
 
 PRESET = load_robot("aoi2022-planar")
 MODEL = PlanarModel(PRESET)

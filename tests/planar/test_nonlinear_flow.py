@@ -5,14 +5,14 @@ import math
 import numba
 import numpy as np
 import pytest
-from free_bodies import FreeBodies
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_strategies import mid_interval, robots, state_of
 
 from chilopod import load_robot
 from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
+from helpers.free_bodies import FreeBodies
+from helpers.planar_strategies import mid_interval, robots, state_of
 
 PRESET = load_robot("aoi2022-planar")
 

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from planar_reference import EXTENDED, LD, PI, fine_flow
-from planar_strategies import robots
 
 from chilopod import Robot, load_robot
 from chilopod.paper.fit_data import critical_mode_data
@@ -15,6 +13,8 @@ from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.stability import Criticality, Kind, exponents, locate, multipliers
 from chilopod.units import parse
+from helpers.planar_reference import EXTENDED, LD, PI, fine_flow
+from helpers.planar_strategies import robots
 
 PRESET = load_robot("aoi2022-planar")
 UNIT = parse("1 N*mm/deg", "N*m/rad")

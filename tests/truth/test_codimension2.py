@@ -9,16 +9,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_b
 
-from chilopod.stability import (
-    BifurcationPoint,
-    CodimensionTwo,
-    Ending,
-    Kind,
-    PeriodicSystem,
-    follow2,
-    from_rhs,
-    locate,
-)
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, PeriodicSystem, follow2, from_rhs, locate
 
 
 def mapped(dimension, image, error=1e-15, **known):
@@ -375,10 +366,7 @@ def test_folds_of_cycles_of_an_autonomous_system():
 
     def family2(p, q):
         return replace(
-            plain(p, q),
-            period=None,
-            velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2],
-            guess_period=2.0 * np.pi,
+            plain(p, q), period=None, velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2], guess_period=2.0 * np.pi
         )
 
     x = -np.sqrt(0.1 / 3.0)

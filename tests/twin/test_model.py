@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 import pytest
-from leg_tips import tip_place
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
@@ -11,6 +10,7 @@ from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.twin import TwinModel
 from chilopod.twin.legs import joint_angles
+from helpers.leg_tips import tip_place
 
 PRESET = load_robot("aoi2022")
 

@@ -199,8 +199,7 @@ def test_a_killed_study_goes_on_and_gives_the_same_bits(tmp_path):
     expected = study(whole).criteria
 
     running = subprocess.Popen(
-        [sys.executable, "-c", f"{STUDY}study(sys.argv[1])", str(killed)],
-        env={**os.environ, "NUMBA_NUM_THREADS": "1"},
+        [sys.executable, "-c", f"{STUDY}study(sys.argv[1])", str(killed)], env={**os.environ, "NUMBA_NUM_THREADS": "1"}
     )
     deadline = time.monotonic() + 60.0
     while len(list(killed.glob("planar-*.nc"))) < 10 and time.monotonic() < deadline:
