@@ -71,7 +71,7 @@ def test_what_cannot_walk_is_refused_in_one_line(capsys, arguments, complaint, t
 
 
 def test_a_turn_does_not_walk_its_law_anew(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(importlib.import_module("chilopod.tasks.radius_law"), "DURATION", 45.0)
+    monkeypatch.setattr(importlib.import_module("chilopod.tasks.radius_law"), "DURATION", 25.0)
     arguments = ["turn", ROBOT, "--engine", "twin", "--target", "45 deg, 1.3 m", "--k1", "law", "--duration", "2 s"]
     first = printed(capsys, *arguments, "--trials", str(tmp_path), "--json")
     kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.iterdir()}

@@ -217,20 +217,6 @@ def test_a_killed_study_goes_on_and_gives_the_same_bits(tmp_path):
     xr.testing.assert_identical(result, expected)
 
 
-def test_a_damaged_record_is_walked_again(tmp_path):
-    def go():
-        return turning_task(ROBOT, TASK_A, (9.0,), 2, duration=2.0, shown=(9.0,), folder=tmp_path)
-
-    first = go()
-    files = sorted(tmp_path.glob("planar-*.nc"))
-    whole = files[0].stat().st_mtime_ns
-    files[1].write_bytes(files[1].read_bytes()[:1000])
-    second = go()
-    xr.testing.assert_identical(first.criteria, second.criteria)
-    assert files[0].stat().st_mtime_ns == whole
-    assert files[1].stat().st_size > 1000
-
-
 def test_findings_of_another_robot(found):
     """Where nothing arrives the words still hold."""
     stiff = turning_task(ROBOT, TASK_A, (60.0, 75.0), repeats=2, duration=5.0, shown=(60.0, 60.0, 75.0))
