@@ -237,12 +237,6 @@ def test_numbers_out_of_range_are_refused_when_set(override):
     assert override.partition("=")[0].endswith(caught.value.field)
 
 
-def test_a_robot_without_a_twin_cannot_be_built():
-    with pytest.raises(ParameterError) as caught:
-        TwinModel(load_robot("aoi2022-planar"))
-    assert caught.value.field == "twin"
-
-
 def test_a_robot_of_which_mujoco_warns_is_refused():
     with pytest.raises(ParameterError, match=r"MuJoCo cannot build this robot .*singular"):
         TwinModel(PRESET.set_from_text(["body.length=1e9 m"]))
