@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test run-tests test-processors test-lowest test-newest torture lint types format docs renew package bench lock clean
+.PHONY: help setup reproduce test run-tests test-processors test-lowest test-newest torture lint style layers types format docs renew package bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -13,9 +13,10 @@ LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
 BENCH := $(VENV)/.bench-installed
-# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way. Threads of
-# numba that have nothing to do sleep: by default they wait actively, and take the other processes' time.
-JOBS ?= 2
+# Test processes at once, one more than cores: some tests wait for a browser, a cluster, or the clock. Each has one
+# thread for linear algebra, as more would stand in each other's way. Threads of numba that have nothing to do sleep:
+# by default they wait actively, and take the other processes' time.
+JOBS ?= 3
 ALONGSIDE := OPENBLAS_NUM_THREADS=1 OMP_WAIT_POLICY=passive
 
 # Makes .venv with the first suitable Python, unless a working one is there.
@@ -52,8 +53,8 @@ $(DEV): pyproject.toml $(LOCK)
 	@echo "Installing chilopod, what it runs on and what its tests need"
 	@$(PIP) install -c $(LOCK) setuptools
 	@$(PIP) install -c $(LOCK) --no-build-isolation --no-compile -e '.[dev]'
-	@# pip would compile on one core, the tests of packages too.
-	@$(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true
+	@# pip would compile on one core, the tests of packages and what hardly anything imports too.
+	@$(BIN)/python -m compileall -qq -j 0 -x '/(tests?|debugpy|fontTools|mypyc?|OpenGL|pip)/' $(VENV)/lib || true
 	@touch $(RUNTIME) $@
 
 $(BENCH): $(RUNTIME) $(LOCK_BENCH)
@@ -64,8 +65,8 @@ $(BENCH): $(RUNTIME) $(LOCK_BENCH)
 reproduce: $(RUNTIME)  ## compute the paper's results and write report/index.html; options in ARGS="--quick"
 	$(BIN)/chilopod reproduce $(ARGS)
 
-test: lint  ## all checks and all tests
-	@$(MAKE) --no-print-directory -j 2 types run-tests
+test: style  ## all checks and all tests
+	@$(MAKE) --no-print-directory -j 2 run-tests layers types
 
 run-tests: $(DEV)
 	$(ALONGSIDE) $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
@@ -104,9 +105,13 @@ test-newest: $(UV)  ## the same with the newest that there are
 torture: $(DEV)  ## attack it for ten minutes, and count what came of it; options in ARGS="kills --seed 7 --minutes 3"
 	$(BIN)/python torture/run.py --save $(ARGS)
 
-lint: $(DEV)  ## style and the contracts between layers
+lint: style layers  ## style and the contracts between layers
+
+style: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+layers: $(DEV)
 	$(BIN)/lint-imports
 
 types: $(DEV)  ## static types

@@ -70,10 +70,7 @@ def test_what_is_refused_leaves_nothing(capsys, tmp_path, monkeypatch, arguments
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ["walk", ROBOT, "--duration", "1 s", "--out", "there/walks.nc"],
-        ["stability", ROBOT, "--out", "there"],
-    ],
+    [["walk", ROBOT, "--duration", "1 s", "--out", "there/walks.nc"], ["stability", ROBOT, "--out", "there"]],
 )
 def test_what_cannot_be_written_is_printed_all_the_same(capsys, tmp_path, monkeypatch, arguments):
     real = os.replace

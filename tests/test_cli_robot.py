@@ -203,13 +203,6 @@ def test_random_overrides(stem, rest, value):
         assert err.count("\n") == 1
 
 
-@given(st.binary(max_size=300))
-def test_random_files(tmp_path_factory, content):
-    file = tmp_path_factory.getbasetemp() / "hostile.toml"
-    file.write_bytes(content)
-    assert "hostile.toml: " in refused("robot", "check", str(file))
-
-
 def test_faults_of_our_own_show_no_traceback_unless_asked(monkeypatch):
     def broken(self, assignments):
         raise TypeError("two\nlines")

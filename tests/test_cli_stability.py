@@ -141,13 +141,6 @@ def test_an_unwritable_folder_is_refused_before_any_work(capsys, tmp_path):
     assert len(err.splitlines()) == 1
 
 
-def test_an_unknown_section_of_the_report_offers_the_nearest(capsys, tmp_path):
-    code, out, err = call(capsys, "reproduce", "--only", "variant", "--out", tmp_path / "report")
-    assert (code, out) == (2, "")
-    assert "variants" in err
-    assert not (tmp_path / "report").exists()
-
-
 def test_a_search_without_time_says_so(capsys):
     code, out, err = bifurcation(capsys, "--seconds", "0")
     assert code == 0
@@ -174,7 +167,7 @@ _PATHS = st.one_of(
 @example(parameter=K1, low="1e-12", high="1e9")
 @example(parameter="gait.stride", low="1 um", high="1 km")
 def test_random_arguments_never_end_in_a_traceback(capsys, parameter, low, high):
-    search = ("bifurcation", PRESET, f"--parameter={parameter}", "--seconds", "0.5", "--between", low, high)
+    search = ("bifurcation", PRESET, f"--parameter={parameter}", "--seconds", "0.1", "--between", low, high)
     code, out, err = call(capsys, *search)
     assert code in (0, 2)
     assert "Traceback" not in err

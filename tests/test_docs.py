@@ -1,16 +1,15 @@
 """What README and docs show is what commands and blocks print."""
 
 import contextlib
-import importlib
 import io
 import json
 import re
 import shlex
-import sys
 from decimal import Decimal
 from pathlib import Path
 
 import pytest
+import renew
 import typer
 from PIL import Image
 
@@ -19,8 +18,6 @@ from chilopod.cli import app
 from chilopod.robot import load_robot
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / "docs"))
-renew = importlib.import_module("renew")
 
 FENCED = re.compile(
     r"^(?:<!-- (?P<why>not run: [^\n]+|run by make renew) -->\n)?```(?P<kind>\w+)\n(?P<code>.*?)^```$", re.M | re.S

@@ -37,10 +37,7 @@ def test_round_off_in_phases_makes_no_extra_legs_or_switches():
     assert gait.leg_phases(1000)[999, 0] == 0.0
     schedule = gait.schedule(1000)
     np.testing.assert_allclose(
-        schedule.times,
-        [0.0, 0.01, 0.1, 0.11, 0.2, 0.21, 0.3, 0.31, 0.4, 0.41, 0.5, 0.51, 0.6],
-        rtol=0,
-        atol=1e-12,
+        schedule.times, [0.0, 0.01, 0.1, 0.11, 0.2, 0.21, 0.3, 0.31, 0.4, 0.41, 0.5, 0.51, 0.6], rtol=0, atol=1e-12
     )
     assert schedule.times[-1] == gait.period
     np.testing.assert_array_equal(schedule.contact[:, 0], schedule.contact[:, 999])

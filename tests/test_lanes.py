@@ -97,15 +97,10 @@ def test_a_wish_not_to_compile_is_refused_in_one_line():
 
 @pytest.mark.parametrize(
     ("command", "name", "value"),
-    [
-        ("['walk', 'aoi2022-planar', '--duration', '0.1 s']", "", "tbb"),
-        ("['walk', 'aoi2022-planar', '--duration', '0.1 s']", "_PRIORITY", "zzz"),
-        ("['doctor', '--json']", "", "safe"),
-        ("['doctor', '--json']", "_PRIORITY", "zzz"),
-    ],
+    [("['walk', 'aoi2022-planar', '--duration', '0.1 s']", "", "tbb"), ("['doctor', '--json']", "_PRIORITY", "zzz")],
 )
 def test_threads_that_cannot_be_had_are_one_line(command, name, value):
-    if value in ("tbb", "safe") and find_library("tbb"):
+    if value == "tbb" and find_library("tbb"):
         pytest.skip("they can be had")
     wish = {f"NUMBA_THREADING_LAYER{name}": value}
     done = _python(f"from chilopod.cli import main; raise SystemExit(main({command}))", **wish)

@@ -16,9 +16,7 @@ from chilopod.numba_internals import ABOVE
 
 PACKAGE = Path(chilopod.__file__).parent
 INTERNALS = {
-    "numba.core.caching": {
-        "numba_internals.py": ("CompileResultCacheImpl", "FunctionCache", "IndexDataCacheFile"),
-    },
+    "numba.core.caching": {"numba_internals.py": ("CompileResultCacheImpl", "FunctionCache", "IndexDataCacheFile")},
     "numba.core.typeconv": {"numba_internals.py": ("Conversion",)},
     "numba.core.typing": {"numba_internals.py": ("signature",)},
     "numba.core": {"numba_internals.py": ("cgutils", "event")},

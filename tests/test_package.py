@@ -16,10 +16,7 @@ import chilopod
 ROOT = Path(__file__).parent.parent
 RELEASE = chilopod.__version__.partition("+")[0]
 BUILD = runpy.run_path(str(ROOT / "packaging" / "build.py"))
-REQUIRED = {
-    "software": {"authors", "cff-version", "message", "title"},
-    "article": {"authors", "title", "type"},
-}
+REQUIRED = {"software": {"authors", "cff-version", "message", "title"}, "article": {"authors", "title", "type"}}
 """Of the Citation File Format 1.2.0; a reference is of a type, the file itself need not say."""
 ALLOWED = {
     "software": {*REQUIRED["software"], "abstract", "keywords", "license", "references", "type", "version"},
@@ -33,10 +30,7 @@ needs_git = pytest.mark.skipif(not shutil.which("git"), reason="no git")
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no repository")
 def test_distributions_hold_what_git_tracks_and_nothing_else(tmp_path):
     sdist, wheel = BUILD["build"](tmp_path)
-    assert (sdist.name, wheel.name) == (
-        f"chilopod-{RELEASE}.tar.gz",
-        f"chilopod-{RELEASE}-py3-none-any.whl",
-    )
+    assert (sdist.name, wheel.name) == (f"chilopod-{RELEASE}.tar.gz", f"chilopod-{RELEASE}-py3-none-any.whl")
     assert BUILD["faults"](sdist, wheel) == []
 
 

@@ -72,10 +72,7 @@ def robots(draw):
     return Robot(
         name=draw(st.text("abc -_'\"\\äµ", min_size=1).filter(str.strip)),
         body=Body(
-            modules=joints + 1,
-            length=draw(positive),
-            mass=draw(positive),
-            yaw_inertia=draw(st.none() | positive),
+            modules=joints + 1, length=draw(positive), mass=draw(positive), yaw_inertia=draw(st.none() | positive)
         ),
         springs=Springs(
             stiffness=draw(st.lists(positive, min_size=joints, max_size=joints)),

@@ -1,19 +1,19 @@
 """Pages lead somewhere, and what the site generates leaves nothing out. The site itself is built by `make docs`."""
 
-import importlib
 import re
-import sys
 from pathlib import Path
 
+import check
+import conf
+import extension
 import pytest
+import reference
 import typer
 
 from chilopod.cli import app
 from chilopod.robot.parameters import QUANTITIES
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / "docs"))
-check, conf, extension, reference = map(importlib.import_module, ("check", "conf", "extension", "reference"))
 
 
 @pytest.mark.parametrize("page", check.PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())

@@ -1,18 +1,18 @@
 """The harness attacks for some seconds what is cheap to attack; and it finds faults that are planted."""
 
-import importlib
-import sys
 from pathlib import Path
 
 import pytest
 
 import chilopod.robot
 import chilopod.tasks
+import in_process
+import outcomes
+import processors
+import run
+import workers
 from chilopod.planar.walk import PlanarWalk
 
-sys.path.append(str(Path(__file__).parent.parent / "torture"))
-names = ("run", "workers", "outcomes", "in_process", "processors")
-run, workers, outcomes, in_process, processors = map(importlib.import_module, names)
 Kind = outcomes.Kind
 SEED = 13
 SHORT = {

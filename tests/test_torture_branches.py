@@ -1,16 +1,15 @@
 """The campaign of random branches finds faults that are planted, and what it says of some branches."""
 
-import importlib
-import sys
 from dataclasses import replace
-from pathlib import Path
 from random import Random
 
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parent.parent / "torture"))
-branches, checks, kinds, own = map(importlib.import_module, ("branches", "branch_checks", "branch_kinds", "own_flow"))
+import branch_checks as checks
+import branch_kinds as kinds
+import branches
+import own_flow as own
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from gymnasium.wrappers.vector import RecordEpisodeStatistics as RecordBatchStatistics
 
 import chilopod.gym
-from chilopod import load_robot, planar
+from chilopod import load_robot
 from chilopod.errors import ChilopodError, ExtraError, ParameterError
 from chilopod.gym import Episodes, OneTarget, Rewards, RobotEnv, Steered, baseline, episodes
 from chilopod.paper import printed
@@ -408,12 +408,6 @@ def test_episodes_that_no_memory_holds_are_refused(monkeypatch):
 def test_rewards_are_numbers(worth):
     with pytest.raises(ParameterError, match="arrival"):
         Rewards(arrival=worth)
-
-
-@pytest.mark.parametrize("expected", [np.nan, -1.0])
-def test_how_long_a_walk_is_likely_to_be_is_a_time(expected):
-    with pytest.raises(ParameterError, match="expected"):
-        planar.start(load_robot("aoi2022-planar"), expected=expected)
 
 
 @dataclasses.dataclass(frozen=True)

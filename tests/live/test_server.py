@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import importlib
 import os
 import re
 import signal
@@ -23,6 +22,10 @@ import xarray as xr
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+import in_process
+import live_clients
+import outcomes
+import workers
 from chilopod import process
 from chilopod.cli import main
 from chilopod.errors import ParameterError
@@ -33,10 +36,6 @@ from chilopod.robot import load_robot
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:websockets", "ignore::DeprecationWarning:viser")
 
-sys.path.append(str(Path(__file__).parents[2] / "torture"))
-live_clients, workers, in_process, outcomes = map(
-    importlib.import_module, ("live_clients", "workers", "in_process", "outcomes")
-)
 PLANAR = load_robot("aoi2022-planar")
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -193,11 +192,7 @@ def test_clients_that_are_not_the_page_get_nowhere(attacks, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "planted"),
-    [
-        ("_unwelcome", lambda *_: None),
-        ("_offers", lambda *_: True),
-        ("message", lambda self, connection, raw: raw),
-    ],
+    [("_unwelcome", lambda *_: None), ("_offers", lambda *_: True), ("message", lambda self, connection, raw: raw)],
 )
 def test_the_attacks_find_a_gate_that_is_open(attacks, tmp_path, monkeypatch, name, planted):
     monkeypatch.setattr(gate.Gate, name, planted)

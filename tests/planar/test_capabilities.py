@@ -29,14 +29,7 @@ flows_each: FlowsEach = FOLLOWED
 
 def test_the_models_have_the_capabilities_they_declare() -> None:
     for model in (MODEL, FOLLOWED):
-        for capability in (
-            SystemLike,
-            KnowsOrbit,
-            SpatiallySymmetric,
-            FlowsWithError,
-            FlowsStates,
-            FlowsMany,
-        ):
+        for capability in (SystemLike, KnowsOrbit, SpatiallySymmetric, FlowsWithError, FlowsStates, FlowsMany):
             assert isinstance(model, capability), capability.__name__
     assert isinstance(FOLLOWED, FlowsEach)
     assert not isinstance(MODEL, FlowsEach)

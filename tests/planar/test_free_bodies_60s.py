@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from free_bodies import FreeBodies
 
 from chilopod import load_robot
 from chilopod.integrate import integrator
 from chilopod.planar import PlanarModel
 from chilopod.planar.model import carry
+from helpers.free_bodies import FreeBodies
 
 N_MM_PER_DEG = 1e-3 * 180 / np.pi
 MINUTE = 60.0

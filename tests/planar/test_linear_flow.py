@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from planar_reference import EXTENDED, LD, coordinates, fine_flow
-from planar_strategies import log_floats, nonlinear_flow, robots
 
 from chilopod import load_robot
+from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.planar.linear import joint_bound, mass_matrix
+from helpers.planar_reference import EXTENDED, LD, coordinates, fine_flow
+from helpers.planar_strategies import log_floats, nonlinear_flow, robots
 
 import peer_model
 
@@ -122,8 +123,7 @@ def test_the_bound_holds_when_feet_stride_over_more_than_a_module():
 @finer
 @pytest.mark.parametrize("modules", [20, 30])
 def test_the_bound_holds_for_long_chains(modules):
-    robot = PRESET.with_value("body.modules", modules)
-    robot = robot.with_value("body.length", 0.225 * modules).with_value("body.mass", 8.5 / 6 * modules)
+    robot = with_modules(PRESET, modules)
     columns = [0, 1, 2, 3, modules, modules + 2, 2 * modules]
     model = PlanarModel(robot)
     _, matrix, bound = model.flow_with_error(model.orbit, 0.0, 0.3)

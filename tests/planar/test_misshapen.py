@@ -16,12 +16,7 @@ MODEL, FOLLOWED = PlanarModel(ROBOT), FollowedModel(ROBOT)
 @pytest.mark.parametrize(
     "call",
     [
-        lambda: MODEL.flow(np.zeros(12), 0.0, 0.1),
-        lambda: MODEL.flow(np.zeros((2, 13)), 0.0, 0.1),
-        lambda: MODEL.flow_states(np.zeros((2, 12)), 0.0, 0.1),
         lambda: MODEL.flow_states(np.zeros(13), 0.0, 0.1),
-        lambda: MODEL.rhs(0.1, np.zeros(3)),
-        lambda: MODEL.drift(np.zeros(16)),
         lambda: PlanarModel.flow_many([], 0.0, 0.1),
         lambda: FollowedModel.flow_each([], np.zeros((0, 13)), 0.0, 0.1),
         lambda: FollowedModel.flow_each([FOLLOWED], np.zeros((1, 5)), 0.0, 0.1),

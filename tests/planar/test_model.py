@@ -6,19 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_strategies import robots, state_of
 
 from chilopod import load_robot
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.stability import PeriodicSystem, SystemLike
+from helpers.planar_strategies import robots, state_of
 
 PRESET = load_robot("aoi2022-planar")
 MODEL = PlanarModel(PRESET)
-
-
-def with_modules(n):
-    return PRESET.override("body.modules", n).with_value("body.length", 0.225 * n).with_value("body.mass", 8.5 / 6 * n)
 
 
 def one_line(caught):
@@ -32,19 +29,13 @@ def one_line(caught):
 def test_states_of_the_wrong_shape_are_refused(x):
     for call in (
         lambda: MODEL.flow(x, 0.0, 0.6),
+        lambda: MODEL.flow_states([x, x], 0.0, 0.6),
         lambda: MODEL.rhs(0.0, x),
         lambda: MODEL.drift(x),
     ):
         with pytest.raises(ParameterError) as caught:
             call()
-        assert "(13,)" in one_line(caught)
-
-
-@pytest.mark.parametrize("states", [np.zeros(13), np.zeros((2, 12)), np.zeros((1, 2, 13)), 0.0])
-def test_batches_of_the_wrong_shape_are_refused(states):
-    with pytest.raises(ParameterError) as caught:
-        MODEL.flow_states(states, 0.0, 0.6)
-    assert "13" in one_line(caught)
+        assert "13" in one_line(caught)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -167,7 +158,7 @@ def test_robots_of_other_springs_flow_together():
 
 @pytest.mark.parametrize("modules", [2, 60])
 def test_robots_of_every_size_walk(modules):
-    model = PlanarModel(with_modules(modules))
+    model = PlanarModel(with_modules(PRESET, modules))
     state, matrix, bound = model.flow_with_error(model.orbit, 0.0, model.period)
     np.testing.assert_array_equal(state, model.orbit)
     assert np.isfinite(matrix).all()
@@ -179,7 +170,7 @@ def test_robots_of_every_size_walk(modules):
 
 
 def test_a_thousand_modules_have_a_right_hand_side_and_a_flow_without_derivative():
-    model = PlanarModel(with_modules(1000))
+    model = PlanarModel(with_modules(PRESET, 1000))
     x = state_of(model, 0, bend=1e-3)
     slope = model.rhs(0.05, x)
     assert slope.shape == (2001,)

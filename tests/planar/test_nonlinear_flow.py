@@ -5,34 +5,30 @@ import math
 import numba
 import numpy as np
 import pytest
-from free_bodies import FreeBodies
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_strategies import mid_interval, nonlinear_flow, robots, state_of
 
 from chilopod import load_robot
+from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
+from helpers.free_bodies import FreeBodies
+from helpers.planar_strategies import mid_interval, robots, state_of
 
 PRESET = load_robot("aoi2022-planar")
-
-
-def with_modules(n):
-    robot = PRESET.with_value("body.modules", n)
-    return robot.with_value("body.length", 0.225 * n).with_value("body.mass", 8.5 / 6 * n)
 
 
 CASES = {
     "preset": PRESET,
     "soft front": PRESET.with_value("springs.stiffness[0]", 0.5),
-    "two modules, damped": with_modules(2).with_value("springs.damping", 0.02),
+    "two modules, damped": with_modules(PRESET, 2).with_value("springs.damping", 0.02),
     "feet far ahead, duty 0.3": PRESET.with_value("gait.stance", 0.2)
     .with_value("gait.swing", 0.4)
     .with_value("legs.forward_offset", 0.1),
-    "duty 0.7, side phase 70 deg": with_modules(4)
+    "duty 0.7, side phase 70 deg": with_modules(PRESET, 4)
     .with_value("gait.stance", 0.42)
     .with_value("gait.swing", 0.18)
     .with_value("gait.side_phase", math.radians(70)),
-    "side phase 0, module phase -50 deg": with_modules(3)
+    "side phase 0, module phase -50 deg": with_modules(PRESET, 3)
     .with_value("gait.side_phase", 0.0)
     .with_value("gait.module_phase", math.radians(-50)),
 }
@@ -182,11 +178,3 @@ def test_inputs_are_left_alone_and_results_are_fresh():
         third, third_matrix = model.flow(x, 0.0, 0.3)
         np.testing.assert_array_equal(again, third)
         np.testing.assert_array_equal(again_matrix, third_matrix)
-
-
-def test_beside_the_straight_walk_means_the_nonlinear_equations():
-    model = PlanarModel(PRESET)
-    _, linear = model.flow(model.orbit, 0.0, 0.6)
-    _, nonlinear = nonlinear_flow(model, model.orbit, 0.0, 0.6)
-    assert not np.array_equal(linear, nonlinear)
-    np.testing.assert_allclose(nonlinear, linear, rtol=0, atol=1e-12)

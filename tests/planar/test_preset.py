@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from planar_reference import EXTENDED, LD, PI, fine_flow
-from planar_strategies import robots
 
 from chilopod import Robot, load_robot
 from chilopod.paper.fit_data import critical_mode_data
+from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.stability import Criticality, Kind, exponents, locate, multipliers
 from chilopod.units import parse
+from helpers.planar_reference import EXTENDED, LD, PI, fine_flow
+from helpers.planar_strategies import robots
 
 PRESET = load_robot("aoi2022-planar")
 UNIT = parse("1 N*mm/deg", "N*m/rad")
@@ -51,10 +52,6 @@ def test_the_pitchfork_with_the_former_constants(former):
     assert point.value / UNIT == pytest.approx(12.00114549050763, rel=1e-13)
     joints = np.abs(point.mode[3:8]) / np.linalg.norm(point.mode[3:8])
     np.testing.assert_allclose(joints, [0.635, 0.358, 0.476, 0.465, 0.163], rtol=0, atol=1e-3)
-
-
-def with_modules(robot, n):
-    return robot.override("body.modules", n).with_value("body.length", 0.225 * n).with_value("body.mass", 8.5 / 6 * n)
 
 
 @pytest.mark.parametrize(

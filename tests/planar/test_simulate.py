@@ -126,39 +126,6 @@ def test_yawed_legs_steer_to_their_side():
     assert float(np.abs(straight.heading).max()) == 0.0
 
 
-def test_moving_the_world_moves_the_walk():
-    turn, shift = 2.1, np.array([3.0, -7.0])
-    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    target = np.array([1.0, 0.8])
-    here = simulate(SOFT, 8.0, initial=initial_states(SOFT, BENT, 0.2), controller=Sideways(), target=target, rate=10.0)
-    there = simulate(
-        SOFT,
-        8.0,
-        initial=initial_states(SOFT, BENT, 0.2 + turn, shift),
-        controller=Sideways(),
-        target=rotation @ target + shift,
-        rate=10.0,
-    )
-    moved = here.position.values @ rotation.T + shift
-    np.testing.assert_allclose(there.position.values, moved, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(there.joint_angle.values, here.joint_angle.values, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(there.distance.values, here.distance.values, rtol=0, atol=1e-6)
-
-
-def test_mirroring_the_world_mirrors_the_walk():
-    """The mirror image of a robot has its left legs half a cycle later: a gait whose front leads by half a turn."""
-    leads = SOFT.gait.period / 2
-    model = PlanarModel(SOFT)
-    x0 = initial_states(SOFT, BENT)[0, :13]
-    x1 = model.flow_states(x0[None], 0.0, leads)[0]
-    whole = simulate(SOFT, 6.0 + leads, initial=initial_states(SOFT, BENT), rate=10.0, tolerance=1e-11)
-    mirrored = simulate(SOFT, 6.0, initial=np.append(model.reflection @ x1, np.zeros(3)), rate=10.0, tolerance=1e-11)
-    later = whole.isel(time=slice(3, None))
-    np.testing.assert_allclose(mirrored.joint_angle.values, -later.joint_angle.values, rtol=0, atol=1e-9)
-    turned = later.heading.values - later.heading.values[0]
-    np.testing.assert_allclose(mirrored.heading.values, -turned, rtol=0, atol=1e-9)
-
-
 def test_neither_company_nor_threads_change_a_bit():
     robots = [SOFT.with_value("springs.stiffness[0]", k) for k in np.linspace(0.4, 3.0, 7)]
     start = initial_states(SOFT, BENT)
@@ -249,12 +216,10 @@ def test_friction_factors_scale_the_feet():
     [
         ({"duration": 0.0}, "duration"),
         ({"duration": -1.0}, "duration"),
-        ({"duration": np.nan}, "duration"),
         ({"duration": 1e9}, "duration"),
         ({"rate": 0.0}, "rate"),
         ({"duration": 9e4, "rate": 1e6}, "rate"),
         ({"tolerance": 1.0}, "tolerance"),
-        ({"robots": []}, "robots"),
         ({"robots": [PRESET, PRESET.set_from_text(["gait.stride=2 cm"])]}, "robots"),
         ({"initial": np.zeros(13)}, "initial"),
         ({"initial": np.zeros((0, 16))}, "initial"),

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from free_bodies import FreeBodies
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_strategies import energy_rate, mid_interval, robots, state_of
 
 from chilopod import load_robot
 from chilopod.compiled import njit
@@ -16,6 +14,8 @@ from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOP
 from chilopod.planar.energy import module_motion
 from chilopod.planar.stretch import _slope
 from chilopod.record import Recording, spring_work
+from helpers.free_bodies import FreeBodies
+from helpers.planar_strategies import energy_rate, mid_interval, robots, state_of
 
 N_MM_PER_DEG = 1e-3 * 180 / np.pi
 PRESET = load_robot("aoi2022-planar").override("springs.adjustable", True)

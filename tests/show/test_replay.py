@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from chilopod.errors import OutputError, ParameterError
+from chilopod.errors import OutputError
 from chilopod.show import replay
 from chilopod.show.scene.frames import body_frames
 from helpers.html_page import Page
@@ -102,11 +102,6 @@ def test_positions_beyond_all_bounds(record):
 def test_page_is_small():
     html = replay(walk(0.0, 0.5, -0.5, duration=25.0, step=0.01), titles="abc", heading="h").html
     assert len(html.encode()) < 300_000
-
-
-def test_every_robot_needs_a_title(record):
-    with pytest.raises(ParameterError, match="titles"):
-        replay(record, titles=["only one"], heading="h")
 
 
 def test_notebook_plays_the_page():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.stability import Ending, Kind, PeriodicSystem, begin, find_orbit, follow, proceed, switch
+from chilopod.stability import Ending, Kind, PeriodicSystem, begin, find_orbit, follow, proceed
 
 
 def of_map(function, dimension, size=1.0):
@@ -148,9 +148,3 @@ def test_what_cannot_be_is_one_line():
     pitchfork = {p: of_map(lambda x, p=p: (1 + p) * x - x**3, 1) for p in (0.0,)}
     with pytest.raises(AnalysisError, match="branches meet here"):
         follow(lambda p: of_map(lambda x: (1 + p) * x - x**3, 1), begin(pitchfork.get, 0.0, [0.0]), (-1.0, 1.0))
-
-
-def test_switching_needs_a_special_point():
-    branch = follow(linear, [0.1], (0.0, 1.0))
-    with pytest.raises(ParameterError, match="must be a special point"):
-        switch(linear, branch.points[1])

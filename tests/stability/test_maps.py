@@ -7,9 +7,7 @@ import pytest
 
 from chilopod.errors import ParameterError
 from chilopod.stability import (
-    Kind,
     find_orbit,
-    follow,
     from_map,
     from_rhs,
     locate,
@@ -22,16 +20,6 @@ from chilopod.stability import (
 
 def logistic(r):
     return from_map(lambda x: ([r * x[0] * (1.0 - x[0])], [[r * (1.0 - 2.0 * x[0])]]), 1)
-
-
-def test_the_cascade_of_the_logistic_map():
-    (doubling,) = locate(logistic, (2.5, 3.2), [0.6])
-    assert abs(doubling.value - 3.0) <= doubling.error_bound < 1e-11
-    (start,) = switch(logistic, doubling)
-    branch = follow(logistic, start, (2.5, 3.6))
-    first, second = branch.special_points
-    assert first.special is second.special is Kind.PERIOD_DOUBLING
-    assert abs(second.value - (1.0 + math.sqrt(6.0))) <= second.bifurcation.error_bound < 1e-9
 
 
 def test_images_are_taken_at_whole_times():

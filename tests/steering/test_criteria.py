@@ -39,13 +39,7 @@ def test_outcomes(bearing):
     broken[0][700:] = np.nan
     broken[1][700:] = np.nan
     result = evaluate(record(*paths, broken, target=target), 14.0)
-    assert result.outcome == (
-        Outcome.ARRIVED,
-        Outcome.OUTSIDE,
-        Outcome.INSIDE,
-        Outcome.OUTSIDE,
-        Outcome.FAILED,
-    )
+    assert result.outcome == (Outcome.ARRIVED, Outcome.OUTSIDE, Outcome.INSIDE, Outcome.OUTSIDE, Outcome.FAILED)
     assert np.isnan(result.distance[4])
     assert np.isnan(result.effort[4])
 

@@ -55,11 +55,7 @@ def test_is_soft_until_the_bend_is_there_then_steady_then_stiff(side):
 
 @pytest.mark.parametrize(
     "what",
-    [
-        {"bearing": 0.01},
-        {"bearing": 1.2, "bend": 7.0},
-        {"bearing": 1.5, "distance": 0.2, "bend": 2.0},
-    ],
+    [{"bearing": 0.01}, {"bearing": 1.2, "bend": 7.0}, {"bearing": 1.5, "distance": 0.2, "bend": 2.0}],
     ids=["the target is ahead", "a joint is bent too far", "the tightest circle leads round the target"],
 )
 def test_straightens(what):

@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import edited_controllers as edits
 from chilopod import load_robot
 from chilopod.engine import Command, Event
 from chilopod.trials import Trial, run
 from chilopod.trials.reach import Reach, UnknownKindError
 
-sys.path.append(str(Path(__file__).parents[2] / "torture"))
-edits = importlib.import_module("edited_controllers")
 PLANAR = load_robot("aoi2022-planar")
 REFUSED = {"hidden state", "ufunc of one's own", "imported by name", "state of a generator"}
 BY_NAME = {"global by name", "attribute by name", "evaluated", "helper by name"}

@@ -5,10 +5,20 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Criticality, Ending, Kind, PeriodicSystem, begin, follow, from_rhs, locate, switch
+from chilopod.stability import (
+    Criticality,
+    Ending,
+    Kind,
+    PeriodicSystem,
+    begin,
+    follow,
+    from_map,
+    from_rhs,
+    locate,
+    switch,
+)
 
 
 def of_map(function, derivative, dimension=1, **more):
@@ -63,7 +73,7 @@ def crossing(p):
 
 
 def logistic(r):
-    return of_map(lambda x: r * x * (1 - x), lambda x: r * (1 - 2 * x))
+    return from_map(lambda x: (r * x * (1 - x), np.diag(r * (1 - 2 * x))), 1)
 
 
 def henon(a, b=0.3):
@@ -216,21 +226,6 @@ def test_two_period_doublings_within_a_step(width):
     assert within(branch.special_points[1], 0.5 + off)
 
 
-def integrated(velocity, jacobian, dimension, guess_period):
-    """A system that does not depend on time, by an integrator of its own."""
-
-    def flow(x, t0, t1):
-        def both(t, y):
-            state = y[:dimension]
-            return np.append(velocity(state), (jacobian(state) @ y[dimension:].reshape(dimension, -1)).ravel())
-
-        start = np.append(x, np.eye(dimension).ravel())
-        end = solve_ivp(both, (t0, t1), start, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-        return end[:dimension], end[dimension:].reshape(dimension, dimension)
-
-    return PeriodicSystem(dimension, None, flow, velocity=velocity, guess_period=guess_period)
-
-
 def radial(constant, linear, omega=2.0):
     """r' = r (constant + linear r^2 - r^4), theta' = omega."""
 
@@ -349,34 +344,6 @@ def test_period_doubling_of_an_orbit_with_a_period_of_its_own():
         assert point.period == pytest.approx(4 * pi, rel=1e-9)
         assert point.multipliers[0].real == pytest.approx(exp(-8 * pi * point.value), rel=1e-6)
         assert point.stable
-
-
-def van_der_pol(mu):
-    return integrated(
-        lambda x: np.array([x[1], mu * (1 - x[0] ** 2) * x[1] - x[0]]),
-        lambda x: np.array([[0, 1], [-2 * mu * x[0] * x[1] - 1, mu * (1 - x[0] ** 2)]]),
-        2,
-        6.3,
-    )
-
-
-def test_van_der_pol_by_liouville():
-    """The multiplier is exp of the integral of the divergence; the period is 2 pi (1 + mu^2/16 - 5 mu^4/3072 + ...)."""
-    branch = follow(van_der_pol, begin(van_der_pol, 0.2, [2.0, 0.0]), (0.2, 1.0), points=20, closely=False)
-    assert branch.ending is Ending.LEFT_INTERVAL
-    assert branch.points[-1].value == 1.0
-    assert not branch.special_points
-    first = branch.points[0]
-    assert first.period == pytest.approx(2 * pi * (1 + 0.2**2 / 16 - 5 * 0.2**4 / 3072), rel=1e-6)
-    for point in branch.points:
-        mu = point.value
-
-        def rates(t, y, mu=mu):
-            return [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0], mu * (1 - y[0] ** 2)]
-
-        end = solve_ivp(rates, (0, point.period), [*point.orbit, 0.0], method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-        assert end[:2] == pytest.approx(point.orbit, abs=1e-7)
-        assert point.multipliers[0].real == pytest.approx(exp(end[2]), rel=1e-6)
 
 
 def square(mu):

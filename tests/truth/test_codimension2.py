@@ -9,25 +9,16 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_b
 
-from chilopod.stability import (
-    BifurcationPoint,
-    CodimensionTwo,
-    Ending,
-    Kind,
-    PeriodicSystem,
-    follow2,
-    from_rhs,
-    locate,
-)
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, PeriodicSystem, follow2, from_rhs, locate
 
 
-def mapped(dimension, image, **known):
+def mapped(dimension, image, error=1e-15, **known):
     """A system given by its return map: ``image(x)`` -> (H(x), H'(x))."""
     return PeriodicSystem(
         dimension,
         1.0,
         lambda x, t0, t1: image(x),
-        flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
+        flow_with_error=lambda x, t0, t1: (*image(x), error),
         flow_states=lambda states, t0, t1: np.array([image(x)[0] for x in states]),
         **known,
     )
@@ -151,11 +142,35 @@ def test_resonances_on_a_curve_of_neimark_sacker():
         np.testing.assert_allclose(point.values, parameters_at(x, 1.0 + 0.2 * x), atol=1e-12)
 
 
-def test_double_multiplier_and_flip_on_a_curve_of_folds():
+@pytest.mark.parametrize(("units", "first"), [((1.0, 1.0), 1.0), ((1e-7, 1e5), 1e6)])
+def test_double_multiplier_and_flip_on_a_curve_of_folds(units, first):
+    """With states, and the first parameter, in any units."""
+    units = np.array(units)
+
+    def family2(a, b):
+        plain = area_changing(a / first, b)
+
+        def image(x):
+            state, jacobian = plain.flow(x / units, 0.0, 1.0)
+            return state * units, jacobian * units[:, None] / units
+
+        return mapped(2, image, 1e-15 * np.outer(units, 1.0 / units))
+
     x = np.full(2, -1.5 / 1.6)
-    start = BifurcationPoint(Kind.FOLD, -(1.5**2) / 3.2, 0.0, x, np.ones(2, complex), 1.0 + 0j, 0.0)
-    curve = follow2(area_changing, start, ((-2.0, 1.0), (-2.0, 1.5)), second=0.5, longest=0.1)
+    start = BifurcationPoint(Kind.FOLD, -(1.5**2) / 3.2 * first, 0.0, x * units, units.astype(complex), 1.0 + 0j, 0.0)
+    curve = follow2(family2, start, ((-2.0 * first, first), (-2.0, 1.5)), second=0.5, longest=0.1)
+    curve = replace(
+        curve,
+        **{
+            name: tuple(
+                replace(each, values=each.values / [first, 1.0], error_bound=each.error_bound / [first, 1.0])
+                for each in getattr(curve, name)
+            )
+            for name in ("points", "special")
+        },
+    )
     check_curve(curve, lambda values: values[0] + (1.0 + values[1]) ** 2 / 3.2)
+    assert all((point.error_bound < 1e-11).all() for point in curve.special)
     check_special(
         curve,
         (CodimensionTwo.FOLD_FLIP, (0.0, -1.0)),
@@ -351,10 +366,7 @@ def test_folds_of_cycles_of_an_autonomous_system():
 
     def family2(p, q):
         return replace(
-            plain(p, q),
-            period=None,
-            velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2],
-            guess_period=2.0 * np.pi,
+            plain(p, q), period=None, velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2], guess_period=2.0 * np.pi
         )
 
     x = -np.sqrt(0.1 / 3.0)
@@ -393,40 +405,3 @@ def test_pitchfork_of_the_half_period_map_to_a_known_one():
     np.testing.assert_allclose(end.orbit, [1.87793925257730701435, 0.63506905472679528861], atol=1e-11)
     assert end.frequency == 0.0
     assert end.coefficient < -end.coefficient_error
-
-
-def test_units_of_states_and_parameters_change_nothing():
-    """The same curve of folds with states in units of 1e-7 and 1e5, and a parameter in units of 1e6."""
-    units, thousand = np.array([1e-7, 1e5]), 1e6
-
-    def family2(a, b):
-        plain = area_changing(a / thousand, b)
-
-        def image(x):
-            state, jacobian = plain.flow(x / units, 0.0, 1.0)
-            return state * units, jacobian * units[:, None] / units
-
-        def flow_with_error(x, t0, t1):
-            return (*image(x), 1e-15 * np.outer(units, 1.0 / units))
-
-        return PeriodicSystem(
-            2,
-            1.0,
-            lambda x, t0, t1: image(x),
-            flow_with_error=flow_with_error,
-            flow_states=lambda states, t0, t1: np.array([image(x)[0] for x in states]),
-        )
-
-    x = np.full(2, -1.5 / 1.6)
-    start = BifurcationPoint(
-        Kind.FOLD, -(1.5**2) / 3.2 * thousand, 0.0, x * units, units.astype(complex), 1.0 + 0j, 0.0
-    )
-    curve = follow2(family2, start, ((-2.0 * thousand, thousand), (-2.0, 1.5)), second=0.5, longest=0.1)
-    a, b = curve.values.T
-    np.testing.assert_allclose(a / thousand, -((1.0 + b) ** 2) / 3.2, atol=1e-13)
-    assert kinds(curve) == [CodimensionTwo.FOLD_FLIP, CodimensionTwo.RESONANCE_1_1]
-    for point, values in zip(curve.special, [(0.0, -1.0), (-((16.0 / 9.0) ** 2) / 3.2, 7.0 / 9.0)], strict=True):
-        off = np.abs(point.values / [thousand, 1.0] - values)
-        bound = point.error_bound / [thousand, 1.0]
-        assert (off <= bound).all()
-        assert (bound < 1e-11).all()

@@ -42,15 +42,6 @@ def test_an_equilibrium_is_no_orbit(b, guess):
         multipliers(brusselator(b), guess)
 
 
-def test_a_cycle_that_shrinks_into_its_hopf_point():
-    """At B = 1 + A^2 = 2 it is no more, which is not a fold."""
-    found = locate(lambda minus_b: brusselator(-minus_b, 6.5), (-3.0, -1.8), orbit=[1.0, 4.0], normal_form=False)
-    assert len(found) == 0
-    assert not found.complete
-    (remark,) = found.remarks
-    assert "shrinks into an equilibrium near -2.000" in remark
-
-
 def coupled(t, x, k):
     result = []
     for i, j in ((0, 2), (2, 0)):
@@ -154,22 +145,3 @@ def test_a_spiral_returns_to_its_section_but_is_no_orbit(damping, size):
     spiral = from_rhs(lambda t, x: [x[1], -x[0] - damping * x[1]], 2, None, guess_period=6.3)
     with pytest.raises(AnalysisError, match=r"^orbit: [^\n]*$"):
         multipliers(spiral, [size, 0.0])
-
-
-def test_two_cycles_that_meet():
-    """r' = r (mu + r^2 - r^4), at mu = -1/4, where r^2 = 1/2."""
-
-    def rhs(t, x, mu):
-        q = x[0] * x[0] + x[1] * x[1]
-        growth = mu + q - q * q
-        return [growth * x[0] - 2.0 * x[1], growth * x[1] + 2.0 * x[0]]
-
-    found = locate(
-        lambda minus_mu: from_rhs(rhs, 2, None, args=(-minus_mu,), guess_period=3.0), (-0.3, 0.4321), orbit=[1.15, 0.0]
-    )
-    assert found.complete
-    (point,) = found
-    assert point.kind is Kind.FOLD
-    assert abs(point.value - 0.25) <= point.error_bound < 1e-12
-    assert point.period == pytest.approx(np.pi, rel=1e-12)
-    assert np.hypot(*point.orbit) == pytest.approx(np.sqrt(0.5), rel=1e-7)

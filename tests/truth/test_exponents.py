@@ -43,18 +43,6 @@ def blocks(*parts):
     return result
 
 
-SPREAD = [0.1, -0.8, -log(1e25) / PERIOD, -log(1e60) / PERIOD]
-
-
-def test_sixty_orders_of_magnitude():
-    found = exponents(exactly(np.diag(SPREAD)))
-    np.testing.assert_allclose(found.values.real, SPREAD, rtol=1e-11)
-    np.testing.assert_array_equal(found.values.imag, 0.0)
-    modes = SLANT / np.linalg.norm(SLANT, axis=0)
-    modes = modes * np.sign(modes[np.abs(modes).argmax(axis=0), range(4)])
-    np.testing.assert_allclose(found.modes, modes, atol=1e-9)
-
-
 def test_fast_and_slow_pairs():
     """Pairs 40 orders of magnitude apart; the frequencies are given modulo one turn a period."""
     slow, fast = rotation(-0.05, 0.3), rotation(-log(1e40) / PERIOD, 1.7)

@@ -4,7 +4,6 @@ from math import cos, pi
 
 import numpy as np
 import pytest
-from scipy.special import mathieu_a, mathieu_b
 
 from chilopod.stability import exponents, from_rhs, multipliers
 
@@ -35,35 +34,12 @@ def test_mathieu_trace(a, q, trace):
     assert found.half_period is None
 
 
-@pytest.mark.parametrize("q", [0.3, 1.0, 4.0])
-@pytest.mark.parametrize("order", [0, 1, 2, 3])
-def test_mathieu_trace_is_two_at_the_characteristic_values(order, q):
-    values = [mathieu_a(order, q)] if order == 0 else [mathieu_a(order, q), mathieu_b(order, q)]
-    for a in values:
-        matrix = mathieu(float(a), q).flow(np.zeros(2), 0.0, pi)[1]
-        assert np.trace(matrix) == pytest.approx(2.0 * (-1) ** order, rel=1e-11, abs=0)
-
-
 def test_meissner_trace_and_multipliers():
     found = multipliers(meissner(switch_times=[pi / 2, 3 * pi / 2]))
     assert found.values.sum().real == pytest.approx(MEISSNER_TRACE, rel=1e-11, abs=0)
     np.testing.assert_allclose(found.values, MEISSNER, rtol=1e-11)
     assert np.abs(found.values - MEISSNER).max() <= found.error_bound
     assert not found.stable
-
-
-def test_meissner_from_exact_matrices():
-    """The same from its own closed form, so that the printed digits are not the only witness."""
-
-    def part(frequency_squared, duration):
-        w = np.sqrt(frequency_squared)
-        c, s = np.cos(w * duration), np.sin(w * duration)
-        return np.array([[c, s / w], [-w * s, c]])
-
-    period_map = part(1.5, pi / 2) @ part(0.5, pi) @ part(1.5, pi / 2)
-    assert np.trace(period_map) == pytest.approx(MEISSNER_TRACE, rel=1e-14)
-    system = meissner(switch_times=[pi / 2, 3 * pi / 2])
-    np.testing.assert_allclose(system.flow(np.zeros(2), 0.0, 2 * pi)[1], period_map, rtol=1e-11)
 
 
 @pytest.mark.parametrize("start", [0.4, 1.7, pi / 2, 3.0, 5.9])

@@ -47,10 +47,6 @@ def test_pitchfork(eps, sign, symmetry):
     check(locate(family(eps, sign, spatial_symmetry=symmetry), (-0.31, 0.4)), eps, sign)
 
 
-def test_reference_digits():
-    assert -2 * pi * iv(0, 2.0) == pytest.approx(-14.323056878100513, rel=1e-15)
-
-
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_pitchfork_of_a_plain_function(sign):
     check(locate(family(1.0, sign, plain), (-0.31, 0.4)), 1.0, sign)
@@ -70,13 +66,6 @@ def test_multiplier(mu):
     found = multipliers(family(1.5, -1.0)(mu))
     assert found.values[0] == pytest.approx(exp(2 * pi * mu), rel=1e-12)
     assert abs(found.values[0] - exp(2 * pi * mu)) <= found.error_bound
-
-
-def test_coefficient_can_be_left_out():
-    (point,) = locate(family(1.0, -1.0, spatial_symmetry=[[-1.0]]), (-0.31, 0.4), normal_form=False)
-    assert point.kind is Kind.PITCHFORK
-    assert point.coefficient is None
-    assert point.criticality is Criticality.NOT_COMPUTED
 
 
 @pytest.mark.parametrize("eps", [0.0, 1.0])

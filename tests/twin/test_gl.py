@@ -4,7 +4,6 @@ import importlib.util
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -98,12 +97,11 @@ def test_says_in_one_line_what_mends_it(monkeypatch):
 )
 def test_survives_what_drivers_do(monkeypatch, code, says):
     monkeypatch.setattr(gl, "_TRIAL", code)
-    monkeypatch.setattr(gl, "_PATIENCE", 2.0)
-    begun = time.monotonic()
+    if "sleep" in code:
+        monkeypatch.setattr(gl, "_PATIENCE", 0.5)
     renderer, fault = gl._tried("egl")
     assert renderer == ""
     assert says in fault
-    assert time.monotonic() - begun < 20.0
 
 
 def test_survives_a_python_that_cannot_be_started(monkeypatch, tmp_path):

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from leg_tips import tip_place
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
 from chilopod.twin.legs import check_reach, joint_angles, servo_targets, tip_path
+from helpers.leg_tips import tip_place
 
 PRESET = load_robot("aoi2022")
 PERIOD = PRESET.gait.period

@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 import pytest
-from leg_tips import tip_place
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
@@ -11,6 +10,7 @@ from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.twin import TwinModel
 from chilopod.twin.legs import joint_angles
+from helpers.leg_tips import tip_place
 
 PRESET = load_robot("aoi2022")
 
@@ -235,12 +235,6 @@ def test_numbers_out_of_range_are_refused_when_set(override):
     with pytest.raises(ParameterError) as caught:
         PRESET.set_from_text([override])
     assert override.partition("=")[0].endswith(caught.value.field)
-
-
-def test_a_robot_without_a_twin_cannot_be_built():
-    with pytest.raises(ParameterError) as caught:
-        TwinModel(load_robot("aoi2022-planar"))
-    assert caught.value.field == "twin"
 
 
 def test_a_robot_of_which_mujoco_warns_is_refused():

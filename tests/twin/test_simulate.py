@@ -292,11 +292,9 @@ def test_progress_goes_from_nothing_to_everything():
     ("arguments", "field"),
     [
         ({"duration": 0.0}, "duration"),
-        ({"duration": np.nan}, "duration"),
         ({"duration": 1e9}, "duration"),
         ({"rate": 0.0}, "rate"),
         ({"duration": 9e4, "rate": 1e5}, "rate"),
-        ({"robots": []}, "robots"),
         ({"robots": [PRESET, PRESET.set_from_text(["gait.stride=2 cm"])]}, "robots"),
         ({"robots": [PRESET, PRESET.set_from_text(["twin.servo_stiffness=8"])]}, "robots"),
         ({"robots": [PRESET, load_robot("aoi2022-planar")]}, "twin"),
@@ -310,9 +308,6 @@ def test_progress_goes_from_nothing_to_everything():
         ({"friction": np.zeros((6, 2))}, "friction"),
         ({"friction": np.ones((5, 2))}, "friction"),
         ({"target": 1.0}, "target"),
-        ({"target": (np.inf, 0.0)}, "target"),
-        ({"seeds": []}, "seeds"),
-        ({"seeds": [-1]}, "seeds"),
     ],
 )
 def test_bad_arguments_are_named(arguments, field):

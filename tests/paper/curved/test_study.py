@@ -92,19 +92,6 @@ def test_a_walk_that_folds_up_is_told():
     assert not soft.settled.any()
 
 
-def test_the_same_seeds_give_the_same_trials_and_springs_their_own(tmp_path):
-    first = curved_trials(ROBOT, (8.0, 41.0), 2, folder=tmp_path)
-    again = curved_trials(ROBOT, (8.0, 41.0), 2, folder=tmp_path)
-    assert first.identical(again)
-    assert len(list(tmp_path.glob("*.nc"))) == 4
-    # A trial's seed is part of what it is named after, and so is its spring.
-    more = curved_trials(ROBOT, (8.0, 41.0), 3, folder=tmp_path)
-    assert more.isel(repeat=slice(2)).identical(first)
-    assert len(list(tmp_path.glob("*.nc"))) == 6
-    unlike = first.isel(repeat=0).mean_angle.values - first.isel(repeat=1).mean_angle.values
-    assert np.abs(unlike[0]).max() > 1e-4
-
-
 def test_the_law_holds_beside_the_point_only(branch):
     law = curved_findings.law_along_branch(branch)
     exact = law.attrs["exact_k1"]

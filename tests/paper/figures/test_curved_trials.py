@@ -10,12 +10,7 @@ from chilopod.paper.section import Context, Size
 from chilopod.show import style
 from chilopod.show.tables import csv
 
-PANELS = {
-    "walks": figures.walks,
-    "joints": figures.joints,
-    "onset": figures.onset,
-    "variants": figures.variants,
-}
+PANELS = {"walks": figures.walks, "joints": figures.joints, "onset": figures.onset, "variants": figures.variants}
 
 
 @pytest.fixture(scope="module")

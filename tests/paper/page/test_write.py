@@ -148,12 +148,7 @@ def test_only_what_was_asked_for(results, tmp_path):
     folder = tmp_path / "a b"
     page = Page(write_report(only(results, MODE, Context(robot)), folder).read_text(encoding="utf-8"))
     assert {path.stem for path in (folder / "figures").iterdir()} == {"schematic", "mode"}
-    assert [attrs["id"] for tag, attrs in page.tags if tag == "section"] == [
-        "chapter-1",
-        "schematic",
-        "mode",
-        "next",
-    ]
+    assert [attrs["id"] for tag, attrs in page.tags if tag == "section"] == ["chapter-1", "schematic", "mode", "next"]
     assert "6.5359" not in page.text
     # It is no preset any more, so commands name the file that goes with the report.
     assert f'chilopod stability "{folder / "data" / "robot.toml"}"' in page.text

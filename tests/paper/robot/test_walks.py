@@ -14,14 +14,7 @@ from chilopod.paper.robot.figures import turning as turning_figures
 from chilopod.paper.robot.figures import walks as walk_figures
 from chilopod.paper.robot.rows import turning_rows, walk_rows
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.walks import (
-    RobotWalks,
-    by_duration,
-    lower_steps,
-    undulations,
-    walk_ends,
-    walk_records,
-)
+from chilopod.paper.robot.walks import RobotWalks, by_duration, lower_steps, undulations, walk_ends, walk_records
 from chilopod.paper.table import Kind, Verdict
 from chilopod.paper.turning.trials import turning_task, without_leg_yaw
 from chilopod.steering import Target

@@ -39,10 +39,3 @@ def test_more_modules_of_the_same_size_change_little():
     longer = floquet.with_modules(ROBOT, 9)
     assert longer.module_length == pytest.approx(ROBOT.module_length, rel=1e-15)
     assert longer.module_mass == pytest.approx(ROBOT.module_mass, rel=1e-15)
-
-
-def test_uniform_springs():
-    data = floquet.uniform_springs(QUICK)
-    assert data.attrs["value"] == pytest.approx(6.5359, abs=5e-5)
-    assert data.attrs["frequency_rad_s"] == pytest.approx(0.5664, abs=5e-5)
-    assert np.linalg.norm(data.amplitude) == pytest.approx(1.0)

@@ -120,10 +120,7 @@ def carry(upper: Array, duration: Any, x: Array, reach: float) -> Array:
     full[:v] = upper[0]
     full[range(v, size), range(2, v - 1)] = -1
     full[range(v, size), range(3, v)] = 1
-    radius = max(
-        np.abs(np.linalg.eigvals(full)).max(),
-        np.linalg.eigvals(full[:v, :v]).real.__abs__().max(),
-    )
+    radius = max(np.abs(np.linalg.eigvals(full)).max(), np.linalg.eigvals(full[:v, :v]).real.__abs__().max())
     steps = max(1, int(np.ceil(float(radius * duration) / reach)))
     h = duration / steps
     small = np.finfo(LD).eps / 16
