@@ -8,12 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
-from chilopod.frozen import read_only
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, read_only
 
 _COARSEST = 1e-3
 SIZES = (1e-6, 1e-3, 1.0, 1e3)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgebal
 
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 def numerical_balance(matrix: Array) -> Array:

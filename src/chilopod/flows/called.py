@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
@@ -17,8 +17,8 @@ from chilopod.flows import deadline
 from chilopod.flows.arguments import numbers
 from chilopod.flows.carrying import pieces
 from chilopod.flows.jumps import UndeclaredSwitch, longest_step
+from chilopod.frozen import Array
 
-Array = NDArray[np.float64]
 Parts = list[tuple[float, float]]
 
 Gradient = Callable[[float, Array], Array]

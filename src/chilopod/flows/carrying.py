@@ -6,13 +6,11 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 RESOLUTION = 4096
 """Number of grid points over the period; a pulse in time that the grid meets is resolved exactly."""

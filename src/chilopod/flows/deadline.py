@@ -12,11 +12,9 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import SIZES, numbers
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,9 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.flows.arguments import Slopes
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _PROBES = 257
 _GRID = 4096

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import (
@@ -28,9 +28,7 @@ from chilopod.flows.taylor.flow import TaylorFlow
 from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian, evaluate_series
 from chilopod.flows.tracing.trace import Trace, trace
 from chilopod.flows.tracing.traced import Untraceable
-from chilopod.frozen import read_only
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, read_only
 
 TOLERANCE = 1e-14
 _SAME = 1e-6

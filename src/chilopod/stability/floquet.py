@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.cores import cores
 from chilopod.flows.arguments import checked_count
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.problem.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _RESOLVED = 1e-6  # modulus of a multiplier below which the error bound of an eigenvalue is invalid
 _SAME_ANGLE = 1e-12

@@ -19,10 +19,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.convergence import RETURN
 from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
@@ -36,9 +35,6 @@ from chilopod.stability.problem.returns import (
     section_at,
 )
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 LARGE = 100
 """Number of states from which a few directions are cheaper than the whole derivative."""

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays, in_one_line
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.shown import Shown, bounded, number
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing
-
-Array = NDArray[np.float64]
 
 
 class Kind(Labelled):
@@ -133,7 +130,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     value: float
     error_bound: float
     orbit: Array
-    mode: NDArray[np.complex128]
+    mode: ComplexArray
     multiplier: complex
     frequency: float
     criticality: Criticality = Criticality.NOT_COMPUTED
@@ -144,7 +141,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     normal_form: NormalForm | None = None
     period: float = np.nan
     multiplicity: int = 1
-    modes: NDArray[np.complex128] | None = None
+    modes: ComplexArray | None = None
     symmetry: SymmetricCrossing | None = None
     rate: complex | None = None
 

@@ -6,15 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.flows.arguments import check_symmetry, checked_duration
 from chilopod.flows.events import Event
 from chilopod.flows.rhs import TOLERANCE, Method, RightHandSide
 from chilopod.stability.problem.capabilities import spatial_symmetries
 from chilopod.stability.problem.system import PeriodicSystem
-
-Array = NDArray[np.float64]
 
 
 def from_rhs(

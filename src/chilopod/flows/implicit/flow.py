@@ -18,9 +18,7 @@ from chilopod.flows.jumps import longest_step
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.evaluation import branches_of, evaluate, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
-from chilopod.frozen import ReadOnlyArrays
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, ReadOnlyArrays
 
 _STAGES, _OTHER_STAGES = 9, 7
 _NEAREST = 3  # largest number of couplings between two states with their derivative under step control

@@ -21,15 +21,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
 from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.tape import Tape
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _MOST_WORK = 1e7
 _FEWEST_STEPS = 5000

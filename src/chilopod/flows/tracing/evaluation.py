@@ -6,13 +6,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.tape import Integers, Tape
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 def evaluate(tape: Tape, nodes: Integers, t: Any, x: Any, params: Array) -> Array:

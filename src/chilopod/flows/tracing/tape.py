@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
+
 Integers = NDArray[np.int64]
 
 STATE, TIME, PARAMETER, NUMBER = 0, 1, 2, 3

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.flows.tracing.environment import Opaque, describe, python_function, rebuild
 from chilopod.flows.tracing.evaluation import evaluate
@@ -18,8 +18,7 @@ from chilopod.flows.tracing.graph import Graph
 from chilopod.flows.tracing.ordering import ordered
 from chilopod.flows.tracing.tape import Tape
 from chilopod.flows.tracing.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _MOST_NODES = 200_000
 _MOST_KEPT = 64

@@ -21,10 +21,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
 from chilopod.stability.problem.budget import Budget, UserCode
 from chilopod.stability.problem.capabilities import KnowsOrbit, Scaled, SystemLike
@@ -34,8 +33,6 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
 from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
-
-Array = NDArray[np.float64]
 
 Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""

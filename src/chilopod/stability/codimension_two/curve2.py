@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, mark, rows
@@ -18,9 +17,6 @@ from chilopod.stability.tracing.ending import Ending
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 class CodimensionTwo(Labelled):

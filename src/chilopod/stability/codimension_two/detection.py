@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Frame, Spot
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
@@ -30,9 +30,6 @@ from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.tracing.tracer import Parts
 from chilopod.stability.unit_circle.spectra import TARGETS, Event
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _SAFETY = 1.5
 _BESIDE = 1e-3  # step of the differences of a test function, relative to the curve's step

@@ -12,9 +12,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.frozen import Array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, across, critical
@@ -23,8 +23,6 @@ from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displ
 from chilopod.stability.normal_forms.quintic import Quintic
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.budget import Budget, SpentError
-
-Array = NDArray[np.float64]
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
 _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, Station
@@ -26,8 +26,6 @@ from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.tracing.tracer import trace
-
-Array = NDArray[np.float64]
 
 BUDGET = 20_000
 """Default budget of a curve, in return maps with derivatives."""

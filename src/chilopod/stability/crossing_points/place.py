@@ -12,15 +12,13 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum import errors
 from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers, spectrum
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
-
-Array = NDArray[np.float64]
 
 SAFETY = 1.5
 """Factor on the error of a multiplier, for that of its rate of change."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.center_manifold import (
@@ -23,8 +22,6 @@ from chilopod.stability.normal_forms.center_manifold import (
     images,
     turns,
 )
-
-Array = NDArray[np.float64]
 
 _TRIALS = 40  # largest number of sampled amplitudes
 _SHARE = 0.03  # wanted departure of the map from its linear part, relative to the amplitude

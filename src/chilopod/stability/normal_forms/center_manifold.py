@@ -17,11 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.normal_forms.extrapolation import RADII, Series, radii, series
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 ReturnedStates = Callable[[Array], Array]
 """The return map: states, shape (k, n), to their images, shape (k, n)."""

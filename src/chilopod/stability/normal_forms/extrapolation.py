@@ -16,10 +16,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 
 RADII = 8
 """Number of radii at which a function is sampled."""

@@ -11,14 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.flows.balance import numerical_balance
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fitted
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 _START = 0.2  # first amplitude of the search, relative to the scale of the states
 
 
@@ -130,7 +129,7 @@ def normal_form(
     return form if resonance is None else _with_resonant_terms(form, fit, at, resonance)
 
 
-def _uncertainties(jacobian: Array, relative: float) -> tuple[NDArray[np.complex128], Array]:
+def _uncertainties(jacobian: Array, relative: float) -> tuple[ComplexArray, Array]:
     """Eigenvalues of a matrix and bounds on their errors, shape (n,) both, for a relative error of the matrix.
 
     Norms are those of the balanced matrix, so that units do not matter.

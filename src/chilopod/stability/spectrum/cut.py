@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.frozen import Array
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap, flow_with_error
 from chilopod.stability.problem.scales import sizes
 from chilopod.stability.spectrum.eigenvalues import normal_basis
-
-Array = NDArray[np.float64]
 
 _WORST_CONDITION = 1e6
 _FEWEST, _MOST = 8, 32768  # numbers of parts of moderate condition

@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.flows.balance import numerical_balance
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
 

@@ -12,8 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from chilopod.frozen import Array, ComplexArray
 
 SAFETY, DRAWS = 10.0, 8
 """Factor on the largest change of a result under random changes, and their number."""

@@ -11,13 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.spectrum.errors import DRAWS, SAFETY
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _GAP = 1.0  # least gap of ln|eigenvalue| between groups
 _PASSES = 40  # through the product: a gap of 1 leaves exp(-40) of the neighbouring group

@@ -9,18 +9,15 @@ Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.implicit.flow import Stretched
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.problem.capabilities import FlowsFrames, SystemLike, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.cut import Cut, equal_cut, section_basis, turn_in_units
 from chilopod.stability.spectrum.errors import SAFETY, disturbed
 from chilopod.stability.spectrum.splitting import intersection, split_leading
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _DRAWS = 3  # each costs as much as the result
 _PARTS = 64

@@ -13,13 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.stability.symmetry.groups import Images
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.spectra import Event
-
-Array = NDArray[np.float64]
 
 _ALIGNED = 1e-9  # difference from one of a cosine that counts as one: an angle of 4e-5 (elements differ by 6e-4)
 _NULL = 1e-8  # difference of equal eigenvalues of elements; 1 - cos(2 pi / 10 000) is 2e-7

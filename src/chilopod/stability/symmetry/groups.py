@@ -19,9 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
-from chilopod.frozen import ReadOnlyArrays, read_only
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, ReadOnlyArrays, read_only
 
 _PROBES = 3  # probe vectors: a single one may by chance lie close to a mirror plane
 _SAME = 1e-7  # two elements of a cyclic group of ten thousand are 6e-4 apart; round-off of as many products is 1e-11

@@ -17,11 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.symmetry.groups import Group
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _TRIES = 8  # random matrices, of which one in millions is not generic
 _DISTINCT = 1e-7  # distance of eigenvalues of a random matrix of norm one that count as equal

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.stability.unit_circle.critical import (
     LOST,
@@ -23,8 +22,6 @@ from chilopod.stability.unit_circle.critical import (
 )
 from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
-
-Array = NDArray[np.float64]
 
 _CLEARLY, _ROOM = 1e-5, 1e3  # distance from the circle, and multiple of errors elsewhere, that needs no error estimate
 _GREY = 32.0  # distance from the circle, in errors, up to which a multiplier may have left it or not

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Spectra
-
-Array = NDArray[np.float64]
 
 UNKNOWN = 1.0
 """Error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined."""
@@ -124,7 +122,7 @@ def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
     return found
 
 
-def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _meeting(upper: ComplexArray) -> ComplexArray:
     """The two nearest to each other."""
     if upper.size < 2:
         return upper[:0]

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
 from chilopod.stability.spectrum.errors import DRAWS, SAFETY, disturbed
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
 entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, for a missing matrix,
