@@ -26,17 +26,7 @@ class SpentError(AnalysisError):
 class Deadline:
     """A time limit; within its context a flow ends at the limit, even inside an integration.
 
-    Time that numba spends compiling is not counted.
-
-    Parameters
-    ----------
-    seconds
-        Time from now, s; infinite for no limit.
-
-    Raises
-    ------
-    ParameterError
-        If ``seconds`` is not a number or is negative.
+    It is given in s from now, infinite for none; time that numba spends compiling is not counted.
     """
 
     def __init__(self, seconds: float = math.inf) -> None:

@@ -51,17 +51,8 @@ def checked_events(events: object) -> tuple[Event, ...]:
 
 
 def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array, orbit: Array | None, n: int) -> None:
-    """Check that guards return numbers that may pass zero, and resets states, at the orbit and around it.
-
-    Parameters
-    ----------
-    events, args
-        Events and arguments of the system, with n states.
-    times
-        Times within the period, shape (times,).
-    orbit
-        A state, shape (n,), or None.
-    """
+    """Check that guards return numbers that may pass zero, and resets states, around the orbit, a state of shape (n,),
+    at some times within the period."""
     if not events:
         return
     base = np.zeros(n) if orbit is None else orbit

@@ -67,14 +67,9 @@ class Flows(NamedTuple):
 class RightHandSide:
     """A right-hand side f(t, x, *args), checked, with the arguments of :func:`chilopod.stability.from_rhs`.
 
-    The ``duration`` is the period of the explicit dependence on time; without one, the approximate duration of a
-    motion. Of the results, ``start`` is the state on the orbit, None if unknown, and ``base`` a state to test f at;
-    ``edges`` are the times from 0 to the period at which f switches, and ``times`` one inside each interval.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is invalid.
+    The ``duration`` is the period of the explicit dependence on time, or about that of a motion. Of the results,
+    ``start`` is the state on the orbit, if known, and ``base`` a state to test f at; ``edges`` are the times from 0 to
+    the period at which f switches, and ``times`` one inside each interval.
     """
 
     rhs: Callable[..., ArrayLike]

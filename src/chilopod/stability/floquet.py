@@ -164,8 +164,8 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
         First guess of a state on the orbit at time 0; not needed if the system knows its orbit.
     leading
         Number of largest multipliers, counted with multiplicity, or one more to complete a pair; all by default. For
-        100 states or more and a system with ``flow_tangents`` (any right-hand side that can be traced) they are
-        computed in a block Krylov subspace, without the derivative of the flow as a matrix.
+        100 states or more and a system with ``flow_tangents`` (any right-hand side that can be traced) they take no
+        derivative of the flow as a matrix.
 
     Raises
     ------
@@ -218,11 +218,8 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
 
 
 def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
-    """All Floquet exponents and modes, the strongly damped ones included.
-
-    The period is cut into factors of moderate condition and the state space split along their product, so a multiplier
-    of 1e-60 has the same relative accuracy as one of 0.5; the eigenvalues of the product itself would be round-off.
-    """
+    """All Floquet exponents and modes, the strongly damped ones included: the state space is split along the factors of
+    the period, so a multiplier of 1e-60 has the same relative accuracy as one of 0.5."""
     found = find_orbit(system, orbit)
     image = found.image
     if is_stiff(system, found.state, image.period / image.returns):

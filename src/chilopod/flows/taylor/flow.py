@@ -53,34 +53,17 @@ class Passage(NamedTuple):
 
 
 class TaylorFlow:
-    """The flow of a tape.
-
-    Parameters
-    ----------
-    tape
-        Right-hand side with guards and resets.
-    edges
-        Times from 0 to the period that no step may straddle; may be empty.
-    period
-        Period T of an explicit dependence on time, else infinite.
-    directions
-        Directions of the events: 1, -1 or 0.
-    tolerance
-        Truncation error of a step relative to the size of each state and entry of the derivative; at least
-        round-off.
-    patience
-        Number of steps after which the flow ends if the budget of steps will not suffice, as for a stiff motion; 0
-        for no such test, which lets a motion that is slow only at first reach its end.
-    """
+    """The flow of a tape."""
 
     def __init__(
         self,
-        tape: Tape,
+        tape: Tape,  # right-hand side with guards and resets
         *,
-        edges: tuple[float, ...] = (),
-        period: float = math.inf,
-        directions: tuple[float, ...] = (),
-        tolerance: float = _LEAST_TOLERANCE,
+        edges: tuple[float, ...] = (),  # times from 0 to the period that no step may straddle
+        period: float = math.inf,  # period T of an explicit dependence on time
+        directions: tuple[float, ...] = (),  # directions of the events: 1, -1 or 0
+        tolerance: float = _LEAST_TOLERANCE,  # truncation of a step relative to each state and entry of the derivative
+        # Steps after which the flow ends if its budget will not suffice, as for a stiff motion; 0 for no such test.
         patience: int = 0,
     ) -> None:
         n = tape.dimension
@@ -102,10 +85,9 @@ class TaylorFlow:
     ) -> Passage:
         """Carry one state from t0 to t1 >= t0, with its derivative unless ``derived`` is False.
 
-        The error bound sums round-off and the last terms of each step, carried by the derivatives of the steps, and
-        adds the difference from a second computation of another order with other steps, disturbed at the start and
-        after every step by several times round-off. Relative to the first part, all entries differ alike, so that
-        part is scaled to many times the usual difference; several times its own difference is added for each entry.
+        The bound sums round-off and the last terms of each step, carried by the derivatives of the steps, scaled to
+        many times the usual difference from a second computation (of another order with other steps, disturbed by
+        several times round-off), and adds several times the own difference of each entry.
 
         Raises
         ------
@@ -133,11 +115,8 @@ class TaylorFlow:
         return Passage(x, derivative, bound, steps)
 
     def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
-        """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number).
-
-        The series of the directions are carried, so the work is proportional to their number, without any matrix of
-        shape (n, n). Raises the errors of :meth:`advance`.
-        """
+        """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number), without
+        any matrix of shape (n, n); raises the errors of :meth:`advance`."""
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         images = np.array(directions, dtype=np.float64, order="C")
         self._run(x, (t0, t1), params, images, stepwise=False)

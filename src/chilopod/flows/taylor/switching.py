@@ -78,12 +78,12 @@ def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
     first = tape.layout[3]
     for s in range(switches.shape[1]):
         stop = tape.layout[4] if switches[0, s] == GUARD else switches[2, s]
-        values_at(program, terms, slopes, first, stop, 0, 1.0, values, branches)
+        values_at(program, terms, slopes, (first, stop), 0, 1.0, values, branches)
         first = stop
         g = values[switches[1, s], 0]
         if s != switched and abs(g - surfaces[s]) > _ZERO * scales[s]:
             branches[s] = branch_at(switches[0, s], g)
-    values_at(program, terms, slopes, first, tape.layout[4], 0, 1.0, values, branches)
+    values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
 
 
 @fused_njit(error_model="numpy")

@@ -47,13 +47,7 @@ def _names(code: types.CodeType) -> tuple[str, ...]:
 
 
 def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
-    """A hashable description of a value; all its floats are appended to a list.
-
-    Raises
-    ------
-    Opaque
-        If the value holds objects of unknown kinds.
-    """
+    """A hashable description of a value; all its floats are appended to a list. Raises Opaque for unknown kinds."""
     if isinstance(value, float | np.floating):  # np.float64 is a float
         floats.append(float(value))
         return "f"

@@ -68,15 +68,15 @@ def branch_at(kind: int, value: float) -> float:
 
 @fused_njit(error_model="numpy")
 def values_at(
-    program: Any, terms: Any, slopes: Any, start: int, stop: int, order: int, unit: float, values: Any, branches: Any
+    program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, branches: Any
 ) -> None:
-    """Coefficients 0 to ``order`` of the operations from ``start`` up to ``stop``, and of the states from ``slopes``.
+    """Coefficients 0 to ``order`` of the operations in a span (first and past-last), and of the states from ``slopes``.
 
     Its arguments are single arrays, and one call handles all orders: counting references to arrays takes as long as
     the arithmetic of a small system.
     """
     for k in range(order + 1):
-        for i in range(start, stop):
+        for i in range(span[0], span[1]):
             code, a, b = program[0, i], program[1, i], program[2, i]
             s, odd = 0.0, 0.0  # two independent sums run in parallel
             if code == LINEAR:
@@ -146,13 +146,13 @@ def _add(tangents: Any, i: int, k: int, a: int, at: int, factor: float) -> None:
 
 @fused_njit(error_model="numpy")
 def tangents_at(
-    program: Any, terms: Any, slopes: Any, start: int, stop: int, order: int, unit: float, values: Any, tangents: Any
+    program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, tangents: Any
 ) -> None:
     """The same for the tangents that are needed, from values computed before."""
     nodes, orders, lanes = tangents.shape
     tangents = as_lanes(tangents.reshape(nodes, orders, lanes // HALF, HALF), HALF)
     for k in range(order + 1):
-        for i in range(start, stop):
+        for i in range(span[0], span[1]):
             if program[4, i] == 0:
                 continue
             code, a, b = program[0, i], program[1, i], program[2, i]
@@ -196,7 +196,7 @@ def loaded(tape: Any, params: Any, orders: int, directions: int, branches: Any) 
         values[n + 1 + i, 0] = params[i]
     for i in range(tape.numbers.size):
         values[n + 1 + parameters + i, 0] = tape.numbers[i]
-    values_at(tape.program, tape.terms, tape.slopes, first, stop, 0, 1.0, values, branches)
+    values_at(tape.program, tape.terms, tape.slopes, (first, stop), 0, 1.0, values, branches)
     return Series(values, np.zeros((nodes, orders, lanes)), branches)
 
 
@@ -208,10 +208,10 @@ def choose(tape: Any, series: Any) -> None:
     first = tape.layout[3]
     for s in range(switches.shape[1]):
         if switches[0, s] != GUARD:
-            values_at(program, terms, slopes, first, switches[2, s], 0, 1.0, values, branches)
+            values_at(program, terms, slopes, (first, switches[2, s]), 0, 1.0, values, branches)
             branches[s] = branch_at(switches[0, s], values[switches[1, s], 0])
             first = switches[2, s]
-    values_at(program, terms, slopes, first, tape.layout[4], 0, 1.0, values, branches)
+    values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
     for s in range(switches.shape[1]):
         if switches[0, s] == GUARD:
             branches[s] = branch_at(GUARD, values[switches[1, s], 0])
@@ -240,8 +240,8 @@ def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, j
     for i in range(x.size):
         values[i, 0] = x[i] * units[i]
     values[x.size, 0] = t
-    values_at(program, terms, slopes, first, stop, 0, 1.0, values, series.branches)
-    tangents_at(program, terms, slopes, first, stop, 0, 1.0, values, tangents)
+    values_at(program, terms, slopes, (first, stop), 0, 1.0, values, series.branches)
+    tangents_at(program, terms, slopes, (first, stop), 0, 1.0, values, tangents)
     s = 0.0
     for i in range(x.size):
         slope[i] = values[slopes[i], 0] / units[i]
@@ -273,7 +273,7 @@ def compose(tape: Any, params: Any, curve: Any, branches: Any, found: Any) -> No
         for i in range(n):
             series.values[i, k] = curve[k, i]
     nothing, first, stop = np.empty(0, np.int64), tape.layout[3], tape.layout[4]  # no states follow from f
-    values_at(tape.program, tape.terms, nothing, first, stop, orders - 1, 1.0, series.values, branches)
+    values_at(tape.program, tape.terms, nothing, (first, stop), orders - 1, 1.0, series.values, branches)
     for k in range(orders):
         for i in range(n):
             found[k, i] = series.values[tape.slopes[i], k]
@@ -288,7 +288,7 @@ def expand_values(tape: Any, order: int, stop: int, unit: float, series: Any) ->
     """
     values, first = series.values, tape.layout[3]
     values[tape.layout[0], 1] = unit
-    values_at(tape.program, tape.terms, tape.slopes, first, stop, order, unit, values, series.branches)
+    values_at(tape.program, tape.terms, tape.slopes, (first, stop), order, unit, values, series.branches)
 
 
 @fused_njit(error_model="numpy", inline="always")
@@ -297,4 +297,4 @@ def expand(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
     expand_values(tape, order, stop, unit, series)
     if series.tangents.shape[2] > 0:
         program, terms, first = tape.program, tape.terms, tape.layout[3]
-        tangents_at(program, terms, tape.slopes, first, stop, order, unit, series.values, series.tangents)
+        tangents_at(program, terms, tape.slopes, (first, stop), order, unit, series.values, series.tangents)

@@ -144,15 +144,11 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     unknowns. Widths of the box are the parameters' units."""
 
     first: Spot  # first point of the curve
+    precision = ROUND_OFF
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
-        self._family2 = family2
-        self.target = target
-        self.known = known
-        self.box = box
-        self.widths = box[:, 1] - box[:, 0]
-        self.budget = budget
-        self.precision = ROUND_OFF
+        self._family2, self.target, self.known = family2, target, known
+        self.box, self.widths, self.budget = box, box[:, 1] - box[:, 0], budget
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
@@ -161,7 +157,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             return self._family2(first, second)
 
     def begin(self, place: Place) -> Spot:
-        """The point of the curve nearest to a place that is close to it."""
+        """The point of the curve nearest to a place beside it."""
         system = self.system(place.values)
         section = None if self.known else section_at(system, place.state)
         place, image = self._mapped(place, section, False)

@@ -75,9 +75,8 @@ class Point2(ReadOnlyArrays):
     frequency
         Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
     coefficient, coefficient_error
-        Coefficient and coefficient error of the normal form, for the map of a :class:`BifurcationPoint` (over two
-        periods at a period doubling): the quadratic one at a fold or a transcritical point, the cubic one at all
-        others; None if undefined or not computed.
+        Coefficient of the normal form and its error, for the map of a :class:`BifurcationPoint`: the quadratic one at
+        a fold or a transcritical point, else the cubic one; None if undefined or not computed.
     """
 
     values: Array
@@ -102,10 +101,9 @@ class SpecialPoint2(Point2):
         the curve.
     next_coefficient, next_coefficient_error
         Next coefficient where that of the curve's normal form vanishes, for the same map and amplitude, and a bound on
-        its error. That is c of a -> a + c a^3 at a cusp and a degenerate
-        transcritical point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised
-        period doubling; the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point.
-        None elsewhere.
+        its error: c of a -> a + c a^3 at a cusp and a degenerate transcritical point; e of a -> a + e a^5 at a
+        degenerate pitchfork and a generalised period doubling, and of |a| -> |a| + e |a|^5, the second Lyapunov
+        coefficient, at a Chenciner point. None elsewhere.
     """
 
     kind: CodimensionTwo

@@ -118,11 +118,8 @@ def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
 def solve_homological(
     at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
 ) -> ComplexArray:
-    """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both.
-
-    If nu^i conj(nu)^j is critical (``resonant``: nu, or its conjugate at the resonance 1:3), the solution has no part
-    along that critical direction.
-    """
+    """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both; without a part along the critical direction if
+    the factor is critical (``resonant``: nu, or its conjugate at the resonance 1:3)."""
     i, j = powers
     n = at.state.size
     factor = at.multiplier**i * at.multiplier.conjugate() ** j
@@ -136,12 +133,10 @@ def solve_homological(
 
 
 class Manifold:
-    """The centre manifold up to the order below that of a coefficient, improved on samples of the return map.
+    """The centre manifold up to the order below that of a coefficient, 3 or 5, improved on samples of the return map.
 
-    It has no part along q at resonant monomials. It is determined by H(W(z)) = W(g(z)), with the return map
-    H and the map g on the critical space (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.3 and 9.4;
-    Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007). The order of the coefficient is 3 or 5; at
-    the resonance 3 the conjugate of the multiplier is its square.
+    It is determined by H(W(z)) = W(g(z)), with the map g on the critical space, and has no part along q at resonant
+    monomials (Kuznetsov, sections 9.3 and 9.4; Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007).
     """
 
     def __init__(

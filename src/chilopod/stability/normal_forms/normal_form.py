@@ -17,6 +17,7 @@ from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fitted
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
+from chilopod.stability.spectrum.eigenvalues import eigensystem
 
 _START = 0.2  # first amplitude of the search, relative to the scale of the states
 
@@ -27,14 +28,12 @@ class NormalForm:
     space.
 
     With a the amplitude along the unit critical mode: real multiplier +1, a -> a + quadratic a^2 + cubic a^3. A
-    multiplier -1 of the return map: the same, of the first map that has +1 again. That is the map over one period where
-    a period is an even number of returns (a pitchfork that breaks a symmetry in time). Else it is the map over two
-    periods (a period doubling): where one period maps a to -a + b a^2 + d a^3, ``cubic`` is -2 (b^2 + d), and
-    ``quadratic`` is zero. Neimark-Sacker (state = 2 Re(a mode)): |a| -> |a| + cubic |a|^3,
-    while the phase of a advances by that of the multiplier + rotation |a|^2.
+    multiplier -1 of the return map: the same, with ``quadratic`` zero, of the first map that has +1 again: that over one
+    period if it is an even number of returns (a pitchfork that breaks a symmetry in time), else over two (a period
+    doubling, with ``cubic`` -2 (b^2 + d) where one period maps a to -a + b a^2 + d a^3). Neimark-Sacker (state = 2 Re(a
+    mode)): |a| -> |a| + cubic |a|^3, while the phase of a advances by that of the multiplier + rotation |a|^2.
 
-    A mode k times as long (through a change of units) has amplitudes 1/k as large, so coefficients k times (quadratic)
-    and k^2 times as large (cubic, rotation).
+    A mode k times as long has coefficients k times (quadratic) and k^2 times as large (cubic, rotation).
 
     Attributes
     ----------
@@ -75,25 +74,13 @@ def normal_form(
     mapped: ReturnedStates,
     at: CriticalOrbit,
     *,
+    # relative errors of the map, beside round-off and the noise of the samples, and of its derivative
     noise: float = 0.0,
     uncertainty: float = 0.0,
-    scale: ArrayLike | None = None,
-    orbit_error: float | None = None,
+    scale: ArrayLike | None = None,  # sizes of the states, shape (n,), where the search for an amplitude starts
+    orbit_error: float | None = None,  # error of the orbit along the mode; by default from its residual and the noise
 ) -> NormalForm:
-    """Normal form on the centre manifold of a critical orbit.
-
-    Parameters
-    ----------
-    mapped, at
-        Return map of several states, shape (k, n), and the critical orbit.
-    noise, uncertainty
-        Relative errors of the map, beside round-off and the noise of the samples, and of its derivative.
-    scale
-        Sizes of the states, shape (n,), where the search for an amplitude starts; by default the size of the orbit.
-    orbit_error
-        Error of the orbit along the mode; by default from its residual and the noise, large near a singular
-        H - 1.
-    """
+    """Normal form on the centre manifold of a critical orbit of a map of several states, shape (k, n)."""
     values, errors = _uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
     own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
     others = np.delete(np.arange(values.size), own)
@@ -130,21 +117,14 @@ def normal_form(
 
 
 def _uncertainties(jacobian: Array, relative: float) -> tuple[ComplexArray, Array]:
-    """Eigenvalues of a matrix and bounds on their errors, shape (n,) both, for a relative error of the matrix.
-
-    Norms are those of the balanced matrix, so that units do not matter.
-    """
+    """Eigenvalues of a matrix and bounds on their errors, shape (n,) both, for an error relative to its norm in units
+    that balance it."""
     units = numerical_balance(jacobian)
     balanced = jacobian * units / units[:, None]
-    values, right = np.linalg.eig(balanced)
-    try:
-        left = np.linalg.inv(right).conj().T
-    except np.linalg.LinAlgError:
-        left = np.full(right.shape, np.inf)
+    values, _, left = eigensystem(balanced)
     error = relative * np.linalg.norm(balanced)
     # To first order the condition gives each error, but even for a defective pair it is at most the square root.
-    condition = np.linalg.norm(right, axis=0) * np.linalg.norm(left, axis=0)
-    return values.astype(np.complex128), np.minimum(error * condition, np.sqrt(error))
+    return values, np.minimum(error * np.linalg.norm(left, axis=0), np.sqrt(error))
 
 
 def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
@@ -159,11 +139,9 @@ def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
 
 
 def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
-    """Error along the mode of an orbit with this residual, where H - 1 is singular.
-
-    At a distance d from the symmetric orbit of a pitchfork the residual is at least cubic d^3, with an apparent
-    quadratic term 3 cubic d; beside a transcritical point it is quadratic d^2.
-    """
+    """Error d along the mode of an orbit with this residual, where H - 1 is singular: beside the symmetric orbit of a
+    pitchfork the residual is at least cubic d^3, with an apparent quadratic term 3 cubic d; beside a transcritical
+    point it is quadratic d^2."""
     image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
     if image is None:
         return 0.0

@@ -57,16 +57,8 @@ def equal_cut(system: SystemLike, x: Array, image: ReturnMap, count: int) -> Cut
 
 
 def moderate_cut(system: SystemLike, x: Array, image: ReturnMap) -> Cut:
-    """A return from a state on the orbit in parts of moderate condition.
-
-    Only parts that contract too strongly are halved, which gives a relaxation oscillation a few short ones. The return
-    of a map, which has no parts, stays whole.
-
-    Raises
-    ------
-    AnalysisError
-        If no parts are of moderate condition.
-    """
+    """A return from a state on the orbit in parts of moderate condition: those that contract too strongly are halved.
+    The return of a map, which has no parts, stays whole. Raises AnalysisError if no parts are of moderate condition."""
     units = _units(system, x, image)
     parts = _equal_parts(system, x, image, _FEWEST, units)
     if not is_autonomous(system):

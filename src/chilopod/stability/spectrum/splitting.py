@@ -75,10 +75,8 @@ def split_product(
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
-    """The same for the ``count`` directions that grow most, of factors that may map the others to zero.
-
-    A gap must separate these from the others, and the factors must be of moderate condition on them.
-    """
+    """The same for the ``count`` directions that grow most, separated by a gap from the others, which may become
+    zero."""
     bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]
     following = [*bases[1:], bases[0]]
     restricted = [after.T @ f @ before for f, before, after in zip(factors, bases, following, strict=True)]

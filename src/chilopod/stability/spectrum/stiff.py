@@ -40,12 +40,7 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
 
     Directions that the derivative of the flow resolves are split by it; the others, which must be real and of different
     sizes, have the stretch of the frame and its sign. The fastest has all digits, by Liouville's formula; several share
-    an error, which must not exceed 1e-6 of either.
-
-    Raises
-    ------
-    AnalysisError
-        If the error is larger.
+    an error; AnalysisError if that exceeds 1e-6 of either.
     """
     cut = equal_cut(system, x, image, _PARTS)
     frame, logarithms, signs, unsure = _carried(system, cut)
@@ -105,11 +100,8 @@ def _carried(system: FlowsFrames, cut: Cut) -> tuple[Array, Array, Array, Array]
 def _stretched(
     system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, most: int
 ) -> tuple[Stretched, int]:
-    """A frame over a part, and the number of halvings of the part, at most ``most``.
-
-    A part is halved if two computations differ: a direction that turns from a fast decay to a slow one needs short
-    steps, as after a start.
-    """
+    """A frame over a part, and the number of halvings of the part, at most ``most``: it is halved if two computations
+    differ, as where a direction turns from a fast decay to a slow one."""
     n = units.size
     sums, turned, halved = np.zeros((2, n)), np.ones(n), 0
     ends = [t1]
@@ -148,10 +140,8 @@ def _orthonormal(matrix: Array) -> tuple[Array, Array]:
 
 
 def _fastest(system: SystemLike, cut: Cut, k: int) -> Array:
-    """Orthonormal basis of the directions at time 0 that decay faster than the first k, on the section.
-
-    They are contracted most by the flow, over a time so short that they are still above round-off.
-    """
+    """Orthonormal basis of the directions at time 0 that decay faster than the first k, on the section: those that the
+    flow contracts most, over a time so short that they are still above round-off."""
     if k == 0:
         return np.eye(cut.sections[0].shape[1])
     duration = float(cut.times[-1])

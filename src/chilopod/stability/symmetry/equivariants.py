@@ -136,11 +136,8 @@ def _quadratics(rho: Array) -> int:
 
 
 def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
-    """Unit vectors of the lines that are the fixed-point space of a subgroup, one of each class of conjugate ones, and
-    True if the search was complete.
-
-    Every fixed-point space is an intersection of those of single elements, at -1 with either sign.
-    """
+    """Unit vectors of the lines that are the fixed-point space of a subgroup (an intersection of those of single
+    elements, at -1 with either sign), one of each class of conjugate ones; and True if the search was complete."""
     rho = _once(rho)
     most = _MOST_ENTRIES // rho.shape[1] ** 2
     signed = np.concatenate([rho, -rho]) if critical is Event.MINUS else rho

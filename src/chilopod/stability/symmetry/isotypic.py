@@ -27,30 +27,18 @@ _EXACT = 1e-6  # distance of entries of orthogonal matrices and numbers from 0 a
 
 @dataclass(frozen=True)
 class Block(ReadOnlyArrays):
-    """An irreducible real representation of a group, with all its copies in the space of states.
+    """An irreducible real representation of a group, of dimension d, with all its m copies in the space of states."""
 
-    Attributes
-    ----------
-    real
-        True for the real type, whose representation commutes with multiples of the identity only; False for the complex
-        type, such as turns of a plane.
-    basis
-        Symmetry-adapted basis B, shape (n, m d). For the real type it has one copy after the other, with the same
-        matrices in all: P B = B (I_m ⊗ rho(P)).
-    dual
-        Left inverse of the basis, zero on the other blocks, shape (m d, n).
-    representation
-        Orthogonal matrices rho(P) of the elements, shape (order, d, d).
-    kernel
-        Elements that act as the identity, truth values of shape (order,): new orbits always keep these
-        symmetries.
-    """
-
+    # True for the real type, whose representation commutes with multiples of the identity only; False for the complex
+    # type, such as turns of a plane
     real: bool
+    # symmetry-adapted basis B, shape (n, m d); for the real type one copy after the other: P B = B (I_m ⊗ rho(P))
     basis: Array
-    dual: Array
-    representation: Array
-    kernel: NDArray[np.bool_]
+    dual: Array  # left inverse of the basis, zero on the other blocks, shape (m d, n)
+    representation: Array  # orthogonal matrices rho(P) of the elements, shape (order, d, d)
+    kernel: NDArray[
+        np.bool_
+    ]  # truth values, shape (order,), of elements that act as the identity: new orbits keep them
 
     @property
     def dimension(self) -> int:
@@ -73,10 +61,9 @@ class Block(ReadOnlyArrays):
         return self.dimension if self.real else 1
 
     def reduced(self, matrices: ArrayLike) -> Array:
-        """Reduced form of matrices M, shape (..., n, n), that commute with the group.
+        """Reduced form of matrices M, shape (..., n, n), that commute with the group (else of the mean of P M P^-1).
 
-        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; a matrix that does not commute is replaced by
-        the mean of P M P^-1 over the group. Complex type: dual @ M @ basis, shape (..., m d, m d).
+        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d. Complex type: dual @ M @ basis.
         """
         return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
@@ -102,11 +89,8 @@ class Block(ReadOnlyArrays):
 
 
 def isotypic(group: Group) -> tuple[Block, ...]:
-    """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel.
-
-    Raises AnalysisError if the matrices are not exact enough to separate its representations, or one of these is of
-    quaternionic type.
-    """
+    """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel; AnalysisError
+    if its matrices are not exact enough, or a representation is of quaternionic type."""
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
         blocks = _blocks(group, random)
