@@ -80,10 +80,8 @@ class TaylorFlow:
         """Budget of steps of an integration: a few seconds."""
         return max(_FEWEST_STEPS, int(_MOST_WORK / (self.tape.program.shape[1] * (1 + self.tape.dimension))))
 
-    def advance(
-        self, x: Array, t0: float, t1: float, params: Array, *, derived: bool = True, bounded: bool = False
-    ) -> Passage:
-        """Carry one state from t0 to t1 >= t0, with its derivative unless ``derived`` is False.
+    def advance(self, x: Array, t0: float, t1: float, params: Array, *, bounded: bool = False) -> Passage:
+        """Carry one state from t0 to t1 >= t0, with its derivative and, if ``bounded``, a bound on its error.
 
         The bound sums round-off and the last terms of each step, carried by the derivatives of the steps, scaled to
         many times the usual difference from a second computation (of another order with other steps, disturbed by
@@ -98,7 +96,7 @@ class TaylorFlow:
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
-            derivative = np.eye(n) if derived else np.empty((n, 0))
+            derivative = np.eye(n)
             steps = self._run(x, (t0, t1), params, derivative)
             return Passage(x, derivative, _NOTHING, steps)
         other_x = x.copy()
@@ -123,14 +121,12 @@ class TaylorFlow:
         return x, images
 
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
-        """Carry many states, shape (states, n); ``params`` has shape (parameters,) or (states, parameters)."""
-        states = np.array(states, dtype=np.float64, order="C")
-        params = np.asarray(params, dtype=np.float64)
-        rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])), order="C")
+        """Carry many states, shape (states, n)."""
+        states, params = np.array(states, dtype=np.float64, order="C"), np.array(params, dtype=np.float64)
         none, stop = np.empty((self.tape.dimension, 0)), deadline.stop()
 
         def carry(i: int) -> None:
-            self._run(states[i], (t0, t1), rows[i], none, stop=stop)
+            self._run(states[i], (t0, t1), params, none, stop=stop)
 
         carry_all(carry, len(states), _FEWEST_PER_THREAD)
         return states

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -168,11 +167,8 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     return target, known
 
 
-class _Looked(NamedTuple):
-    """The station at the end of a step, if any, and the events within the step."""
-
-    station: Station | None
-    special: tuple[SpecialPoint2, ...]
+_Looked = tuple[Station | None, tuple[SpecialPoint2, ...]]
+"""The station at the end of a step, if any, and the events within the step."""
 
 
 @dataclass
@@ -195,16 +191,17 @@ class _Half:
         for spot, point in self.detector.events(step, self.last.signals, station.signals):
             special += (point,)
             if self.curve.target == 0 and point.kind in _MEETINGS:
-                return _Looked(self.detector.station(spot), special), Ending.RESONANCE
-        return _Looked(None if ending is Ending.CLOSED else station, special), ending
+                return (self.detector.station(spot), special), Ending.RESONANCE
+        return (None if ending is Ending.CLOSED else station, special), ending
 
     def keep(self, found: _Looked, count: int) -> None:
         """Keep a step with its events."""
-        self.special += found.special
-        if found.station is not None:
-            self.points.append(found.station.point)
-            self.last = found.station
-            self.progress(count, found.station.point)
+        station, special = found
+        self.special += special
+        if station is not None:
+            self.points.append(station.point)
+            self.last = station
+            self.progress(count, station.point)
 
 
 def _joined(kind: Kind, origin: Station, before: _Half, after: _Half) -> Curve2:

@@ -171,9 +171,11 @@ class Regular(ReadOnlyArrays):
 
 
 def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regular | None:
-    """Place and orbit at a multiplier +1, where H - 1 is singular and Newton's method stops anywhere along the mode: the
-    orbit and the determinant of H' - 1 are interpolated from regular places on both sides, or on one side at an end,
-    ever closer together until interpolations of two orders agree. None if the orbit is regular or there is no room."""
+    """Place and orbit at a multiplier +1, where H - 1 is singular and Newton's method stops anywhere along the mode.
+
+    The orbit and the determinant of H' - 1 are interpolated from regular places on both sides, or on one side at an end,
+    ever closer together until interpolations of two orders agree. None if the orbit is regular or there is no room.
+    """
     if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
     tried: list[tuple[float, float, _Interpolation]] = []

@@ -60,11 +60,11 @@ class Fit:
     cubic_error: float
 
 
-def fitted(mapped: ReturnedStates, at: CriticalOrbit, noise: float, resonance: int | None, radius: float) -> Fit | None:
+def fitted(mapped: ReturnedStates, at: CriticalOrbit, resonance: int | None, radius: float) -> Fit | None:
     """The terms at the amplitude, and with the bend of the curve, of the most accurate cubic coefficient, from a given
     first amplitude; None if none is suitable."""
     third: Powers = (3, 0) if at.real else (2, 1)
-    manifold = Manifold(mapped, at, noise, 3, resonance)
+    manifold = Manifold(mapped, at, 3, resonance)
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
     best = None
     best_error, status = np.inf, NormalFormStatus.LINEAR

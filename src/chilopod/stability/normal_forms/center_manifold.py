@@ -108,11 +108,10 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
     return result if np.isfinite(result).all() else None
 
 
-def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
+def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
     """Errors of images of a size, shape (n,), and of their projection, shape (n + 1,)."""
     rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
-    floor: Array = np.maximum(rounding, noise * reached)
-    return np.append(floor, np.abs(at.left) @ floor)
+    return np.append(rounding, np.abs(at.left) @ rounding)
 
 
 def solve_homological(
@@ -139,10 +138,8 @@ class Manifold:
     monomials (Kuznetsov, sections 9.3 and 9.4; Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007).
     """
 
-    def __init__(
-        self, mapped: ReturnedStates, at: CriticalOrbit, noise: float, order: int, resonance: int | None = None
-    ) -> None:
-        self._mapped, self._at, self._noise, self._order = mapped, at, noise, order
+    def __init__(self, mapped: ReturnedStates, at: CriticalOrbit, order: int, resonance: int | None = None) -> None:
+        self._mapped, self._at, self._order = mapped, at, order
         if at.real:
             nu = at.multiplier.real
             self._resonant = {(k, 0): nu**k == nu for k in range(2, order)}
@@ -171,9 +168,7 @@ class Manifold:
             return None
         found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
         size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
-        blur, floor = (
-            _expected_noise(at, reached, self._noise) for reached in (np.abs(at.state), np.abs(at.state) + size)
-        )
+        blur, floor = (_expected_noise(at, reached) for reached in (np.abs(at.state), np.abs(at.state) + size))
         # A cosine transform spreads the noise of the samples evenly over the coefficients, smaller by this factor.
         seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
         shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0

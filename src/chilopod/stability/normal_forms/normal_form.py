@@ -28,7 +28,7 @@ class NormalForm:
     space.
 
     With a the amplitude along the unit critical mode: real multiplier +1, a -> a + quadratic a^2 + cubic a^3. A
-    multiplier -1 of the return map: the same, with ``quadratic`` zero, of the first map that has +1 again: that over one
+    multiplier -1 of the return map: the same, with ``quadratic`` zero, of the first map that has +1 again: over one
     period if it is an even number of returns (a pitchfork that breaks a symmetry in time), else over two (a period
     doubling, with ``cubic`` -2 (b^2 + d) where one period maps a to -a + b a^2 + d a^3). Neimark-Sacker (state = 2 Re(a
     mode)): |a| -> |a| + cubic |a|^3, while the phase of a advances by that of the multiplier + rotation |a|^2.
@@ -74,14 +74,12 @@ def normal_form(
     mapped: ReturnedStates,
     at: CriticalOrbit,
     *,
-    # relative errors of the map, beside round-off and the noise of the samples, and of its derivative
-    noise: float = 0.0,
-    uncertainty: float = 0.0,
+    uncertainty: float = 0.0,  # relative error of the derivative of the map
     scale: ArrayLike | None = None,  # sizes of the states, shape (n,), where the search for an amplitude starts
-    orbit_error: float | None = None,  # error of the orbit along the mode; by default from its residual and the noise
+    orbit_error: float | None = None,  # error of the orbit along the mode; by default from its residual
 ) -> NormalForm:
     """Normal form on the centre manifold of a critical orbit of a map of several states, shape (k, n)."""
-    values, errors = _uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
+    values, errors = _uncertainties(at.jacobian, max(uncertainty, 16.0 * np.finfo(float).eps))
     own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
     others = np.delete(np.arange(values.size), own)
     if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
@@ -95,11 +93,11 @@ def normal_form(
         return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=resonance)
     # An overflow far out is a valid result.
     with np.errstate(all="ignore"):
-        fit = fitted(mapped, at, noise, resonance, _start(at, scale))
+        fit = fitted(mapped, at, resonance, _start(at, scale))
     if fit is None:
         return NormalForm(NormalFormStatus.OUT_OF_REACH, resonance=resonance)
     if at.real:
-        return _of_full_period(fit, mapped, at, noise, orbit_error)
+        return _of_full_period(fit, mapped, at, orbit_error)
     cubic = at.returns * np.conj(at.multiplier) * fit.cubic
     error = at.returns * fit.cubic_error
     form = NormalForm(
@@ -138,15 +136,15 @@ def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
     return orbit / float(mode.max()) if orbit > 0.0 else _START
 
 
-def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
+def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic: float) -> float:
     """Error d along the mode of an orbit with this residual, where H - 1 is singular: beside the symmetric orbit of a
     pitchfork the residual is at least cubic d^3, with an apparent quadratic term 3 cubic d; beside a transcritical
     point it is quadratic d^2."""
     image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
     if image is None:
         return 0.0
-    rounding = max(noise, 2.0 * np.finfo(float).eps) * np.abs(at.state)
-    missed = float(abs(image[0] @ at.left)) + float(np.abs(at.left) @ rounding)
+    rounding = 2.0 * float(np.finfo(float).eps)
+    missed = float(abs(image[0] @ at.left) + rounding * (np.abs(at.left) @ np.abs(at.state)))
     if missed == 0.0:
         return 0.0
     by_cubic = float(1.5 * np.cbrt(missed / cubic)) if cubic > 0.0 else np.inf
@@ -154,16 +152,14 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic
     return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
 
 
-def _of_full_period(
-    fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float, orbit_error: float | None
-) -> NormalForm:
+def _of_full_period(fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, orbit_error: float | None) -> NormalForm:
     """Coefficients of the map with multiplier +1 from those of one return at a real multiplier."""
     quadratic, quadratic_error = fit.sampled.term((2, 0))
     cubic, cubic_error = fit.cubic.real, fit.cubic_error
     fourth, fourth_error = fit.sampled.term((4, 0))
     off = orbit_error
     if off is None:
-        off = _loose_by(mapped, at, noise, abs(quadratic), abs(cubic) + cubic_error)
+        off = _loose_by(mapped, at, abs(quadratic), abs(cubic) + cubic_error)
     if off > 0.0:
         quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
         cubic_error += 4.0 * (abs(fourth) + fourth_error) * off

@@ -29,12 +29,12 @@ class Quintic:
     amplitude: float  # largest amplitude at which the return map was sampled
 
 
-def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float, noise: float = 0.0) -> Quintic | None:
+def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float) -> Quintic | None:
     """The coefficient of fifth order at a critical orbit, from the amplitude with the smallest error; the search starts
     at that of the normal form of third order. None if the map is undefined at all amplitudes. A multiplier +1 belongs
     to a pitchfork, whose symmetry excludes terms of even order."""
     best: Quintic | None = None
-    manifold = Manifold(mapped, at, noise, 5)
+    manifold = Manifold(mapped, at, 5)
     curve: Curve = manifold.curve
     for factor, radius in ((_STEP, amplitude), (1.0 / _STEP, amplitude / _STEP)):
         worse, tries = 0, 0
