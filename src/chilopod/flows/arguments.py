@@ -131,8 +131,7 @@ def _waves(n: int) -> Array:
 def check_symmetry(
     field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
 ) -> None:
-    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes: a wrong symmetry would give wrong
-    multipliers without an error."""
+    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes."""
     x = np.tile(base[:, None] + _waves(base.size), times.size)
     t = np.repeat(times, x.shape[1] // times.size)
     both = slopes(np.concatenate([t, (t + shift) % period]), np.concatenate([x, matrix @ x], axis=1))

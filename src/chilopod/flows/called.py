@@ -109,8 +109,7 @@ class CalledFlow:
         return y[:n], y[n:].reshape(-1, n)
 
     def _missed(self, x: Array, parts: Parts, derivative: Array, sizes: Array) -> float:
-        """Error of the derivative by differences of the flow: where f jumps with the state, the error remains for
-        every small difference."""
+        """Error of the derivative by small differences of the flow: it remains where f jumps with the state."""
         direction = np.cos(5.0 * np.arange(x.size) + 0.7)
         off = []
         for h in (_SMALL, _SMALL / 3.0):
@@ -220,8 +219,7 @@ def _cut(parts: Parts) -> Parts:
 
 
 def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, sizes: Array, times: Array) -> bool:
-    """True if a right-hand side accepts complex states, and complex steps agree with differences on both sides of
-    zero, at all given times."""
+    """True if complex steps are accepted, and agree with differences on both sides of zero at all given times."""
     step = sizes * np.cos(2.0 * np.arange(x.size) + 0.1)
     shift = sizes * np.cos(np.arange(x.size) + 0.3)
     for t, part in itertools.product(times.tolist(), (0.7, -0.7, 3.1, -3.1)):

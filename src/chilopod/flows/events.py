@@ -51,8 +51,7 @@ def checked_events(events: object) -> tuple[Event, ...]:
 
 
 def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array, orbit: Array | None, n: int) -> None:
-    """Check that guards return numbers that may pass zero, and resets states, around the orbit, a state of shape (n,),
-    at some times within the period."""
+    """Check that guards give numbers that may pass zero, and resets states, around the orbit at some times."""
     if not events:
         return
     base = np.zeros(n) if orbit is None else orbit

@@ -8,8 +8,7 @@ _FALLING = 0.5
 
 
 class Rule(NamedTuple):
-    """A stopping rule: the residual is round-off, or it is small and no longer halves, which is the accuracy of the
-    equations."""
+    """Stopping rule: the residual is round-off, or small and no longer halves, which is the equations' accuracy."""
 
     round_off: float  # residual, relative to the sizes of the unknowns, that is round-off
     settled: float  # residual below which it may stop falling

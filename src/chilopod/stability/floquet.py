@@ -94,8 +94,7 @@ class Multipliers(Result, ReadOnlyArrays):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """Dataset of the multipliers of the full period, and of the return map as ``half_period``, over
-        ``multiplier``."""
+        """Dataset of the multipliers of the full period, and ``half_period`` of the return map, over ``multiplier``."""
         half = self.values if self.half_period is None else self.half_period
         values = {"multipliers": self.values, "modulus": np.abs(self.values), "error_bounds": self.error_bounds}
         about = {"period": self.period, "verdict": VERDICTS[self.stable], "remarks": "; ".join(self.remarks)}

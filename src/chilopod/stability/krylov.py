@@ -360,8 +360,7 @@ def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
 def _bend(
     image: TangentMap, size: Array, subspace: KrylovSubspace, state_error: Array, directions: Array, images: Array
 ) -> Array:
-    """Change of the derivative within the error of the orbit, along its least certain direction, applied to vectors
-    given by real and imaginary parts."""
+    """Change of the derivative's images within the error of the orbit, along its least certain direction."""
     _, values, right = np.linalg.svd(subspace.matrix - np.eye(len(subspace.matrix)))
     values = values[values > _SINGULAR * values[0]]
     weakest = subspace.basis @ right[values.size - 1]

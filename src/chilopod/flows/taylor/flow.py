@@ -143,8 +143,7 @@ class TaylorFlow:
         stepwise: bool = True,
         stop: Array | None = None,
     ) -> int:
-        """Carry state, derivative and bound over an interval in place; return the number of steps. ``other`` selects
-        the second computation, of another order with other steps."""
+        """Carry state, derivative and bound in place, by the second computation if ``other``; return the steps."""
         kernels = _compiled()
         stop = deadline.stop() if stop is None else stop
         n, parameters = self._shape

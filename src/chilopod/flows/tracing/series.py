@@ -219,8 +219,7 @@ def choose(tape: Any, series: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: Any) -> None:
-    """Values of some nodes at times and states, with their branches; shapes (samples,), (n, samples) and (nodes,
-    samples), where all samples may share one time or state."""
+    """Values of nodes, shape (nodes, samples), at times and states, of which all may share one."""
     series = loaded(tape, params, 1, 0, np.zeros(tape.switches.shape[1]))
     n, values = tape.layout[0], series.values
     for m in range(found.shape[1]):

@@ -174,8 +174,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return self.spot(found.place, anchor.frame, None)
 
     def _nearest(self, anchor: Spot) -> Evaluated:
-        """The equations at the point of the curve nearest to a spot beside it; on an edge of the box if the point lies
-        outside."""
+        """The equations at the point of the curve nearest to a spot beside it, or on an edge of the box before it."""
         try:
             return self.along(anchor, 0.0)
         except OutsideBoxError as error:
@@ -185,8 +184,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             return self.step(anchor, Guess(plane.target * row, anchor.matrix), plane).found
 
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
-        """Description of a point on the curve, in a frame adapted to it; its tangent has the direction of the one
-        ``before``."""
+        """A point on the curve, in a frame adapted to it, with its tangent along the one ``before``."""
         system = self.system(place.values)
         section = frame.section
         if section is not None:
@@ -250,8 +248,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
 
     def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and the coordinates that identify it: a system that does not
-        depend on time may return to the same orbit at another instant."""
+        """Displacement of the first point, its tangent, and coordinates that do not change with the time 0."""
         frame, first = anchor.frame, self.first
         seen = slice(0 if frame.section is None else frame.parameters.start, None)
         return frame.between(anchor.place, first.place), frame.carried(first.tangent, first.frame), seen

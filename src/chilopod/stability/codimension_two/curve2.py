@@ -158,8 +158,7 @@ class Curve2(Result):
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the curve over both parameters, with points of codimension two marked, on axes of matplotlib or on new
-        ones."""
+        """Draw the curve over both parameters, with points of codimension two, on given or new axes of matplotlib."""
         axes = axes_for(axes)
         axes.plot(*self.values.T, label=self.kind.label)
         mark(axes, [(each.kind.label, each.values[0], each.values[1]) for each in self.special])

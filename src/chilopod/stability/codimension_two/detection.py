@@ -42,8 +42,7 @@ _EPSILON = float(np.finfo(float).eps)
 
 
 class Own(enum.Enum):
-    """Test functions of the critical multiplier: the coefficient of the normal form, and w . v, which is zero where the
-    multiplier is double."""
+    """Coefficient of the normal form, and w . v of the critical eigenvectors, zero for a double multiplier."""
 
     COEFFICIENT = enum.auto()
     DOUBLE = enum.auto()
@@ -123,8 +122,7 @@ class Station:
 
 
 class Detector:
-    """Test functions along a curve of bifurcations of some kind, with that of the normal form if coefficients are
-    requested."""
+    """Test functions along a curve of bifurcations, with that of the normal form if ``coefficients``."""
 
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
         self._curve, self._kind, self._coefficients = curve, kind, coefficients
@@ -210,8 +208,7 @@ class Detector:
     def _located(
         self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
     ) -> list[tuple[float, Spot, SpecialPoint2]]:
-        """The point where a test function vanishes within a step, and its distance along the step; None for a zero
-        without meaning."""
+        """Points where a test function vanishes within a step, with their distances along the step."""
         curve, start, length = self._curve, parts.step.start, parts.step.size
         seen: dict[float, tuple[float, float]] = {}
 
@@ -247,8 +244,7 @@ class Detector:
         return [(root, spot, point)]
 
     def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
-        """A point with its next coefficient, whose error includes part of the change to a place ``beside``, as the
-        point may be off by that distance."""
+        """A point with its next coefficient, whose error includes its change over the error of the place."""
         terms, forms = [], [self.form(each) for each in (here, beside)]
         for each, form in zip((here, beside), forms, strict=True):
             value, error = form.cubic, form.cubic_error
@@ -344,8 +340,7 @@ def across(spot: Spot) -> Array:
 def _along(
     test: Callable[[float], float], parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float
 ) -> Array:
-    """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open; from
-    differences over h."""
+    """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
     try:
         slope = abs(test(root + h) - test(root - h)) / (2.0 * h)
         low, middle, high = (parts.at(root + s).found.place.values for s in (-h, 0.0, h))

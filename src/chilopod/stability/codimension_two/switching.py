@@ -141,8 +141,7 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
 
 
 def _across(spot: Spot, target: int) -> Array:
-    """``response`` of an unfolding, by the shortest way in the plane of the parameters; g changes by -(w . v) times the
-    change of the multiplier."""
+    """``response`` of an unfolding, by the shortest way; g changes by -(w . v) times the change of the multiplier."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.at.left[:, 0] @ spot.at.right[:, 0])
     orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])

@@ -99,8 +99,7 @@ def described(
 
 
 def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
-    """Root mean square of a mode over a return, across the motion, which does not depend on the choice of time 0; 1 for
-    a given period, which fixes time 0."""
+    """Root mean square of a mode over a return, across the motion; 1 for a given period, which fixes time 0."""
     if not is_autonomous(system):
         return 1.0
     before, parts, duration = 0.0, _FEWEST_PARTS, orbit.period / orbit.image.returns

@@ -86,8 +86,7 @@ def critical_multipliers(spec: Spectrum, crossing: Crossing) -> NDArray[np.intp]
 
 
 def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
-    """Bound on the error of the place of a crossing on a course, from the return map there with its error bounds: the
-    error of the critical multipliers over their rate of change."""
+    """Bound on the error of the place of a crossing: error of the critical multipliers over their rate of change."""
     width = 0.5 * (crossing.bracket[1] - crossing.bracket[0])
     try:
         if crossing.collision:
@@ -161,8 +160,7 @@ Bounded = Callable[[float, Array, Array, ReturnMap], Orbit]
 
 @dataclass(frozen=True)
 class Regular(ReadOnlyArrays):
-    """An interpolated singular orbit: its place with an error bound, the ``orbit`` of a sample there, and the orbit
-    itself."""
+    """An interpolated singular orbit: place, error bound, ``orbit`` of a sample there, and the orbit itself."""
 
     place: float
     error_bound: float
@@ -173,8 +171,8 @@ class Regular(ReadOnlyArrays):
 def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regular | None:
     """Place and orbit at a multiplier +1, where H - 1 is singular and Newton's method stops anywhere along the mode.
 
-    The orbit and the determinant of H' - 1 are interpolated from regular places on both sides, or on one side at an end,
-    ever closer together until interpolations of two orders agree. None if the orbit is regular or there is no room.
+    The orbit and det(H' - 1) are interpolated from regular places on both sides, or on one side at an end, ever closer
+    together until interpolations of two orders agree. None if the orbit is regular or there is no room.
     """
     if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
@@ -210,8 +208,7 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
 
 
 class _Interpolation(NamedTuple):
-    """Place and orbit by polynomials through the determinant of H' - 1 and the orbit, in units of the reach from the
-    root finder's place."""
+    """Place and orbit by polynomials through det(H' - 1) and the orbit, in units of the reach."""
 
     place: float  # zero of the determinant
     between: float  # its distance from the zero of the polynomial without the outermost two places

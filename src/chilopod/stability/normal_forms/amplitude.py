@@ -135,8 +135,7 @@ def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: 
 
 
 def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
-    """Departure of the projected map from its linear part, relative to the amplitude; the order of its main term; and
-    True if it exceeds the noise."""
+    """Departure from linearity relative to the amplitude, order of its main term, True if it exceeds the noise."""
     share, order = 0.0, 2
     for one in found.harmonics:
         sizes = np.abs(one.coefficients[1:, -1])

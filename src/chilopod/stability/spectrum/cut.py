@@ -23,8 +23,7 @@ _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, ab
 
 @dataclass(frozen=True)
 class Cut:
-    """A return in parts, with orthonormal bases at the borders: of the planes across the motion if the system does not
-    depend on time, else of the whole space."""
+    """A return in parts, with orthonormal bases at the borders: of the planes across the motion, or of the space."""
 
     times: Array  # times of the borders, shape (parts + 1,)
     states: Array  # states there, shape (parts + 1, n)

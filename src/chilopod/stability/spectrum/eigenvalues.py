@@ -70,8 +70,7 @@ def return_multipliers(image: ReturnMap) -> ComplexArray:
 
 
 def _across(image: ReturnMap) -> tuple[Array, Array]:
-    """Coordinates on the section of a return map: (n, n-1) from them, and (n-1, n) to them along the motion; two unit
-    matrices without a section."""
+    """Coordinates on the section of a return map: matrices (n, n-1) from them, and (n-1, n) to them."""
     n = image.state.size
     if image.velocity is None or image.normal is None:
         return np.eye(n), np.eye(n)

@@ -75,8 +75,7 @@ def split_product(
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
-    """The same for the ``count`` directions that grow most, separated by a gap from the others, which may become
-    zero."""
+    """The same for the ``count`` directions that grow most, separated by a gap from the others."""
     bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]
     following = [*bases[1:], bases[0]]
     restricted = [after.T @ f @ before for f, before, after in zip(factors, bases, following, strict=True)]
@@ -132,8 +131,7 @@ def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
 def _moved(
     factors: Sequence[Array], errors: Sequence[Array], groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]
 ) -> Array:
-    """Change of the logarithms when factors change by their errors, group by group: the largest over random signs (in
-    one draw the contributions may cancel), with a safety factor."""
+    """Largest change of the logarithms when factors change by their errors with random signs, with a safety factor."""
     nodes = [np.hstack(bases) for bases in zip(*groups, strict=True)]
     sizes = np.cumsum([0, *(len(values) for values in known)])
     moved = np.zeros(sizes[-1])

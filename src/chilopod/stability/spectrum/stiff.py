@@ -66,8 +66,7 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
 
 
 def _carried(system: FlowsFrames, cut: Cut) -> tuple[Array, Array, Array, Array]:
-    """The frame at time 0 on the section, the logarithms of its stretch in every part, its signs on return (0 if lost),
-    and the errors of the sums of the logarithms."""
+    """The frame at time 0, its logarithms of stretch by parts, its signs on return (0 if lost), errors of the sums."""
     units, n = cut.units, cut.units.size
     along = 1 if is_autonomous(system) else 0
     frame = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]

@@ -129,8 +129,7 @@ def _kind(block: Block, critical: Event, quadratic: int, returns: int) -> Symmet
 
 
 def _quadratics(rho: Array) -> int:
-    """Number of quadratic equivariants V -> V: multiplicity of V in its symmetric square (Sattinger, Group Theoretic
-    Methods in Bifurcation Theory, Springer 1979)."""
+    """Number of quadratic equivariants V -> V: multiplicity of V in its symmetric square."""
     one, two = (np.trace(power, axis1=1, axis2=2) for power in (rho, rho @ rho))
     return round(float((one * (one**2 + two)).mean() / 2.0))
 

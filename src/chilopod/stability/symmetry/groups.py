@@ -128,8 +128,7 @@ def centraliser(group: Group, gamma: Array) -> Group:
 
 
 def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
-    """Commutator of the derivative of a return map with a group, relative to the bound on the error of its entries and
-    round-off: at most 1 if it commutes."""
+    """Commutator of a return map's derivative with a group, relative to its errors: at most 1 if it commutes."""
     n = group.dimension
     sizes = group.scales[:, None] / group.scales
     pairs = group.component[:, None], group.component[None, :]

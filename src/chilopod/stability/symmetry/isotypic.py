@@ -68,8 +68,7 @@ class Block(ReadOnlyArrays):
         return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
-        """Bound on the absolute error of the reduced matrices, from that of the matrices' entries (one number or all)
-        and round-off."""
+        """Bound on the error of the reduced matrices, from that of the entries (one number or all) and round-off."""
         round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
         entries = np.asarray(error, dtype=np.float64) + round_off
         return self._diagonal(np.abs(self.dual) @ entries @ np.abs(self.basis))
@@ -156,8 +155,7 @@ def _mean(q: Array, matrix: Array) -> Array:
 
 
 def _image(projector: Array, coordinates: NDArray[np.intp]) -> Array:
-    """Orthonormal basis, shape (n, any), of the image under a projector of the space of some of the coordinates, which
-    it does not mix with others, as these may have other units."""
+    """Orthonormal basis, shape (n, any), of a projector's image of some coordinates, which it mixes with no others."""
     values, vectors = np.linalg.eigh(projector[np.ix_(coordinates, coordinates)])
     embedded = np.zeros((len(projector), int((values > 0.5).sum())))
     embedded[coordinates] = vectors[:, values > 0.5]

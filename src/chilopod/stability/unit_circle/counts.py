@@ -227,8 +227,7 @@ class Accounts:
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
     def _followed(self, x: float, y: float, before: int, after: int) -> list[Root]:
-        """Roots of the multipliers whose ranks are inside the circle at one end of a gap and outside at the
-        other."""
+        """Roots of the multipliers whose ranks are inside the circle at one end of a gap and outside at the other."""
         changed, spectra = f"{after - before:+d} multipliers outside", self._spectra
         if spectra.conservative and not spectra.holes(x, y):
             return self._bisected(x, y, before, after)

@@ -42,8 +42,7 @@ def rooted(
     event: Event | None,
     within: float = 0.0,
 ) -> Root:
-    """The root of a function of the eigenvalues between two places with opposite signs, to within a distance or to the
-    last digits."""
+    """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
     most = min(200, max(spectra.left, 1))
     finest = max(within, 5e-324)
     place = float(brentq(function, low, high, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
