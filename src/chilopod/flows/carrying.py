@@ -12,8 +12,7 @@ from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
 from chilopod.frozen import Array
 
-RESOLUTION = 4096
-"""Number of grid points over the period; a pulse in time that the grid meets is resolved exactly."""
+RESOLUTION = 4096  # number of grid points over the period; a pulse in time that the grid meets is resolved exactly
 
 DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
 """How an integration ends."""

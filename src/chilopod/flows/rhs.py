@@ -32,12 +32,10 @@ from chilopod.frozen import Array, read_only
 
 TOLERANCE = 1e-14
 _SAME = 1e-6
-_FLOOR = 0.01
-"""Truncation of a Taylor step relative to the tolerance: a small one costs almost nothing."""
+_FLOOR = 0.01  # truncation of a Taylor step relative to the tolerance: a small one costs almost nothing
 _ESTIMATED = 100.0
 """Error estimate of an implicit step relative to the tolerance: the estimate is far larger than the error."""
-_PATIENCE = 256
-"""Taylor steps after which the implicit method takes over a motion that would exceed the budget."""
+_PATIENCE = 256  # taylor steps after which the implicit method takes over a motion that would exceed the budget
 
 Method = Literal["automatic", "taylor", "implicit"]
 

@@ -42,12 +42,11 @@ class Multipliers(Result, ReadOnlyArrays):
     Attributes
     ----------
     values
-        Multipliers of the full period, by falling modulus, shape (n,); n-1 of them if the system does not depend on
-        time, without the one along the motion, which is 1. The absolute accuracy is ``error_bound``: smaller values
-        are only known to be small (:func:`exponents` resolves them). Fewer if only leading ones were requested.
+        Multipliers of the full period, by falling modulus, shape (n,), or (n-1,) without the one along the motion if
+        the system does not depend on time, or fewer if only leading ones were requested. Values below ``error_bound``
+        are only known to be small (:func:`exponents` resolves them).
     half_period
-        Multipliers nu of the return map of a system with a symmetry in time of order k (by default 2, hence the name),
-        with ``values = nu^k`` in the same order; None without one.
+        Multipliers nu of the return map with a symmetry in time of order k (usually 2), ``values = nu^k``; else None.
     error_bound
         Bound on the absolute error of every multiplier of modulus above 1e-6.
     error_bounds
@@ -109,16 +108,14 @@ class Exponents(Shown, ReadOnlyArrays):
     ----------
     values
         Exponents (1/s), by falling real part, shape (n,) or, like the multipliers, (n-1,): principal logarithm of the
-        full-period multiplier over T, imaginary part in (-pi/T, pi/T]. With a symmetry in time of order k they come
-        from ln(nu^k), the same number.
+        full-period multiplier over T, imaginary part in (-pi/T, pi/T].
     modes
         Unit eigenvectors of the full-period map at time 0 as columns, the largest entry real and positive; for a system
         that does not depend on time, of its Poincare map on the section across the motion.
-        multipliers
+    multipliers
         Multipliers of the same orbit.
     error_bound
-        Bound on the absolute error (1/s) of each of ``values``, in the same shape: their change when the flows over
-        parts of the period change by their errors.
+        Bound on the absolute error (1/s) of each of ``values``.
     """
 
     values: ComplexArray

@@ -35,8 +35,7 @@ from chilopod.stability.problem.returns import (
 from chilopod.stability.spectrum.eigenvalues import eigensystem
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors
 
-LARGE = 100
-"""Number of states from which a few directions are cheaper than the whole derivative."""
+LARGE = 100  # number of states from which a few directions are cheaper than the whole derivative
 
 _LANES = 4  # columns that the compiled code carries together
 _ROUND_OFF = 1e-14  # part outside a subspace that is round-off, relative to the largest image

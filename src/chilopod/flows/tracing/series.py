@@ -15,11 +15,6 @@ from chilopod.compiled import fused_njit
 from chilopod.flows.tracing import tape as ops
 from chilopod.lanes import HALF, as_lanes
 
-LINEAR, PRODUCT, SQUARE, QUOTIENT = ops.LINEAR, ops.PRODUCT, ops.SQUARE, ops.QUOTIENT
-STEP, FLOOR, SELECT, GUARD = ops.STEP, ops.FLOOR, ops.SELECT, ops.GUARD
-EXP, SIN, COS, TAN, SINH, COSH, TANH = ops.EXP, ops.SIN, ops.COS, ops.TAN, ops.SINH, ops.COSH, ops.TANH
-LOG, SQRT, POWER, ATAN, ASIN = ops.LOG, ops.SQRT, ops.POWER, ops.ATAN, ops.ASIN
-
 
 class Series(NamedTuple):
     """Taylor coefficients of all nodes of a tape along a motion."""
@@ -33,27 +28,27 @@ class Series(NamedTuple):
 
 @fused_njit(error_model="numpy")
 def _function(code: int, a: float, b: float) -> float:
-    if code == EXP:
+    if code == ops.EXP:
         return math.exp(a) if a < 709.7 else math.inf
-    if code == SIN:
+    if code == ops.SIN:
         return math.sin(a)
-    if code == COS:
+    if code == ops.COS:
         return math.cos(a)
-    if code == TAN:
+    if code == ops.TAN:
         return math.tan(a)
-    if code == SINH:
+    if code == ops.SINH:
         return math.sinh(a) if abs(a) < 710.0 else math.inf
-    if code == COSH:
+    if code == ops.COSH:
         return math.cosh(a) if abs(a) < 710.0 else math.inf
-    if code == TANH:
+    if code == ops.TANH:
         return math.tanh(a)
-    if code == LOG:
+    if code == ops.LOG:
         return math.log(a) if a > 0.0 else math.nan
-    if code == SQRT:
+    if code == ops.SQRT:
         return math.sqrt(a) if a >= 0.0 else math.nan
-    if code == POWER:
+    if code == ops.POWER:
         return np.power(a, b)
-    if code == ATAN:
+    if code == ops.ATAN:
         return math.atan(a)
     return math.asin(a) if abs(a) <= 1.0 else math.nan
 
@@ -61,7 +56,7 @@ def _function(code: int, a: float, b: float) -> float:
 @fused_njit(error_model="numpy")
 def branch_at(kind: int, value: float) -> float:
     """Branch of a switch where its function has a value: the largest whole number below, or the sign."""
-    if kind == FLOOR:
+    if kind == ops.FLOOR:
         return math.floor(value)
     return 1.0 if value >= 0.0 else -1.0
 
@@ -79,10 +74,10 @@ def values_at(
         for i in range(span[0], span[1]):
             code, a, b = program[0, i], program[1, i], program[2, i]
             s, odd = 0.0, 0.0  # two independent sums run in parallel
-            if code == LINEAR:
+            if code == ops.LINEAR:
                 for j in range(a, b):
                     s += values[terms[0, j], 0] * values[terms[1, j], k]
-            elif code == PRODUCT:
+            elif code == ops.PRODUCT:
                 half = (k + 1) // 2
                 for j in range(half):
                     s += values[a, j] * values[b, k - j]
@@ -90,7 +85,7 @@ def values_at(
                 if 2 * half == k:
                     s += values[a, k] * values[b, 0]
                 s += odd
-            elif code == SQUARE:
+            elif code == ops.SQUARE:
                 half = (k + 1) // 4
                 for j in range(half):
                     s += values[a, j] * values[a, k - j]
@@ -100,15 +95,15 @@ def values_at(
                 s = 2.0 * (s + odd)
                 if k % 2 == 0:
                     s += values[a, k // 2] * values[a, k // 2]
-            elif code == QUOTIENT:
+            elif code == ops.QUOTIENT:
                 s = values[a, k]
                 for j in range(1, k + 1):
                     s -= values[b, j] * values[i, k - j]
                 s = s / values[b, 0] if values[b, 0] != 0.0 else math.nan
-            elif code in (STEP, FLOOR):
+            elif code in (ops.STEP, ops.FLOOR):
                 if k == 0:
                     s = branches[b] if b >= 0 else branch_at(code, values[a, 0])
-            elif code == SELECT:
+            elif code == ops.SELECT:
                 s = values[b, k] if values[a, 0] > 0.0 else values[program[3, i], k]
             elif k == 0:
                 s = _function(code, values[a, 0], values[b, 0])
@@ -120,7 +115,7 @@ def values_at(
                     odd += (half + j) * values[a, half + j] * values[w, k - half - j]
                 for j in range(2 * half + 1, (1 if program[5, a] != 0 else k) + 1):
                     s += j * values[a, j] * values[w, k - j]
-                s = (s + odd) / (-k if code == COS else k)
+                s = (s + odd) / (-k if code == ops.COS else k)
             values[i, k] = s
         if k < order:
             for i in range(slopes.size):
@@ -158,18 +153,18 @@ def tangents_at(
             code, a, b = program[0, i], program[1, i], program[2, i]
             for lane in range(tangents.shape[2]):
                 tangents[i, k, lane] = 0.0
-            if code == LINEAR:
+            if code == ops.LINEAR:
                 for j in range(a, b):
                     if program[4, terms[1, j]] != 0:
                         _add(tangents, i, k, terms[1, j], k, values[terms[0, j], 0])
-            elif code == PRODUCT:
+            elif code == ops.PRODUCT:
                 if program[4, a] != 0:
                     _convolve(tangents, values, i, b, a, 0, k, 1.0)
                 if program[4, b] != 0:
                     _convolve(tangents, values, i, a, b, 0, k, 1.0)
-            elif code == SQUARE:
+            elif code == ops.SQUARE:
                 _convolve(tangents, values, i, a, a, 0, k, 2.0)
-            elif code == QUOTIENT:
+            elif code == ops.QUOTIENT:
                 f = 1.0 / values[b, 0]
                 if program[4, a] != 0:
                     _add(tangents, i, k, a, k, f)
@@ -177,10 +172,10 @@ def tangents_at(
                     _convolve(tangents, values, i, i, b, 0, k, -f)
                 if k > 0:
                     _convolve(tangents, values, i, b, i, 1, k, -f)
-            elif code == SELECT:
+            elif code == ops.SELECT:
                 _add(tangents, i, k, b if values[a, 0] > 0.0 else program[3, i], k, 1.0)
             else:
-                _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == COS else 1.0)
+                _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == ops.COS else 1.0)
         if k < order:
             for i in range(slopes.size):
                 for lane in range(tangents.shape[2]):
@@ -207,14 +202,14 @@ def choose(tape: Any, series: Any) -> None:
     values, branches = series.values, series.branches
     first = tape.layout[3]
     for s in range(switches.shape[1]):
-        if switches[0, s] != GUARD:
+        if switches[0, s] != ops.GUARD:
             values_at(program, terms, slopes, (first, switches[2, s]), 0, 1.0, values, branches)
             branches[s] = branch_at(switches[0, s], values[switches[1, s], 0])
             first = switches[2, s]
     values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
     for s in range(switches.shape[1]):
-        if switches[0, s] == GUARD:
-            branches[s] = branch_at(GUARD, values[switches[1, s], 0])
+        if switches[0, s] == ops.GUARD:
+            branches[s] = branch_at(ops.GUARD, values[switches[1, s], 0])
 
 
 @fused_njit(error_model="numpy")

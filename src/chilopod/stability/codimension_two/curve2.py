@@ -97,8 +97,7 @@ class SpecialPoint2(Point2):
     Attributes
     ----------
     kind
-        Kind of the point. The error of its ``values`` is also that of the test function over its rate of change along
-        the curve.
+        Kind of the point.
     next_coefficient, next_coefficient_error
         Next coefficient where that of the curve's normal form vanishes, for the same map and amplitude, and a bound on
         its error: c of a -> a + c a^3 at a cusp and a degenerate transcritical point; e of a -> a + e a^5 at a

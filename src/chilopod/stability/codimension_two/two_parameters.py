@@ -57,15 +57,14 @@ def follow2(
         ``family2(p, q)`` is the system at values of both parameters.
     start
         Point from :func:`chilopod.stability.locate` in the family of p with q = ``second``; or start from
-        :func:`chilopod.stability.switch2`, which contains its q and leads away from the point of codimension two.
+        :func:`chilopod.stability.switch2`, which contains its q.
     between
         Intervals of both parameters: the box of the curve; the family is called for values inside only. Their widths
         are the parameters' units.
     second
         Value of q at the start.
     rising
-        True to start towards rising q, False towards falling q, None for both in one curve. Not used for a curve that
-        leaves another one.
+        True to start towards rising q, False towards falling q, None for both in one curve; unused from `switch2`.
     points
         Largest number of points in each direction.
     step, longest
@@ -73,16 +72,15 @@ def follow2(
     coefficients
         True to compute normal forms, which are needed to find cusps and degenerate points.
     budget, seconds
-        Number of return maps with derivatives (normal forms are counted separately), and time in s, after which the
-        curve ends.
+        Number of return maps with derivatives, beside those of normal forms, and time in s, at which the curve ends.
     progress
         Called with the number of points and the newest one.
 
     Raises
     ------
     ParameterError
-        If an argument is out of range; for a pitchfork, transcritical or branch point that neither a symmetry nor a
-        known orbit preserves as both parameters change; for a Krein collision.
+        If an argument is out of range; for a Krein collision, and a pitchfork, transcritical or branch point that
+        neither a symmetry nor a known orbit preserves.
     AnalysisError
         If no point of a curve is found at the start.
     """

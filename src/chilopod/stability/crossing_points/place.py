@@ -20,8 +20,7 @@ from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
 
-SAFETY = 1.5
-"""Factor on the error of a multiplier, for that of its rate of change."""
+SAFETY = 1.5  # factor on the error of a multiplier, for that of its rate of change
 
 _TOUCH_STEP = 1e-3  # distance from a touch at which the multiplier is computed, relative to the course
 _ASIDE = np.arange(1.0, 9.0) / 4.0  # nodes of the interpolation of a singular orbit on one side, in units of the reach

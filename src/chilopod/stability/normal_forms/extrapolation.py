@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 
-RADII = 8
-"""Number of radii at which a function is sampled."""
+RADII = 8  # number of radii at which a function is sampled
 
 _SAFETY = 5.0  # factor on the noise, estimated from few samples, and the truncation, from the next two terms
 _FALL = 4.0

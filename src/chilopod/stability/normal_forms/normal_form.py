@@ -39,7 +39,7 @@ class NormalForm:
     ----------
     status
         Status of the numbers. If it is neither FOUND nor LINEAR they are NaN with infinite errors, except at the
-        resonances 1:3 and 1:4, where they belong to Kuznetsov's normal form but decide nothing alone.
+        resonances 1:3 and 1:4, where they decide nothing alone.
     quadratic, cubic
         Coefficients. A negative ``cubic`` bounds the growth: supercritical.
     rotation
@@ -52,7 +52,7 @@ class NormalForm:
         Number k, 1 to 4, if the pair is exp(+-2 pi i / k) within its uncertainty; else None.
     resonant, resonant_error
         Coefficient of conj(a)^2 (1:3) or conj(a)^3 (1:4) of one return; it turns with the phase of the mode.
-        ratio
+    ratio
         At 1:4: A = -i C / |D| of Kuznetsov, section 9.5.3, with C and D the coefficients of a |a|^2 and conj(a)^3.
     """
 

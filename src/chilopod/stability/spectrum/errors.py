@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import Array, ComplexArray
 
-SAFETY, DRAWS = 10.0, 8
-"""Factor on the largest change of a result under random changes, and their number."""
+SAFETY, DRAWS = 10.0, 8  # factor on the largest change of a result under random changes, and their number
 
-FIRST_ORDER = 1e-6
-"""Error, relative to the largest eigenvalue, up to which first-order bounds hold."""
+FIRST_ORDER = 1e-6  # error, relative to the largest eigenvalue, up to which first-order bounds hold
 
 VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
 """Words for the results of :func:`stable_within`."""

@@ -64,14 +64,11 @@ class AxialBranch(ReadOnlyArrays):
     Attributes
     ----------
     direction
-        Unit vector w of the irreducible representation, shape (d,). The new orbits leave along
-        ``block.mode(a, w)``, with a the critical eigenvector of the reduced matrix.
+        Unit vector w of the irreducible representation, shape (d,): the new orbits leave along ``block.mode(a, w)``.
     isotropy
-        Indices of the elements with rho(P) w = w, at -1 also with rho(P) w = -w, shape (k,): the symmetries of the new
-        orbits, at -1 together with a shift by one return.
+        Indices of the elements with rho(P) w = w, at -1 also those with -w, shape (k,): symmetries of the new orbits.
     reversed
-        True if an element, or at -1 the shift by one return, maps w to -w: both halves of the branch are then images
-        of each other.
+        True if an element, or at -1 the shift by one return, maps w to -w: both halves are images of each other.
     """
 
     direction: Array
@@ -88,8 +85,7 @@ class SymmetricCrossing:
     kind
         Kind of the crossing.
     quadratic
-        Number of linearly independent quadratic maps that commute with the representation (with its negatives too at
-        -1; with phase shifts too at a pair): terms of the normal form.
+        Number of quadratic terms of the normal form: linearly independent maps that commute with the representation.
     branches
         Axial branches, those with the most symmetries first; not computed for a pair.
     complete

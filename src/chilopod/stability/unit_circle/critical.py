@@ -13,8 +13,7 @@ from scipy.optimize import brentq
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Spectra
 
-UNKNOWN = 1.0
-"""Error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined."""
+UNKNOWN = 1.0  # error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined
 
 LOST = "multipliers near the circle are known no better than their distance from it"
 
