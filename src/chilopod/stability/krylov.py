@@ -31,6 +31,7 @@ from chilopod.stability.problem.returns import (
     return_duration,
     return_time,
     section_at,
+    turned,
 )
 from chilopod.stability.spectrum.eigenvalues import eigensystem
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors
@@ -173,11 +174,9 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
     velocity, normal = None, None
     duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
-    state = carried(system, x[None], 0.0, duration)[0]
+    state = turned(system, carried(system, x[None], 0.0, duration))[0]
     if not np.isfinite(state).all():
         raise AnalysisError("the flow is not finite over one return", field="flow")
-    if system.symmetry is not None:
-        state = system.symmetry @ state
     if is_autonomous(system):
         assert section is not None
         velocity, normal = np.asarray(system.velocity(np.array(state)), dtype=np.float64), section.normal

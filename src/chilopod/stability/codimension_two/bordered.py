@@ -101,6 +101,7 @@ class Evaluated(ReadOnlyArrays):
     place: Place  # place, and the return map there
     image: ReturnMap
     jacobian: Array  # Jacobian of the return map in units of the frame, shape (n, n)
+    error: Array  # bounds on the errors of its entries
     residual: Array  # left sides of the equations, shape (m + k,)
     right: Array  # v and w, shape (n, k), which are null vectors where the residual is zero; in units of the frame
     left: Array
@@ -315,11 +316,12 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _equations(self, place: Place, image: ReturnMap, frame: Frame) -> Evaluated:
         jacobian = image.jacobian * frame.size / frame.size[:, None]
+        error = np.broadcast_to(image.error, jacobian.shape) * frame.size / frame.size[:, None]
         right, left, inverse = _bordered(self._critical(jacobian, place.cosine), frame.column, frame.row)
         k = right.shape[1]
         orbit = frame.basis.T @ ((image.state - place.state) / frame.size)
         residual = np.concatenate([orbit, frame.mixture @ inverse[-k:, -k:].ravel()])
-        return Evaluated(place, image, jacobian, residual, right, left, float(np.linalg.norm(inverse, 2)))
+        return Evaluated(place, image, jacobian, error, residual, right, left, float(np.linalg.norm(inverse, 2)))
 
     def _derivative(self, at: Evaluated, frame: Frame) -> Array:
         """Derivative of the equations with respect to the coordinates, exact or by differences."""
@@ -337,15 +339,13 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return matrix
 
     def _uncertainty(self, at: Evaluated, frame: Frame) -> Array:
-        size = frame.size
-        error = np.broadcast_to(np.asarray(at.image.error, dtype=np.float64), at.jacobian.shape) * size / size[:, None]
-        wrong = error
+        error = wrong = at.error
         if not self.target:
             own = np.abs(at.jacobian)
             wrong = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error
         rounding = 4.0 * np.finfo(float).eps
         # The error of the derivative determines that of the returned state.
-        returned = error.sum(axis=1) + rounding * np.abs(at.place.state) / size
+        returned = error.sum(axis=1) + rounding * np.abs(at.place.state) / frame.size
         critical = np.abs(frame.mixture) @ (np.abs(at.left.T) @ wrong @ np.abs(at.right)).ravel()
         norms = np.linalg.norm(at.left) * np.linalg.norm(at.right) * np.linalg.norm(frame.mixture, 2)
         power = 1 if self.target else 2

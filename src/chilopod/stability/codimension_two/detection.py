@@ -21,8 +21,7 @@ from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates
-from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
-from chilopod.stability.normal_forms.quintic import Quintic, quintic
+from chilopod.stability.normal_forms.normal_form import NormalForm, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import Spectrum, spectrum
@@ -79,12 +78,6 @@ class Critical(ReadOnlyArrays):
     mode: ComplexArray  # unit right eigenvector and left one with left^H mode = 1, shape (n,)
     left: ComplexArray
     overlap: float  # overlap of the two, each a unit vector in the frame: 0 for a double multiplier, NaN for a pair
-
-    @property
-    def error(self) -> Array:
-        """Bounds on the errors of the return map's derivative in units of the frame, shape (n, n)."""
-        size = self.frame.size
-        return np.asarray(np.broadcast_to(self.at.image.error, self.at.jacobian.shape) * size / size[:, None])
 
 
 def critical(target: int, at: Evaluated, frame: Frame, shift: Array | None = None) -> Critical:
@@ -155,7 +148,7 @@ class Detector:
         if here.shift is not None:
             frame, m = here.frame, here.frame.basis.shape[1]
             orbit_error = float(np.abs(here.left) @ (frame.size * (np.abs(frame.basis) @ here.shift[:m])))
-            error = float(here.error.max())
+            error = float(here.at.error.max())
         return normal_form(
             *self.sampled(here),
             uncertainty=error / float(np.linalg.norm(here.at.jacobian)),
@@ -190,7 +183,7 @@ class Detector:
         if isinstance(signal, CodimensionTwo):
             return here.at.place.cosine - _COSINES[signal], 0.0 if here.shift is None else float(here.shift[-1])
         if signal is Own.DOUBLE:
-            return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.error))
+            return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.at.error))
         if signal is Own.COEFFICIENT:
             if not self._curve.target and abs(here.at.place.cosine) >= 1.0:
                 return np.nan, np.nan  # past the end of the curve: two real multipliers with product 1

@@ -20,7 +20,7 @@ from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoi
 from chilopod.stability.codimension_two.detection import Detector, across, critical
 from chilopod.stability.codimension_two.two_parameters import BUDGET, checked_box, over_periods
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
-from chilopod.stability.normal_forms.quintic import Quintic
+from chilopod.stability.normal_forms.normal_form import Quintic
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.budget import Budget, SpentError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,13 +32,13 @@ _SHADOW = 1.5  # distance of a crossing that explains a touch, in widths of the 
 _EPSILON = float(np.finfo(float).eps)
 
 
+@dataclass
 class Report:
     """Remarks of a search, a sentence each, and flags for a spent budget and for open questions."""
 
-    def __init__(self) -> None:
-        self.remarks: list[str] = []
-        self.spent = False
-        self.open = False
+    remarks: list[str] = field(default_factory=list)
+    spent: bool = False
+    open: bool = False
 
     def leave(self, remark: str) -> None:
         """Note a remark on an open question."""
