@@ -1,9 +1,9 @@
 """Normal-form coefficients at a bifurcation, from evaluations of the return map.
 
 Near the critical orbit the return map H is sampled along the critical mode, bent by its quadratic part outside the
-critical space; this gives the terms of second and third order on the critical space (Kuznetsov, *Elements of Applied
-Bifurcation Theory*, sections 5.4, 8.7 and 9.2). Only H is needed: no derivatives of the right-hand side by hand and no
-symbolic algebra. The series of H determine the amplitude at which it is sampled, so any units give the same digits.
+critical space; this gives the terms of second and third order on the critical space, and of fifth where the cubic one
+vanishes (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 5.4, 8.7, 9.2 and 9.3). Only H is needed. Its
+series determine the amplitude at which it is sampled, so any units give the same digits.
 """
 
 from __future__ import annotations
