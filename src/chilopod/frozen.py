@@ -1,4 +1,4 @@
-"""Read-only arrays, which keep models and results unchanged after their construction."""
+"""Types of arrays, and read-only arrays, which keep models and results unchanged after their construction."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 
 

@@ -12,8 +12,7 @@ import pytest
 
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
-from chilopod.stability.normal_forms.normal_form import normal_form
-from chilopod.stability.normal_forms.quintic import quintic
+from chilopod.stability.normal_forms.normal_form import normal_form, quintic
 
 CASES = 60
 SHEARS = 3

@@ -8,12 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
-from chilopod.frozen import read_only
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, read_only
 
 _COARSEST = 1e-3
 SIZES = (1e-6, 1e-3, 1.0, 1e3)
@@ -133,8 +131,7 @@ def _waves(n: int) -> Array:
 def check_symmetry(
     field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
 ) -> None:
-    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes: a wrong symmetry would give wrong
-    multipliers without an error."""
+    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes."""
     x = np.tile(base[:, None] + _waves(base.size), times.size)
     t = np.repeat(times, x.shape[1] // times.size)
     both = slopes(np.concatenate([t, (t + shift) % period]), np.concatenate([x, matrix @ x], axis=1))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
@@ -17,8 +17,8 @@ from chilopod.flows import deadline
 from chilopod.flows.arguments import numbers
 from chilopod.flows.carrying import pieces
 from chilopod.flows.jumps import UndeclaredSwitch, longest_step
+from chilopod.frozen import Array
 
-Array = NDArray[np.float64]
 Parts = list[tuple[float, float]]
 
 Gradient = Callable[[float, Array], Array]
@@ -40,10 +40,8 @@ class NotAnalytic(UserWarning):
 
 @dataclass(frozen=True)
 class CalledFlow:
-    """Flow and derivative of dx/dt = rhs(t, x, *args) from calls of the function.
-
-    States are measured in units of their largest size on the way, so that tolerances mean the same in all units.
-    """
+    """Flow and derivative of dx/dt = rhs(t, x, *args) from calls of the function, with tolerances relative to the
+    largest size of every state on the way."""
 
     # as for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative comes from a complex step if the
     # function accepts it near the state, else from central differences.
@@ -92,41 +90,26 @@ class CalledFlow:
     def _sizes(self, x: Array, parts: Parts) -> Array:
         """Rough largest modulus of every state on the way."""
         largest = np.abs(x)
-        unit = np.ones(x.size) * (float(largest.max()) or 1.0)
+        unit = float(largest.max()) or 1.0
         for a, b in parts:
-            answer = self._solved(self._slopes(a, b, unit), x / unit, a, b, 1e-3, 1e-6)
-            largest = np.maximum(largest, np.abs(answer).max(axis=1) * unit)
-            x = answer[:, -1] * unit
+            answer = self._solved(x.size, x, a, b, 1e-3, 1e-6 * unit)
+            largest, x = np.maximum(largest, np.abs(answer).max(axis=1)), answer[:, -1]
         return np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
-
-    def _slopes(self, a: float, b: float, sizes: Array, gradient: Gradient | None = None) -> Gradient:
-        """Slope within a part of the state in units of its size and, with a gradient, of the derivative."""
-        n = sizes.size
-        inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)  # the value at a switch may belong to either side
-
-        def slope(t: float, y: Array) -> Array:
-            t, state = min(max(t, inner_a), inner_b), y[:n] * sizes
-            of_state = self._slope(t, state) / sizes
-            if gradient is None:
-                return of_state
-            matrix = gradient(t, state) * (sizes[None, :] / sizes[:, None])
-            return np.concatenate([of_state, (matrix @ y[n:].reshape(n, n)).ravel()])
-
-        return slope
 
     def _over(
         self, x: Array, parts: Parts, tolerance: float, sizes: Array, gradient: Gradient | None = None
     ) -> tuple[Array, Array]:
         """State and, with a gradient, derivative at the end of some parts."""
-        n = x.size
-        y = x / sizes if gradient is None else np.concatenate([x / sizes, np.eye(n).ravel()])
+        n, y, scales = x.size, x, sizes
+        if gradient is not None:
+            y = np.concatenate([x, np.eye(n).ravel()])
+            scales = np.concatenate([sizes, (sizes[:, None] / sizes).ravel()])
         for a, b in parts:
-            y = self._solved(self._slopes(a, b, sizes, gradient), y, a, b, tolerance, 0.01 * tolerance)[:, -1]
-        return y[:n] * sizes, y[n:].reshape(-1, n) * (1.0 if gradient is None else sizes[:, None] / sizes[None, :])
+            y = self._solved(n, y, a, b, tolerance, 0.01 * tolerance * scales, gradient)[:, -1]
+        return y[:n], y[n:].reshape(-1, n)
 
     def _missed(self, x: Array, parts: Parts, derivative: Array, sizes: Array) -> float:
-        """Error of the derivative by differences of the flow: where f jumps with the state, the error remains for
-        every small difference."""
+        """Error of the derivative by small differences of the flow: it remains where f jumps with the state."""
         direction = np.cos(5.0 * np.arange(x.size) + 0.7)
         off = []
         for h in (_SMALL, _SMALL / 3.0):
@@ -182,10 +165,11 @@ class CalledFlow:
         return np.array(columns).T
 
     def _solved(
-        self, f: Callable[[float, Array], Array], y: Array, a: float, b: float, tolerance: float, smallest: float
+        self, n: int, y: Array, a: float, b: float, tolerance: float, smallest: Any, gradient: Gradient | None = None
     ) -> Array:
-        """States at the steps, shape (states, steps)."""
+        """The n states and, with a gradient, the derivative, at the steps within a part, shape (all, steps)."""
         calls, ended = 0, deadline.stop()
+        inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)  # the value at a switch may belong to either side
 
         def finite(t: float, y: Array) -> Array:
             nonlocal calls
@@ -198,7 +182,10 @@ class CalledFlow:
                 )
             if ended[0] != 0.0:
                 raise deadline.over()
-            slope = f(t, y)
+            t, state = min(max(t, inner_a), inner_b), y[:n].copy()
+            slope = self._slope(t, state)
+            if gradient is not None:
+                slope = np.concatenate([slope, (gradient(t, state) @ y[n:].reshape(n, n)).ravel()])
             if not np.isfinite(slope).all():  # scipy would shorten its step without end
                 raise AnalysisError(
                     f"the motion diverges, or the right-hand side is not finite, at t = {t:g}", field="rhs"
@@ -232,8 +219,7 @@ def _cut(parts: Parts) -> Parts:
 
 
 def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, sizes: Array, times: Array) -> bool:
-    """True if a right-hand side accepts complex states, and complex steps agree with differences on both sides of
-    zero, at all given times."""
+    """True if complex steps are accepted, and agree with differences on both sides of zero at all given times."""
     step = sizes * np.cos(2.0 * np.arange(x.size) + 0.1)
     shift = sizes * np.cos(np.arange(x.size) + 0.3)
     for t, part in itertools.product(times.tolist(), (0.7, -0.7, 3.1, -3.1)):

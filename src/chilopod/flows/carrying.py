@@ -6,16 +6,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
+from chilopod.frozen import Array
 
-Array = NDArray[np.float64]
-
-RESOLUTION = 4096
-"""Number of grid points over the period; a pulse in time that the grid meets is resolved exactly."""
+RESOLUTION = 4096  # number of grid points over the period; a pulse in time that the grid meets is resolved exactly
 
 DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
 """How an integration ends."""

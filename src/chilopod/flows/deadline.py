@@ -12,11 +12,9 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
 
@@ -28,17 +26,7 @@ class SpentError(AnalysisError):
 class Deadline:
     """A time limit; within its context a flow ends at the limit, even inside an integration.
 
-    Time that numba spends compiling is not counted.
-
-    Parameters
-    ----------
-    seconds
-        Time from now, s; infinite for no limit.
-
-    Raises
-    ------
-    ParameterError
-        If ``seconds`` is not a number or is negative.
+    It is given in s from now, infinite for none; time that numba spends compiling is not counted.
     """
 
     def __init__(self, seconds: float = math.inf) -> None:

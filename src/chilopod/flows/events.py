@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import SIZES, numbers
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 @dataclass(frozen=True)
@@ -52,17 +51,7 @@ def checked_events(events: object) -> tuple[Event, ...]:
 
 
 def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array, orbit: Array | None, n: int) -> None:
-    """Check that guards return numbers that may pass zero, and resets states, at the orbit and around it.
-
-    Parameters
-    ----------
-    events, args
-        Events and arguments of the system, with n states.
-    times
-        Times within the period, shape (times,).
-    orbit
-        A state, shape (n,), or None.
-    """
+    """Check that guards give numbers that may pass zero, and resets states, around the orbit at some times."""
     if not events:
         return
     base = np.zeros(n) if orbit is None else orbit

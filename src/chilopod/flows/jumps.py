@@ -7,11 +7,9 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.flows.arguments import Slopes
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _PROBES = 257
 _GRID = 4096
@@ -26,11 +24,8 @@ class UndeclaredSwitch(UserWarning):
 
 
 def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
-    """Borders of the parts of the period in which a right-hand side changes fast, shape (parts, 2).
-
-    It is sampled at a fixed state on a grid of 4096 times. Where it changes between two of them by more than a fiftieth
-    of its whole range, without a switch at one of the ``edges``, an integrator might step over the change.
-    """
+    """Borders of the parts of the period, shape (parts, 2), in which a right-hand side at a fixed state changes by more
+    than a fiftieth of its range in 1/4096 of the period without a switch: an integrator might step over that."""
     period = float(edges[-1])
     times = (np.arange(_GRID) + 0.5) * (period / _GRID)
     x = base + (float(np.abs(base).max()) or 1.0) * np.cos(3.0 * np.arange(base.size) + 1.0)
@@ -54,11 +49,10 @@ def longest_step(fast: Array, period: float, a: float, b: float) -> float:
 
 
 def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> None:
-    """Look for jumps of the right-hand side inside the intervals where it should be smooth.
+    """Warn of jumps of the right-hand side inside the intervals where it should be smooth.
 
-    It is sampled at fixed states away from zero (a jump in a coefficient hides at x = 0). The fourth differences of a
-    smooth function fall as the fourth power of the spacing, those of a jump do not: large ones are bisected down to
-    an interval of 1e-12 of the period.
+    Its fourth differences at fixed states away from zero (a jump in a coefficient hides at x = 0) do not fall with the
+    spacing at a jump: large ones are bisected down to 1e-12 of the period.
     """
     base = np.zeros(n) if orbit is None else orbit
     states = np.array([base + np.cos(3.0 * np.arange(n) + 1.0 + s) for s in range(2)]).T

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import (
@@ -28,18 +28,14 @@ from chilopod.flows.taylor.flow import TaylorFlow
 from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian, evaluate_series
 from chilopod.flows.tracing.trace import Trace, trace
 from chilopod.flows.tracing.traced import Untraceable
-from chilopod.frozen import read_only
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, read_only
 
 TOLERANCE = 1e-14
 _SAME = 1e-6
-_FLOOR = 0.01
-"""Truncation of a Taylor step relative to the tolerance: a small one costs almost nothing."""
+_FLOOR = 0.01  # truncation of a Taylor step relative to the tolerance: a small one costs almost nothing
 _ESTIMATED = 100.0
 """Error estimate of an implicit step relative to the tolerance: the estimate is far larger than the error."""
-_PATIENCE = 256
-"""Taylor steps after which the implicit method takes over a motion that would exceed the budget."""
+_PATIENCE = 256  # taylor steps after which the implicit method takes over a motion that would exceed the budget
 
 Method = Literal["automatic", "taylor", "implicit"]
 
@@ -69,14 +65,9 @@ class Flows(NamedTuple):
 class RightHandSide:
     """A right-hand side f(t, x, *args), checked, with the arguments of :func:`chilopod.stability.from_rhs`.
 
-    The ``duration`` is the period of the explicit dependence on time; without one, the approximate duration of a
-    motion. Of the results, ``start`` is the state on the orbit, None if unknown, and ``base`` a state to test f at;
-    ``edges`` are the times from 0 to the period at which f switches, and ``times`` one inside each interval.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is invalid.
+    The ``duration`` is the period of the explicit dependence on time, or about that of a motion. Of the results,
+    ``start`` is the state on the orbit, if known, and ``base`` a state to test f at; ``edges`` are the times from 0 to
+    the period at which f switches, and ``times`` one inside each interval.
     """
 
     rhs: Callable[..., ArrayLike]

@@ -8,19 +8,10 @@ _FALLING = 0.5
 
 
 class Rule(NamedTuple):
-    """A stopping rule: the residual is round-off, or it is small and no longer halves, which is the accuracy of the
-    equations.
+    """Stopping rule: the residual is round-off, or small and no longer halves, which is the equations' accuracy."""
 
-    Attributes
-    ----------
-    round_off
-        Residual, relative to the sizes of the unknowns, that is round-off.
-    settled
-        Residual below which it may stop falling.
-    """
-
-    round_off: float
-    settled: float
+    round_off: float  # residual, relative to the sizes of the unknowns, that is round-off
+    settled: float  # residual below which it may stop falling
 
     def met(self, off: float, best: float) -> bool:
         """True if a residual ends the corrections, given the best earlier one."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.cores import cores
 from chilopod.flows.arguments import checked_count
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.problem.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _RESOLVED = 1e-6  # modulus of a multiplier below which the error bound of an eigenvalue is invalid
 _SAME_ANGLE = 1e-12
@@ -44,12 +42,11 @@ class Multipliers(Result, ReadOnlyArrays):
     Attributes
     ----------
     values
-        Multipliers of the full period, by falling modulus, shape (n,); n-1 of them if the system does not depend on
-        time, without the one along the motion, which is 1. The absolute accuracy is ``error_bound``: smaller values
-        are only known to be small (:func:`exponents` resolves them). Fewer if only leading ones were requested.
+        Multipliers of the full period, by falling modulus, shape (n,), or (n-1,) without the one along the motion if
+        the system does not depend on time, or fewer if only leading ones were requested. Values below ``error_bound``
+        are only known to be small (:func:`exponents` resolves them).
     half_period
-        Multipliers nu of the return map of a system with a symmetry in time of order k (by default 2, hence the name),
-        with ``values = nu^k`` in the same order; None without one.
+        Multipliers nu of the return map with a symmetry in time of order k (usually 2), ``values = nu^k``; else None.
     error_bound
         Bound on the absolute error of every multiplier of modulus above 1e-6.
     error_bounds
@@ -96,8 +93,7 @@ class Multipliers(Result, ReadOnlyArrays):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """Dataset of the multipliers of the full period, and of the return map as ``half_period``, over
-        ``multiplier``."""
+        """Dataset of the multipliers of the full period, and ``half_period`` of the return map, over ``multiplier``."""
         half = self.values if self.half_period is None else self.half_period
         values = {"multipliers": self.values, "modulus": np.abs(self.values), "error_bounds": self.error_bounds}
         about = {"period": self.period, "verdict": VERDICTS[self.stable], "remarks": "; ".join(self.remarks)}
@@ -112,16 +108,14 @@ class Exponents(Shown, ReadOnlyArrays):
     ----------
     values
         Exponents (1/s), by falling real part, shape (n,) or, like the multipliers, (n-1,): principal logarithm of the
-        full-period multiplier over T, imaginary part in (-pi/T, pi/T]. With a symmetry in time of order k they come
-        from ln(nu^k), the same number.
+        full-period multiplier over T, imaginary part in (-pi/T, pi/T].
     modes
         Unit eigenvectors of the full-period map at time 0 as columns, the largest entry real and positive; for a system
         that does not depend on time, of its Poincare map on the section across the motion.
-        multipliers
+    multipliers
         Multipliers of the same orbit.
     error_bound
-        Bound on the absolute error (1/s) of each of ``values``, in the same shape: their change when the flows over
-        parts of the period change by their errors.
+        Bound on the absolute error (1/s) of each of ``values``.
     """
 
     values: ComplexArray
@@ -166,8 +160,8 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
         First guess of a state on the orbit at time 0; not needed if the system knows its orbit.
     leading
         Number of largest multipliers, counted with multiplicity, or one more to complete a pair; all by default. For
-        100 states or more and a system with ``flow_tangents`` (any right-hand side that can be traced) they are
-        computed in a block Krylov subspace, without the derivative of the flow as a matrix.
+        100 states or more and a system with ``flow_tangents`` (any right-hand side that can be traced) they take no
+        derivative of the flow as a matrix.
 
     Raises
     ------
@@ -220,11 +214,8 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
 
 
 def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
-    """All Floquet exponents and modes, the strongly damped ones included.
-
-    The period is cut into factors of moderate condition and the state space split along their product, so a multiplier
-    of 1e-60 has the same relative accuracy as one of 0.5; the eigenvalues of the product itself would be round-off.
-    """
+    """All Floquet exponents and modes, the strongly damped ones included: the state space is split along the factors of
+    the period, so a multiplier of 1e-60 has the same relative accuracy as one of 0.5."""
     found = find_orbit(system, orbit)
     image = found.image
     if is_stiff(system, found.state, image.period / image.returns):

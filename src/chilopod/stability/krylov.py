@@ -1,15 +1,13 @@
 """Multipliers of largest modulus of a large system, without the derivative of its flow as a matrix, for
 ``multipliers(leading=)``.
 
-The derivative is applied to directions. A block of directions resolves multiple multipliers, as of a ring, in as many
-copies as it has columns, and the compiled flow carries several directions at nearly the cost of one, so single
-directions (Arnoldi's method as in ARPACK) have no advantage. Nor have restarts: the subspace may grow to the whole
-space, where it is exact.
+The derivative is applied to blocks of directions: a block resolves multiple multipliers, as of a ring, and the compiled
+flow carries several directions at nearly the cost of one. The subspace may grow to the whole space, where it is exact.
 
-The orbit is found by Newton's method. Every linear system is solved in such a subspace to about the accuracy that the
-method can use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), from a block that includes the
-least contracting directions of earlier rounds. A strongly dissipative system takes a few directions
-(compare the Newton-Picard methods of Lust, Roose, Spence and Champneys, *SIAM J. Sci. Comput.* 19, 1188, 1998).
+The orbit is found by Newton's method, with linear systems solved in such a subspace to about the accuracy that it can
+use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), from a block with the least contracting
+directions of earlier rounds: a strongly dissipative system takes a few directions (compare the Newton-Picard methods of
+Lust, Roose, Spence and Champneys, *SIAM J. Sci. Comput.* 19, 1188, 1998).
 """
 
 from __future__ import annotations
@@ -19,10 +17,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.convergence import RETURN
 from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
@@ -34,14 +31,12 @@ from chilopod.stability.problem.returns import (
     return_duration,
     return_time,
     section_at,
+    turned,
 )
-from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
+from chilopod.stability.spectrum.eigenvalues import eigensystem
+from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-
-LARGE = 100
-"""Number of states from which a few directions are cheaper than the whole derivative."""
+LARGE = 100  # number of states from which a few directions are cheaper than the whole derivative
 
 _LANES = 4  # columns that the compiled code carries together
 _ROUND_OFF = 1e-14  # part outside a subspace that is round-off, relative to the largest image
@@ -88,8 +83,7 @@ class KrylovSubspace(ReadOnlyArrays):
 
 def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[KrylovSubspace]:
     """Subspaces of a matrix, given by its products with directions, shape (n, any), from a first block, shape (n,
-    columns). Each is larger by an eighth or more, so work on all of them costs only a few times that on the last one,
-    which is invariant."""
+    columns). Each is larger by an eighth or more; the last one is invariant."""
     n = len(start)
     block = _orthonormal(start, _ROUND_OFF * float(np.linalg.norm(start)), n)[0]
     first = block.shape[1]
@@ -145,11 +139,7 @@ class TangentMap(ReadOnlyArrays):
 
     def images_with_error(self, directions: Array) -> tuple[Array, Array, Array]:
         """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,), relative to
-        their norms instead of every entry.
-
-        As in :func:`~chilopod.stability.problem.returns.flow_with_error` they are a multiple of the difference from a
-        second computation with the interval in parts.
-        """
+        their norms: a multiple of the difference from a second computation with the interval in parts."""
         state, images = self._in_parts(directions, (0.0,))
         other, parts = self._in_parts(directions, CUTS)
         return images, REPEATED * np.abs(parts - images), REPEATED * np.abs(self._across(other - state))
@@ -181,17 +171,12 @@ class TangentMap(ReadOnlyArrays):
 
 
 def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None) -> TangentMap:
-    """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time.
-
-    Raises AnalysisError if the flow is not finite or does not return to the section.
-    """
+    """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
     velocity, normal = None, None
     duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
-    state = carried(system, x[None], 0.0, duration)[0]
+    state = turned(system, carried(system, x[None], 0.0, duration))[0]
     if not np.isfinite(state).all():
         raise AnalysisError("the flow is not finite over one return", field="flow")
-    if system.symmetry is not None:
-        state = system.symmetry @ state
     if is_autonomous(system):
         assert section is not None
         velocity, normal = np.asarray(system.velocity(np.array(state)), dtype=np.float64), section.normal
@@ -199,12 +184,9 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
 
 
 def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
-    """Sizes of the states, shape (n,), as in :func:`chilopod.stability.problem.scales.sizes`, without the matrix.
-
-    The size of a state is its largest value during a return, or its change within a part of the return when the others
-    are disturbed at random by their own sizes. If the orbit is zero throughout, only the latter gives the ratios: the
-    one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 261-287, 2000.
-    """
+    """Sizes of the states, shape (n,), as in :func:`chilopod.stability.problem.scales.sizes`, without the matrix: the
+    largest value of a state during a return, or its change within a part of it when the others are disturbed at random
+    by their own sizes (the one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 2000)."""
     given = given_scale(system)
     if given is not None:
         return given
@@ -242,9 +224,8 @@ def closed_orbit(
 ) -> tuple[TangentMap, Array]:
     """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
 
-    A return may displace the guess by ``farthest``, relative to the sizes. If the system does not depend on time, it
-    ends on the section, by default across the motion at the guess. Each round takes a return map from the budget.
-    Raises AnalysisError if Newton's method does not converge.
+    The first return may displace the guess by ``farthest``, relative to the sizes; each round takes a return map from
+    the budget. Raises AnalysisError if Newton's method does not converge.
     """
     size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
@@ -347,16 +328,10 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMu
 
 
 def _ritz(subspace: KrylovSubspace) -> _Ritz:
-    values, vectors = np.linalg.eig(subspace.matrix)
-    order = falling_order(values)
-    values, vectors = values[order].astype(np.complex128), vectors[:, order].astype(np.complex128)
-    try:
-        left = np.linalg.inv(vectors)
-    except np.linalg.LinAlgError:
-        left = np.full_like(vectors, np.inf)
-    n, known = subspace.basis.shape[0], left[:, : subspace.first]
-    seen = _SAFETY * np.sqrt(n / subspace.first) * np.linalg.norm(known, axis=1)
-    condition = np.linalg.norm(left, axis=1)
+    values, vectors, left = eigensystem(subspace.matrix)
+    n, known = subspace.basis.shape[0], left[: subspace.first]
+    seen = _SAFETY * np.sqrt(n / subspace.first) * np.linalg.norm(known, axis=0)
+    condition = np.linalg.norm(left, axis=0)
     if subspace.coupling.size:
         condition = np.maximum(condition, seen)
     return _Ritz(values, vectors, condition, np.linalg.norm(subspace.coupling @ vectors, axis=0))
@@ -383,8 +358,7 @@ def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
 def _bend(
     image: TangentMap, size: Array, subspace: KrylovSubspace, state_error: Array, directions: Array, images: Array
 ) -> Array:
-    """Change of the derivative within the error of the orbit, along its least certain direction, applied to vectors
-    given by real and imaginary parts."""
+    """Change of the derivative's images within the error of the orbit, along its least certain direction."""
     _, values, right = np.linalg.svd(subspace.matrix - np.eye(len(subspace.matrix)))
     values = values[values > _SINGULAR * values[0]]
     weakest = subspace.basis @ right[values.size - 1]

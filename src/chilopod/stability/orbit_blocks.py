@@ -7,16 +7,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings
 from chilopod.stability.unit_circle.spectra import Matrices
-
-Array = NDArray[np.float64]
 
 Blocks = tuple[Block | None, ...]
 """Blocks of a return map; a single None is the whole map."""

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays, in_one_line
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.shown import Shown, bounded, number
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing
-
-Array = NDArray[np.float64]
 
 
 class Kind(Labelled):
@@ -54,7 +51,6 @@ class Criticality(Labelled):
 
 WITHOUT_CRITICALITY = (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT, Kind.COLLISION, Kind.KREIN_COLLISION)
 """Kinds of points without a decisive cubic coefficient."""
-
 
 _CLEAR = 3.0  # least quadratic coefficient, relative to its error, of a transcritical point
 _REAL = 1e-9  # largest imaginary part of a mode that is shown as real
@@ -100,18 +96,15 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     mode
         Unit critical eigenvector, shape (n,), complex for Neimark-Sacker and Hopf.
     multiplier
-        Critical multiplier of the return map (over half a period with that symmetry); at a Hopf point the eigenvalue
-        i omega.
+        Critical multiplier of the return map; at a Hopf point the eigenvalue i omega.
     frequency
-        Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period, else the principal
-        value.
+        Angular frequency (1/s) of the critical mode: 0 for a multiplier +1 of the period, else the principal value.
     criticality
         Verdict of the coefficient, or the reason for a missing one.
     coefficient, coefficient_error
         Cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period doubling over
         two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None if it has no
-        meaning (fold, transcritical, branch point) or without a normal form. At a Hopf point
-        the first Lyapunov coefficient l1 (Kuznetsov, section 3.5), with |a| -> |a| + 2 pi l1 |a|^3 over one period.
+        meaning or without a normal form. At a Hopf point the first Lyapunov coefficient l1 (Kuznetsov, section 3.5).
     rotation, rotation_error
         Change of the phase per period with the amplitude (Neimark-Sacker), rad per amplitude^2.
     period
@@ -119,8 +112,8 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     multiplicity
         Number of critical multipliers, counting both of a pair.
     modes
-        Unit critical eigenvectors if there are several, shape (n, modes): with a symmetry, the directions in which new
-        orbits branch off; else a basis of the critical space.
+        Unit critical eigenvectors if there are several, shape (n, modes): directions of new orbits with a symmetry,
+        else a basis of the critical space.
     symmetry
         Consequences of the orbit's spatial symmetries, if any.
     rate
@@ -133,7 +126,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     value: float
     error_bound: float
     orbit: Array
-    mode: NDArray[np.complex128]
+    mode: ComplexArray
     multiplier: complex
     frequency: float
     criticality: Criticality = Criticality.NOT_COMPUTED
@@ -144,7 +137,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     normal_form: NormalForm | None = None
     period: float = np.nan
     multiplicity: int = 1
-    modes: NDArray[np.complex128] | None = None
+    modes: ComplexArray | None = None
     symmetry: SymmetricCrossing | None = None
     rate: complex | None = None
 

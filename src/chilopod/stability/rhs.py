@@ -6,15 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.flows.arguments import check_symmetry, checked_duration
 from chilopod.flows.events import Event
 from chilopod.flows.rhs import TOLERANCE, Method, RightHandSide
 from chilopod.stability.problem.capabilities import spatial_symmetries
 from chilopod.stability.problem.system import PeriodicSystem
-
-Array = NDArray[np.float64]
 
 
 def from_rhs(
@@ -40,16 +38,12 @@ def from_rhs(
     compiled code integrates the state and its derivative by Taylor series to round-off, in any units. That takes
     arithmetic, the elementary functions of numpy and math, numpy arrays, loops, and functions compiled with
     ``numba.njit``; a family over parameters (arguments, closures or globals that are floats) is traced once. Jumps and
-    kinks (``sign``, ``abs``, ``where``, ``%``, comparisons, ...) are found and crossed exactly, in time and in state.
-    Functions of time alone are sampled on a grid of 4096 points over the period, so a pulse between the points
-    (narrower than about T / 50 000) is missed.
+    kinks (``sign``, ``abs``, ``where``, ``%``, comparisons, ...) are found and crossed exactly, in time and in state. A
+    pulse in time narrower than about T / 50 000 may be missed.
 
-    Taylor series take steps as short as the fastest decay. Where that is much faster than the motion, the system is
-    stiff, and an implicit method, Radau IIA collocation with the exact derivative of its steps, takes over: after the
-    series have used up their steps, or from the start with ``method="implicit"``.
-
-    A function that branches on its arguments (``if x[0] > 0``) or calls other libraries cannot be traced. It is
-    integrated by scipy's DOP853 from calls, hundreds of times slower.
+    A stiff system, whose fastest decay is much faster than its motion, is integrated by an implicit method, Radau IIA
+    collocation with the exact derivative of its steps. A function that branches on its arguments (``if x[0] > 0``) or
+    calls other libraries cannot be traced: scipy's DOP853 integrates it from calls, hundreds of times slower.
 
     Parameters
     ----------
@@ -63,9 +57,8 @@ def from_rhs(
         Events at which the state jumps, or the right-hand side switches, on reaching a surface. They need functions
         that can be traced.
     switch_times
-        Times in [0, T) at which ``rhs`` jumps or has a kink. Integration stops and restarts there. A traced function
-        needs none; others are evaluated strictly inside each interval, and undeclared jumps cost time and digits:
-        those found on a fine grid give a warning.
+        Times in [0, T) at which ``rhs`` jumps or has a kink. A traced function needs none; others are evaluated
+        strictly inside each interval, and undeclared jumps cost time and digits.
     jacobian
         Function ``jacobian(t, x, *args)`` -> (n, n), for functions that cannot be traced; without it the derivative
         then comes from a complex step or, if ``rhs`` does not accept complex states, from central differences, with
@@ -75,9 +68,8 @@ def from_rhs(
         guess.
     method
         "taylor" or "implicit", for functions that can be traced; "automatic": Taylor series, and the implicit method
-        after these take too many steps. That decision takes a second or two for every system, so "implicit" is better
-        for families that are known to be stiff. The implicit method suits smooth functions of the state without
-        events, and some tens of states.
+        after these take too many steps, a second or two for every system. The implicit method suits smooth functions of
+        the state without events, and some tens of states.
     tolerance
         Local error per step, relative to the size of each state.
 

@@ -18,9 +18,7 @@ from chilopod.flows.jumps import longest_step
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.evaluation import branches_of, evaluate, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
-from chilopod.frozen import ReadOnlyArrays
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, ReadOnlyArrays
 
 _STAGES, _OTHER_STAGES = 9, 7
 _NEAREST = 3  # largest number of couplings between two states with their derivative under step control
@@ -61,21 +59,14 @@ class Stretched(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class ImplicitFlow(ReadOnlyArrays):
-    """Flow of a stiff tape.
-
-    Raises
-    ------
-    ParameterError
-        If the right-hand side has events, or switches in the state.
-    """
+    """Flow of a stiff tape without events and switches in the state."""
 
     tape: Tape  # the right-hand side, without events; it may switch in time, not in the state
     params: Array  # values of its parameters
     edges: Array  # times from 0 to the period that no step may straddle
     # borders of the parts of the period with fast changes of the function, shape (parts, 2): steps are limited there
     fast: Array
-    # estimated error of a step relative to the size of each state and entry of the derivative. The estimate belongs
-    # to a formula of order s, so the error is far smaller where steps resolve the fast states too.
+    # estimated error of a step relative to the size of each state and entry of the derivative; the error is far smaller
     tolerance: float
     _cuts: Array = field(init=False, repr=False, compare=False)
 
@@ -97,12 +88,8 @@ class ImplicitFlow(ReadOnlyArrays):
         return self._run(x, (t0, t1), _STAGES, self.tolerance)
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
-        """The same with a bound on the error of every entry of the derivative.
-
-        The bound is a multiple of the larger difference from two other computations, of lower order and of smaller
-        steps, from starts disturbed by round-off; with one of them an entry may agree by chance. Round-off of the
-        entry and of the terms that it may be a difference of is added.
-        """
+        """The same with a bound on the error of every entry of the derivative: a multiple of the larger difference from
+        two other computations, of lower order and of smaller steps, from disturbed starts, and round-off."""
         state, derivative = self._run(x, (t0, t1), _STAGES, self.tolerance)
         shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
         _, lower = self._run(x * (1.0 + shake), (t0, t1), _OTHER_STAGES, self.tolerance)

@@ -11,10 +11,8 @@ from chilopod.compiled import fused_njit
 from chilopod.flows.tracing.series import slope_at
 
 _MOST_ROUNDS = 10
-_CLOSE = 1e-7
-"""Newton correction after which the next one is round-off."""
-_NOISE = 2.0**-51
-"""Round-off relative to the terms whose difference is the error estimate."""
+_CLOSE = 1e-7  # Newton correction after which the next one is round-off
+_NOISE = 2.0**-51  # round-off relative to the terms whose difference is the error estimate
 
 
 @fused_njit(error_model="numpy")

@@ -21,15 +21,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
 from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.tape import Tape
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _MOST_WORK = 1e7
 _FEWEST_STEPS = 5000
@@ -55,34 +53,17 @@ class Passage(NamedTuple):
 
 
 class TaylorFlow:
-    """The flow of a tape.
-
-    Parameters
-    ----------
-    tape
-        Right-hand side with guards and resets.
-    edges
-        Times from 0 to the period that no step may straddle; may be empty.
-    period
-        Period T of an explicit dependence on time, else infinite.
-    directions
-        Directions of the events: 1, -1 or 0.
-    tolerance
-        Truncation error of a step relative to the size of each state and entry of the derivative; at least
-        round-off.
-    patience
-        Number of steps after which the flow ends if the budget of steps will not suffice, as for a stiff motion; 0
-        for no such test, which lets a motion that is slow only at first reach its end.
-    """
+    """The flow of a tape."""
 
     def __init__(
         self,
-        tape: Tape,
+        tape: Tape,  # right-hand side with guards and resets
         *,
-        edges: tuple[float, ...] = (),
-        period: float = math.inf,
-        directions: tuple[float, ...] = (),
-        tolerance: float = _LEAST_TOLERANCE,
+        edges: tuple[float, ...] = (),  # times from 0 to the period that no step may straddle
+        period: float = math.inf,  # period T of an explicit dependence on time
+        directions: tuple[float, ...] = (),  # directions of the events: 1, -1 or 0
+        tolerance: float = _LEAST_TOLERANCE,  # truncation of a step relative to each state and entry of the derivative
+        # Steps after which the flow ends if its budget will not suffice, as for a stiff motion; 0 for no such test.
         patience: int = 0,
     ) -> None:
         n = tape.dimension
@@ -99,15 +80,12 @@ class TaylorFlow:
         """Budget of steps of an integration: a few seconds."""
         return max(_FEWEST_STEPS, int(_MOST_WORK / (self.tape.program.shape[1] * (1 + self.tape.dimension))))
 
-    def advance(
-        self, x: Array, t0: float, t1: float, params: Array, *, derived: bool = True, bounded: bool = False
-    ) -> Passage:
-        """Carry one state from t0 to t1 >= t0, with its derivative unless ``derived`` is False.
+    def advance(self, x: Array, t0: float, t1: float, params: Array, *, bounded: bool = False) -> Passage:
+        """Carry one state from t0 to t1 >= t0, with its derivative and, if ``bounded``, a bound on its error.
 
-        The error bound sums round-off and the last terms of each step, carried by the derivatives of the steps, and
-        adds the difference from a second computation of another order with other steps, disturbed at the start and
-        after every step by several times round-off. Relative to the first part, all entries differ alike, so that
-        part is scaled to many times the usual difference; several times its own difference is added for each entry.
+        The bound sums round-off and the last terms of each step, carried by the derivatives of the steps, scaled to
+        many times the usual difference from a second computation (of another order with other steps, disturbed by
+        several times round-off), and adds several times the own difference of each entry.
 
         Raises
         ------
@@ -118,7 +96,7 @@ class TaylorFlow:
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
-            derivative = np.eye(n) if derived else np.empty((n, 0))
+            derivative = np.eye(n)
             steps = self._run(x, (t0, t1), params, derivative)
             return Passage(x, derivative, _NOTHING, steps)
         other_x = x.copy()
@@ -135,25 +113,20 @@ class TaylorFlow:
         return Passage(x, derivative, bound, steps)
 
     def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
-        """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number).
-
-        The series of the directions are carried, so the work is proportional to their number, without any matrix of
-        shape (n, n). Raises the errors of :meth:`advance`.
-        """
+        """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number), without
+        any matrix of shape (n, n); raises the errors of :meth:`advance`."""
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         images = np.array(directions, dtype=np.float64, order="C")
         self._run(x, (t0, t1), params, images, stepwise=False)
         return x, images
 
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
-        """Carry many states, shape (states, n); ``params`` has shape (parameters,) or (states, parameters)."""
-        states = np.array(states, dtype=np.float64, order="C")
-        params = np.asarray(params, dtype=np.float64)
-        rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])), order="C")
+        """Carry many states, shape (states, n)."""
+        states, params = np.array(states, dtype=np.float64, order="C"), np.array(params, dtype=np.float64)
         none, stop = np.empty((self.tape.dimension, 0)), deadline.stop()
 
         def carry(i: int) -> None:
-            self._run(states[i], (t0, t1), rows[i], none, stop=stop)
+            self._run(states[i], (t0, t1), params, none, stop=stop)
 
         carry_all(carry, len(states), _FEWEST_PER_THREAD)
         return states
@@ -170,8 +143,7 @@ class TaylorFlow:
         stepwise: bool = True,
         stop: Array | None = None,
     ) -> int:
-        """Carry state, derivative and bound over an interval in place; return the number of steps. ``other`` selects
-        the second computation, of another order with other steps."""
+        """Carry state, derivative and bound in place, by the second computation if ``other``; return the steps."""
         kernels = _compiled()
         stop = deadline.stop() if stop is None else stop
         n, parameters = self._shape

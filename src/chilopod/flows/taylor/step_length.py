@@ -7,8 +7,7 @@ from typing import Any
 
 from chilopod.compiled import fused_njit
 
-_UNDERFLOW = 1e-290
-"""Limit below which numbers lose precision: their round-off would look like a singularity."""
+_UNDERFLOW = 1e-290  # limit below which numbers lose precision: their round-off would look like a singularity
 _SAME = 3e-13
 """Round-off in a pulse of a thousandth of the period; a narrower one costs a step at each of its grid points."""
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from chilopod.compiled import fused_njit
 from chilopod.flows.carrying import DONE, GRAZES, SLIDES
-from chilopod.flows.tracing.series import FLOOR, GUARD, Series, branch_at, choose, expand, expand_values, values_at
+from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.series import Series, branch_at, choose, expand, expand_values, values_at
 
-_ZERO = 1e-13
-"""Size of a switching function, relative to its earlier values, that counts as zero."""
+_ZERO = 1e-13  # size of a switching function, relative to its earlier values, that counts as zero
 
 
 class Motion(NamedTuple):
@@ -47,7 +47,7 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
         for s in range(switches.shape[1]):
             g = values[switches[1, s], 0]
             slope = values[switches[1, s], 1]
-            if switches[0, s] == FLOOR:
+            if switches[0, s] == ops.FLOOR:
                 if g == branches[s] and slope < 0.0:
                     branches[s] -= 1.0
                     settled = False
@@ -59,7 +59,7 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
     # The branch changed twice: f points to the switching surface on both sides.
     for s in range(switches.shape[1]):
         g = values[switches[1, s], 0]
-        if switches[0, s] != GUARD and abs(g) <= _ZERO * scales[s]:
+        if switches[0, s] != ops.GUARD and abs(g) <= _ZERO * scales[s]:
             return SLIDES
     return DONE
 
@@ -67,7 +67,7 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
 @fused_njit(error_model="numpy")
 def is_timed(tape: Any, s: int) -> bool:
     """True if a switch is a guard that depends on time only."""
-    return bool(tape.switches[0, s] == GUARD and tape.program[4, tape.switches[1, s]] == 0)
+    return bool(tape.switches[0, s] == ops.GUARD and tape.program[4, tape.switches[1, s]] == 0)
 
 
 @fused_njit(error_model="numpy")
@@ -77,13 +77,13 @@ def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
     values, branches, scales = motion.series.values, motion.series.branches, motion.scales
     first = tape.layout[3]
     for s in range(switches.shape[1]):
-        stop = tape.layout[4] if switches[0, s] == GUARD else switches[2, s]
-        values_at(program, terms, slopes, first, stop, 0, 1.0, values, branches)
+        stop = tape.layout[4] if switches[0, s] == ops.GUARD else switches[2, s]
+        values_at(program, terms, slopes, (first, stop), 0, 1.0, values, branches)
         first = stop
         g = values[switches[1, s], 0]
         if s != switched and abs(g - surfaces[s]) > _ZERO * scales[s]:
             branches[s] = branch_at(switches[0, s], g)
-    values_at(program, terms, slopes, first, tape.layout[4], 0, 1.0, values, branches)
+    values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
 
 
 @fused_njit(error_model="numpy")
@@ -110,7 +110,7 @@ def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, uni
     values, branches = motion.series.values, motion.series.branches
     g = switches[1, s]
     event = -1
-    if switches[0, s] == GUARD and directions[switches[2, s]] * direction >= 0.0:
+    if switches[0, s] == ops.GUARD and directions[switches[2, s]] * direction >= 0.0:
         event = switches[2, s]
     start(tape, motion, t)
     expand(tape, 1, tape.layout[5] if event >= 0 else tape.layout[4], unit, motion.series)
@@ -122,14 +122,14 @@ def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, uni
         before[i] = values[i, 1]
         for j in range(jump.shape[1]):
             jump[i, j] = motion.seeds[i, j]
-    branches[s] = branches[s] + direction if switches[0, s] == FLOOR else direction
+    branches[s] = branches[s] + direction if switches[0, s] == ops.FLOOR else direction
     moves = event >= 0 and _reset(tape, motion, event, before, jump)
     start(tape, motion, t)
     if moves:
         status = settle(tape, motion, unit)
         if status != DONE:
             return status
-    elif switches[0, s] == GUARD:
+    elif switches[0, s] == ops.GUARD:
         return DONE  # f does not switch here
     else:
         _carry_over(tape, motion, s, surfaces)
@@ -165,7 +165,7 @@ def await_events(tape: Any, directions: Any, motion: Any, unit: float, soon: flo
     """
     switches, series, scales = tape.switches, motion.series, motion.scales
     for s in range(switches.shape[1]):
-        if switches[0, s] != GUARD:
+        if switches[0, s] != ops.GUARD:
             continue
         value, slope = series.values[switches[1, s], 0], series.values[switches[1, s], 1]
         scales[s] = soon * abs(slope) / _ZERO

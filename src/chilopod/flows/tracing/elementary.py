@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.graph import Graph
+from chilopod.flows.tracing.graph import FUNCTIONS, Graph
 
 BUILDS: dict[str, Callable[..., int]] = {}
 """``BUILDS[name](graph, *operands) -> node``."""
@@ -26,26 +26,14 @@ def _one(g: Graph) -> int:
     return g.number(1.0)
 
 
-for _name, _code in {
-    "exp": ops.EXP,
-    "sin": ops.SIN,
-    "cos": ops.COS,
-    "tan": ops.TAN,
-    "sinh": ops.SINH,
-    "cosh": ops.COSH,
-    "tanh": ops.TANH,
-    "log": ops.LOG,
-    "sqrt": ops.SQRT,
-    "arctan": ops.ATAN,
-    "arcsin": ops.ASIN,
-}.items():
-    _builds(_name)(lambda g, a, code=_code: g.function(code, a))
+for _code, _function in FUNCTIONS.items():
+    _builds(_function.value.__name__)(lambda g, a, code=_code: g.function(code, a))
 
-_builds("add")(lambda g, a, b: g.add(a, b))
+_builds("add")(Graph.add)
 _builds("subtract")(lambda g, a, b: g.add(a, b, -1.0))
-_builds("multiply")(lambda g, a, b: g.multiply(a, b))
-_builds("divide")(lambda g, a, b: g.divide(a, b))
-_builds("power", "float_power")(lambda g, a, b: g.power(a, b))
+_builds("multiply")(Graph.multiply)
+_builds("divide")(Graph.divide)
+_builds("power", "float_power")(Graph.power)
 _builds("negative")(lambda g, a: g.multiply(g.number(-1.0), a))
 _builds("positive", "conjugate")(lambda g, a: a)
 _builds("square")(lambda g, a: g.multiply(a, a))
@@ -60,16 +48,16 @@ _builds("arccos")(lambda g, a: g.add(g.number(0.5 * math.pi), g.function(ops.ASI
 _builds("deg2rad", "radians")(lambda g, a: g.multiply(g.number(math.pi / 180.0), a))
 _builds("rad2deg", "degrees")(lambda g, a: g.multiply(g.number(180.0 / math.pi), a))
 _builds("absolute", "fabs")(lambda g, a: g.select(a, a, g.multiply(g.number(-1.0), a)))
-_builds("sign")(lambda g, a: g.step(a))
+_builds("sign")(Graph.step)
 _builds("heaviside")(lambda g, a, b: g.select(a, _one(g), g.number(0.0)))
 _builds("maximum", "fmax")(lambda g, a, b: g.select(g.add(a, b, -1.0), a, b))
 _builds("minimum", "fmin")(lambda g, a, b: g.select(g.add(a, b, -1.0), b, a))
 _builds("greater", "greater_equal")(lambda g, a, b: g.select(g.add(a, b, -1.0), _one(g), g.number(0.0)))
 _builds("less", "less_equal")(lambda g, a, b: g.select(g.add(a, b, -1.0), g.number(0.0), _one(g)))
 _builds("logical_not", "invert")(lambda g, a: g.add(_one(g), a, -1.0))
-_builds("logical_and", "bitwise_and")(lambda g, a, b: g.multiply(a, b))
+_builds("logical_and", "bitwise_and")(Graph.multiply)
 _builds("logical_or", "bitwise_or")(lambda g, a, b: g.add(g.add(a, b), g.multiply(a, b), -1.0))
-_builds("floor")(lambda g, a: g.floor(a))
+_builds("floor")(Graph.floor)
 _builds("trunc")(lambda g, a: g.select(a, g.floor(a), _ceil(g, a)))
 _builds("floor_divide")(lambda g, a, b: g.floor(g.divide(a, b)))
 _builds("hypot")(lambda g, a, b: g.function(ops.SQRT, g.add(g.multiply(a, a), g.multiply(b, b))))

@@ -46,14 +46,16 @@ def _names(code: types.CodeType) -> tuple[str, ...]:
     return tuple(names)
 
 
-def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
-    """A hashable description of a value; all its floats are appended to a list.
+def _parts(function: types.FunctionType) -> tuple[Any, ...]:
+    """Closure, defaults and globals of a function."""
+    contents = [cell.cell_contents for cell in function.__closure__ or ()]
+    outer = function.__globals__
+    used = {name: outer[name] for name in _names(function.__code__) if name in outer}
+    return contents, function.__defaults__, function.__kwdefaults__, used
 
-    Raises
-    ------
-    Opaque
-        If the value holds objects of unknown kinds.
-    """
+
+def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
+    """A hashable description of a value; all its floats are appended to a list. Raises Opaque for unknown kinds."""
     if isinstance(value, float | np.floating):  # np.float64 is a float
         floats.append(float(value))
         return "f"
@@ -75,18 +77,7 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
         if id(value) in seen:
             return "again", seen[id(value)]
         seen[id(value)] = len(seen)
-        return (
-            "function",
-            value.__code__,
-            *(describe(cell.cell_contents, floats, seen) for cell in value.__closure__ or ()),
-            describe(value.__defaults__, floats, seen),
-            describe(value.__kwdefaults__, floats, seen),
-            *(
-                (name, describe(value.__globals__[name], floats, seen))
-                for name in _names(value.__code__)
-                if name in value.__globals__
-            ),
-        )
+        return "function", value.__code__, *(describe(part, floats, seen) for part in _parts(value))
     if isinstance(value, functools.partial):
         return "partial", *(describe(part, floats, seen) for part in (value.func, value.args, value.keywords))
     outside = callable(value) and (getattr(value, "__module__", None) or "").partition(".")[0] in _OUTSIDE
@@ -140,13 +131,11 @@ def _rebuilt_function(
     cells = tuple(types.CellType() for _ in value.__closure__ or ())
     function = types.FunctionType(value.__code__, outer, value.__name__, None, cells)
     seen[id(value)] = function
-    for cell, old in zip(cells, value.__closure__ or (), strict=True):
-        cell.cell_contents = rebuild(old.cell_contents, source, seen)
-    function.__defaults__ = rebuild(value.__defaults__, source, seen)
-    function.__kwdefaults__ = rebuild(value.__kwdefaults__, source, seen)
-    for name in _names(value.__code__):
-        if name in value.__globals__:
-            outer[name] = rebuild(value.__globals__[name], source, seen)
+    parts = (rebuild(part, source, seen) for part in _parts(value))
+    contents, function.__defaults__, function.__kwdefaults__, names = parts
+    for cell, content in zip(cells, contents, strict=True):
+        cell.cell_contents = content
+    outer.update(names)
     return function
 
 

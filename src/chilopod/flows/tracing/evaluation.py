@@ -6,13 +6,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.tape import Integers, Tape
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 def evaluate(tape: Tape, nodes: Integers, t: Any, x: Any, params: Array) -> Array:
@@ -40,13 +38,7 @@ def evaluate_jacobian(tape: Tape, t: float, x: Array, params: Array) -> tuple[Ar
 
 def evaluate_series(tape: Tape, curves: Array, params: Array) -> Array:
     """Taylor coefficients in s of f(x(s)) at time 0, shape (curves, orders, n), along the curves x(s) = c0 + c1 s + ...
-    with these coefficients, of the same shape.
-
-    Raises
-    ------
-    AnalysisError
-        If a curve starts on a switching surface, where f has no series.
-    """
+    with these coefficients, of the same shape. Raises AnalysisError if a curve starts on a switching surface."""
     from chilopod.flows.tracing import series
 
     kinds, surfaces = tape.switches[:2]

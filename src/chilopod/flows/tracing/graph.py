@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,26 +12,30 @@ from chilopod.flows.tracing import tape as ops
 
 Node = tuple[int, tuple[int, ...]]
 
-_FUNCTIONS = {
-    ops.EXP: math.exp,
-    ops.SIN: math.sin,
-    ops.COS: math.cos,
-    ops.TAN: math.tan,
-    ops.SINH: math.sinh,
-    ops.COSH: math.cosh,
-    ops.TANH: math.tanh,
-    ops.LOG: math.log,
-    ops.SQRT: math.sqrt,
-    ops.ATAN: math.atan,
-    ops.ASIN: math.asin,
-}
+
+class Function(NamedTuple):
+    """An elementary function c = phi(a), with c' = w a' up to the sign of the cosine's."""
+
+    value: Callable[[float], float]
+    weight: Callable[[Graph, int, int], int]  # ``weight(graph, a, c)`` -> w
 
 
-_DERIVATIVES = {
-    ops.EXP: ops.EXP,
-    **{ops.SIN: ops.COS, ops.COS: ops.SIN, ops.SINH: ops.COSH, ops.COSH: ops.SINH},
+FUNCTIONS = {
+    ops.EXP: Function(math.exp, lambda g, a, c: c),
+    ops.SIN: Function(math.sin, lambda g, a, c: g.function(ops.COS, a)),
+    ops.COS: Function(math.cos, lambda g, a, c: g.function(ops.SIN, a)),
+    ops.TAN: Function(math.tan, lambda g, a, c: g.add(g.number(1.0), g.multiply(c, c))),
+    ops.SINH: Function(math.sinh, lambda g, a, c: g.function(ops.COSH, a)),
+    ops.COSH: Function(math.cosh, lambda g, a, c: g.function(ops.SINH, a)),
+    ops.TANH: Function(math.tanh, lambda g, a, c: g.add(g.number(1.0), g.multiply(c, c), -1.0)),
+    ops.LOG: Function(math.log, lambda g, a, c: g.divide(g.number(1.0), a)),
+    ops.SQRT: Function(math.sqrt, lambda g, a, c: g.divide(g.number(0.5), c)),
+    ops.ATAN: Function(math.atan, lambda g, a, c: g.divide(g.number(1.0), g.add(g.number(1.0), g.multiply(a, a)))),
+    ops.ASIN: Function(
+        math.asin,
+        lambda g, a, c: g.divide(g.number(1.0), g.function(ops.SQRT, g.add(g.number(1.0), g.multiply(a, a), -1.0))),
+    ),
 }
-"""Functions w of the same operand with c' = w a'; the cosine's has the other sign."""
 
 LEAVES = {ops.STATE: ops.MOVING, ops.TIME: ops.TIMED, ops.PARAMETER: ops.CONSTANT, ops.NUMBER: ops.CONSTANT}
 
@@ -204,29 +209,14 @@ class Graph:
         value = self.value(a)
         if value is not None:
             try:
-                return self.number(_FUNCTIONS[code](value))
+                return self.number(FUNCTIONS[code].value(value))
             except (ValueError, OverflowError):
                 return self.number(math.nan)
         node = self._new(code, (a,))
         if node in self.weights:
             return node
-        one = self.number(1.0)
         self.weights[node] = -1  # w may depend on the node itself
-        if code in _DERIVATIVES:
-            weight = self.function(_DERIVATIVES[code], a)
-        elif code == ops.TAN:
-            weight = self.add(one, self.multiply(node, node))
-        elif code == ops.TANH:
-            weight = self.add(one, self.multiply(node, node), -1.0)
-        elif code == ops.LOG:
-            weight = self.divide(one, a)
-        elif code == ops.SQRT:
-            weight = self.divide(self.number(0.5), node)
-        elif code == ops.ATAN:
-            weight = self.divide(one, self.add(one, self.multiply(a, a)))
-        else:  # ASIN
-            weight = self.divide(one, self.function(ops.SQRT, self.add(one, self.multiply(a, a), -1.0)))
-        self.weights[node] = weight
+        self.weights[node] = FUNCTIONS[code].weight(self, a, node)
         return node
 
     def step(self, a: int) -> int:

@@ -62,7 +62,7 @@ def ordered(graph: Graph, slopes: Sequence[int], guards: Sequence[int], resets: 
         np.array([place[i] for i in slopes], dtype=np.int64),
         np.array(switches, dtype=np.int64).reshape(-1, 3).T,
         np.array([[place[i] for i in reset] for reset in resets], dtype=np.int64).reshape(-1, len(slopes)),
-        np.array([place[i] for i in _clocks(graph, every, flat)], dtype=np.int64),
+        np.array([place[i] for i in _clocks(graph, every, flat, linear)], dtype=np.int64),
     )
     return Tape(*(read_only(np.ascontiguousarray(part)) for part in parts))
 
@@ -135,9 +135,8 @@ def _linear_in_time(graph: Graph, every: Sequence[int], flat: Terms) -> set[int]
     return linear
 
 
-def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
+def _clocks(graph: Graph, every: Sequence[int], flat: Terms, linear: set[int]) -> list[int]:
     plain: set[int] = set()  # functions that a Taylor series resolves everywhere
-    linear = _linear_in_time(graph, every, flat)
     for node in every:
         code, operands = graph.nodes[node]
         if code == ops.TIME:

@@ -15,11 +15,6 @@ from chilopod.compiled import fused_njit
 from chilopod.flows.tracing import tape as ops
 from chilopod.lanes import HALF, as_lanes
 
-LINEAR, PRODUCT, SQUARE, QUOTIENT = ops.LINEAR, ops.PRODUCT, ops.SQUARE, ops.QUOTIENT
-STEP, FLOOR, SELECT, GUARD = ops.STEP, ops.FLOOR, ops.SELECT, ops.GUARD
-EXP, SIN, COS, TAN, SINH, COSH, TANH = ops.EXP, ops.SIN, ops.COS, ops.TAN, ops.SINH, ops.COSH, ops.TANH
-LOG, SQRT, POWER, ATAN, ASIN = ops.LOG, ops.SQRT, ops.POWER, ops.ATAN, ops.ASIN
-
 
 class Series(NamedTuple):
     """Taylor coefficients of all nodes of a tape along a motion."""
@@ -33,27 +28,27 @@ class Series(NamedTuple):
 
 @fused_njit(error_model="numpy")
 def _function(code: int, a: float, b: float) -> float:
-    if code == EXP:
+    if code == ops.EXP:
         return math.exp(a) if a < 709.7 else math.inf
-    if code == SIN:
+    if code == ops.SIN:
         return math.sin(a)
-    if code == COS:
+    if code == ops.COS:
         return math.cos(a)
-    if code == TAN:
+    if code == ops.TAN:
         return math.tan(a)
-    if code == SINH:
+    if code == ops.SINH:
         return math.sinh(a) if abs(a) < 710.0 else math.inf
-    if code == COSH:
+    if code == ops.COSH:
         return math.cosh(a) if abs(a) < 710.0 else math.inf
-    if code == TANH:
+    if code == ops.TANH:
         return math.tanh(a)
-    if code == LOG:
+    if code == ops.LOG:
         return math.log(a) if a > 0.0 else math.nan
-    if code == SQRT:
+    if code == ops.SQRT:
         return math.sqrt(a) if a >= 0.0 else math.nan
-    if code == POWER:
+    if code == ops.POWER:
         return np.power(a, b)
-    if code == ATAN:
+    if code == ops.ATAN:
         return math.atan(a)
     return math.asin(a) if abs(a) <= 1.0 else math.nan
 
@@ -61,28 +56,28 @@ def _function(code: int, a: float, b: float) -> float:
 @fused_njit(error_model="numpy")
 def branch_at(kind: int, value: float) -> float:
     """Branch of a switch where its function has a value: the largest whole number below, or the sign."""
-    if kind == FLOOR:
+    if kind == ops.FLOOR:
         return math.floor(value)
     return 1.0 if value >= 0.0 else -1.0
 
 
 @fused_njit(error_model="numpy")
 def values_at(
-    program: Any, terms: Any, slopes: Any, start: int, stop: int, order: int, unit: float, values: Any, branches: Any
+    program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, branches: Any
 ) -> None:
-    """Coefficients 0 to ``order`` of the operations from ``start`` up to ``stop``, and of the states from ``slopes``.
+    """Coefficients 0 to ``order`` of the operations in a span (first and past-last), and of the states from ``slopes``.
 
     Its arguments are single arrays, and one call handles all orders: counting references to arrays takes as long as
     the arithmetic of a small system.
     """
     for k in range(order + 1):
-        for i in range(start, stop):
+        for i in range(span[0], span[1]):
             code, a, b = program[0, i], program[1, i], program[2, i]
             s, odd = 0.0, 0.0  # two independent sums run in parallel
-            if code == LINEAR:
+            if code == ops.LINEAR:
                 for j in range(a, b):
                     s += values[terms[0, j], 0] * values[terms[1, j], k]
-            elif code == PRODUCT:
+            elif code == ops.PRODUCT:
                 half = (k + 1) // 2
                 for j in range(half):
                     s += values[a, j] * values[b, k - j]
@@ -90,7 +85,7 @@ def values_at(
                 if 2 * half == k:
                     s += values[a, k] * values[b, 0]
                 s += odd
-            elif code == SQUARE:
+            elif code == ops.SQUARE:
                 half = (k + 1) // 4
                 for j in range(half):
                     s += values[a, j] * values[a, k - j]
@@ -100,15 +95,15 @@ def values_at(
                 s = 2.0 * (s + odd)
                 if k % 2 == 0:
                     s += values[a, k // 2] * values[a, k // 2]
-            elif code == QUOTIENT:
+            elif code == ops.QUOTIENT:
                 s = values[a, k]
                 for j in range(1, k + 1):
                     s -= values[b, j] * values[i, k - j]
                 s = s / values[b, 0] if values[b, 0] != 0.0 else math.nan
-            elif code in (STEP, FLOOR):
+            elif code in (ops.STEP, ops.FLOOR):
                 if k == 0:
                     s = branches[b] if b >= 0 else branch_at(code, values[a, 0])
-            elif code == SELECT:
+            elif code == ops.SELECT:
                 s = values[b, k] if values[a, 0] > 0.0 else values[program[3, i], k]
             elif k == 0:
                 s = _function(code, values[a, 0], values[b, 0])
@@ -120,7 +115,7 @@ def values_at(
                     odd += (half + j) * values[a, half + j] * values[w, k - half - j]
                 for j in range(2 * half + 1, (1 if program[5, a] != 0 else k) + 1):
                     s += j * values[a, j] * values[w, k - j]
-                s = (s + odd) / (-k if code == COS else k)
+                s = (s + odd) / (-k if code == ops.COS else k)
             values[i, k] = s
         if k < order:
             for i in range(slopes.size):
@@ -146,30 +141,30 @@ def _add(tangents: Any, i: int, k: int, a: int, at: int, factor: float) -> None:
 
 @fused_njit(error_model="numpy")
 def tangents_at(
-    program: Any, terms: Any, slopes: Any, start: int, stop: int, order: int, unit: float, values: Any, tangents: Any
+    program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, tangents: Any
 ) -> None:
     """The same for the tangents that are needed, from values computed before."""
     nodes, orders, lanes = tangents.shape
     tangents = as_lanes(tangents.reshape(nodes, orders, lanes // HALF, HALF), HALF)
     for k in range(order + 1):
-        for i in range(start, stop):
+        for i in range(span[0], span[1]):
             if program[4, i] == 0:
                 continue
             code, a, b = program[0, i], program[1, i], program[2, i]
             for lane in range(tangents.shape[2]):
                 tangents[i, k, lane] = 0.0
-            if code == LINEAR:
+            if code == ops.LINEAR:
                 for j in range(a, b):
                     if program[4, terms[1, j]] != 0:
                         _add(tangents, i, k, terms[1, j], k, values[terms[0, j], 0])
-            elif code == PRODUCT:
+            elif code == ops.PRODUCT:
                 if program[4, a] != 0:
                     _convolve(tangents, values, i, b, a, 0, k, 1.0)
                 if program[4, b] != 0:
                     _convolve(tangents, values, i, a, b, 0, k, 1.0)
-            elif code == SQUARE:
+            elif code == ops.SQUARE:
                 _convolve(tangents, values, i, a, a, 0, k, 2.0)
-            elif code == QUOTIENT:
+            elif code == ops.QUOTIENT:
                 f = 1.0 / values[b, 0]
                 if program[4, a] != 0:
                     _add(tangents, i, k, a, k, f)
@@ -177,10 +172,10 @@ def tangents_at(
                     _convolve(tangents, values, i, i, b, 0, k, -f)
                 if k > 0:
                     _convolve(tangents, values, i, b, i, 1, k, -f)
-            elif code == SELECT:
+            elif code == ops.SELECT:
                 _add(tangents, i, k, b if values[a, 0] > 0.0 else program[3, i], k, 1.0)
             else:
-                _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == COS else 1.0)
+                _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == ops.COS else 1.0)
         if k < order:
             for i in range(slopes.size):
                 for lane in range(tangents.shape[2]):
@@ -196,7 +191,7 @@ def loaded(tape: Any, params: Any, orders: int, directions: int, branches: Any) 
         values[n + 1 + i, 0] = params[i]
     for i in range(tape.numbers.size):
         values[n + 1 + parameters + i, 0] = tape.numbers[i]
-    values_at(tape.program, tape.terms, tape.slopes, first, stop, 0, 1.0, values, branches)
+    values_at(tape.program, tape.terms, tape.slopes, (first, stop), 0, 1.0, values, branches)
     return Series(values, np.zeros((nodes, orders, lanes)), branches)
 
 
@@ -207,20 +202,19 @@ def choose(tape: Any, series: Any) -> None:
     values, branches = series.values, series.branches
     first = tape.layout[3]
     for s in range(switches.shape[1]):
-        if switches[0, s] != GUARD:
-            values_at(program, terms, slopes, first, switches[2, s], 0, 1.0, values, branches)
+        if switches[0, s] != ops.GUARD:
+            values_at(program, terms, slopes, (first, switches[2, s]), 0, 1.0, values, branches)
             branches[s] = branch_at(switches[0, s], values[switches[1, s], 0])
             first = switches[2, s]
-    values_at(program, terms, slopes, first, tape.layout[4], 0, 1.0, values, branches)
+    values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
     for s in range(switches.shape[1]):
-        if switches[0, s] == GUARD:
-            branches[s] = branch_at(GUARD, values[switches[1, s], 0])
+        if switches[0, s] == ops.GUARD:
+            branches[s] = branch_at(ops.GUARD, values[switches[1, s], 0])
 
 
 @fused_njit(error_model="numpy")
 def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: Any) -> None:
-    """Values of some nodes at times and states, with their branches; shapes (samples,), (n, samples) and (nodes,
-    samples), where all samples may share one time or state."""
+    """Values of nodes, shape (nodes, samples), at times and states, of which all may share one."""
     series = loaded(tape, params, 1, 0, np.zeros(tape.switches.shape[1]))
     n, values = tape.layout[0], series.values
     for m in range(found.shape[1]):
@@ -240,8 +234,8 @@ def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, j
     for i in range(x.size):
         values[i, 0] = x[i] * units[i]
     values[x.size, 0] = t
-    values_at(program, terms, slopes, first, stop, 0, 1.0, values, series.branches)
-    tangents_at(program, terms, slopes, first, stop, 0, 1.0, values, tangents)
+    values_at(program, terms, slopes, (first, stop), 0, 1.0, values, series.branches)
+    tangents_at(program, terms, slopes, (first, stop), 0, 1.0, values, tangents)
     s = 0.0
     for i in range(x.size):
         slope[i] = values[slopes[i], 0] / units[i]
@@ -273,7 +267,7 @@ def compose(tape: Any, params: Any, curve: Any, branches: Any, found: Any) -> No
         for i in range(n):
             series.values[i, k] = curve[k, i]
     nothing, first, stop = np.empty(0, np.int64), tape.layout[3], tape.layout[4]  # no states follow from f
-    values_at(tape.program, tape.terms, nothing, first, stop, orders - 1, 1.0, series.values, branches)
+    values_at(tape.program, tape.terms, nothing, (first, stop), orders - 1, 1.0, series.values, branches)
     for k in range(orders):
         for i in range(n):
             found[k, i] = series.values[tape.slopes[i], k]
@@ -288,7 +282,7 @@ def expand_values(tape: Any, order: int, stop: int, unit: float, series: Any) ->
     """
     values, first = series.values, tape.layout[3]
     values[tape.layout[0], 1] = unit
-    values_at(tape.program, tape.terms, tape.slopes, first, stop, order, unit, values, series.branches)
+    values_at(tape.program, tape.terms, tape.slopes, (first, stop), order, unit, values, series.branches)
 
 
 @fused_njit(error_model="numpy", inline="always")
@@ -297,4 +291,4 @@ def expand(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
     expand_values(tape, order, stop, unit, series)
     if series.tangents.shape[2] > 0:
         program, terms, first = tape.program, tape.terms, tape.layout[3]
-        tangents_at(program, terms, tape.slopes, first, stop, order, unit, series.values, series.tangents)
+        tangents_at(program, terms, tape.slopes, (first, stop), order, unit, series.values, series.tangents)

@@ -111,16 +111,17 @@ def _blank(make: Callable[..., Any]) -> Callable[..., Any]:
             result = np.empty(np.shape(shape) if make is np.full_like else shape, dtype=object)
             result[...] = value
             return result.view(TracedArray)
-        options = {key: value for key, value in options.items() if not (key == "dtype" and value is object)}
-        args = tuple(_numeric(value) for value in args)
-        if len(args) > 1 and args[1] == np.dtype(object):
-            args = (args[0], *args[2:])
-        if options.get("dtype") == np.dtype(object):
-            del options["dtype"]
+        options = {key: value for key, value in options.items() if not _means_object(value)}
+        args = tuple(_numeric(value) for value in args if not _means_object(value))
         result = make(*args, **options)
         return as_traced(result) if result.dtype.kind == "f" else result
 
     return shaped
+
+
+def _means_object(value: Any) -> bool:
+    """True for the type of traced arrays."""
+    return isinstance(value, type | np.dtype) and value in (object, np.dtype(object))
 
 
 def _numeric(value: Any) -> Any:
@@ -169,7 +170,8 @@ REPLACED.update(_OWN)
 
 _SAME_NAME = (
     *("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "expm1", "log1p", "log2", "log10", "exp2"),
-    *("floor", "ceil", "trunc", "hypot", "copysign", "cbrt", "radians", "degrees"),
+    *("asin", "acos", "atan", "atan2", "pow", "fabs", "cbrt", "floor", "ceil", "trunc", "hypot", "copysign"),
+    *("radians", "degrees"),
 )
 """Functions with the same name in math and numpy."""
 
@@ -184,9 +186,6 @@ def _instead() -> dict[int, Any]:
         (np.empty, _blank(np.zeros)),
         (np.ones, _blank(np.ones)),
         (np.full, _blank(np.full)),
-        (np.zeros_like, _blank(np.zeros_like)),
-        (np.ones_like, _blank(np.ones_like)),
-        (np.empty_like, _blank(np.zeros_like)),
         (np.eye, lambda *a, **o: as_traced(np.eye(*a, **o))),
         (np.identity, lambda *a, **o: as_traced(np.identity(*a, **o))),
         (np.float64, lambda value=0.0: value if _has_traced(value) else np.float64(value)),
@@ -194,13 +193,7 @@ def _instead() -> dict[int, Any]:
         (builtins.max, _most(builtins.max, np.maximum)),
         (builtins.min, _most(builtins.min, np.minimum)),
         (math.fsum, lambda values: sum(values)),
-        (math.atan, np.arctan),
-        (math.asin, np.arcsin),
-        (math.acos, np.arccos),
-        (math.atan2, np.arctan2),
-        (math.pow, np.power),
         (math.fmod, lambda a, b: a - b * np.trunc(a / b)),
-        (math.fabs, np.abs),
     ]
     pairs += [(getattr(math, name), getattr(np, name)) for name in _SAME_NAME]
     return {id(real): own for real, own in [*_OWN.items(), *pairs]}

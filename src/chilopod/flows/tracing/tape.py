@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
+
 Integers = NDArray[np.int64]
 
 STATE, TIME, PARAMETER, NUMBER = 0, 1, 2, 3
@@ -25,11 +26,9 @@ LINEAR, PRODUCT, SQUARE, QUOTIENT = 4, 5, 6, 7
 STEP, FLOOR, SELECT = 8, 9, 10
 EXP, SIN, COS, TAN, SINH, COSH, TANH, LOG, SQRT, POWER, ATAN, ASIN = range(11, 23)
 
-GUARD = 23
-"""Kind of switch: the guard of an event."""
+GUARD = 23  # kind of switch: the guard of an event
 
-CONSTANT, TIMED, MOVING = 0, 1, 2
-"""Dependence of a node: on parameters only, on time too, or on the state."""
+CONSTANT, TIMED, MOVING = 0, 1, 2  # dependence of a node: on parameters only, on time too, or on the state
 
 
 class Tape(NamedTuple):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.flows.tracing.environment import Opaque, describe, python_function, rebuild
 from chilopod.flows.tracing.evaluation import evaluate
@@ -18,8 +18,7 @@ from chilopod.flows.tracing.graph import Graph
 from chilopod.flows.tracing.ordering import ordered
 from chilopod.flows.tracing.tape import Tape
 from chilopod.flows.tracing.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _MOST_NODES = 200_000
 _MOST_KEPT = 64
@@ -51,20 +50,9 @@ def trace(
 ) -> Trace:
     """Record the operations of a right-hand side, once for all values of its floats.
 
-    Parameters
-    ----------
-    rhs, dimension, args
-        Right-hand side as in :func:`chilopod.stability.from_rhs`. Floats in ``args``, alone or in arrays, tuples and
-        lists, are parameters of the tape.
-    times, base
-        Times between which, and state around which, the tape is compared with the function.
-    events
-        Pairs of a guard g(t, x, *args) and a reset r(t, x, *args) -> state, or None.
-
-    Raises
-    ------
-    Untraceable
-        If it is not a fixed sequence of known operations, or the tape and the function do not agree.
+    Floats in ``args``, alone or in arrays, tuples and lists, are parameters of the tape. ``events`` are pairs of a
+    guard and a reset or None; the tape is compared with the function between some times and around a state ``base``.
+    Raises Untraceable if the function is not a fixed sequence of known operations, or disagrees with the tape.
     """
     functions = (rhs, *(part for event in events for part in event))
     floats: list[float] = []

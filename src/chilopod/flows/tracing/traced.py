@@ -125,34 +125,22 @@ REPLACED: dict[Any, Callable[..., Any]] = {}
 class TracedArray(_Recording, np.ndarray[Any, np.dtype[Any]]):
     """An array of traced and plain numbers."""
 
+    real = property(lambda self: self)
+    imag = property(lambda self: np.zeros(self.shape))
+
     def astype(self, *_: Any, **__: Any) -> Any:
-        """A copy."""
         return self.copy()
 
-    @property  # type: ignore[misc]
-    def real(self) -> Any:
-        """The array itself."""
-        return self
-
-    @property  # type: ignore[misc]
-    def imag(self) -> Any:
-        """Zeros."""
-        return np.zeros(self.shape)
-
     def max(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        """The largest."""
         return np.maximum.reduce(self, axis=axis)
 
     def min(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        """The smallest."""
         return np.minimum.reduce(self, axis=axis)
 
     def mean(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        """The arithmetic mean."""
         return REPLACED[np.mean](self, axis)
 
     def clip(self, low: Any = None, high: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        """Between bounds."""
         return REPLACED[np.clip](self, low, high)
 
 

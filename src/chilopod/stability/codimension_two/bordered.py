@@ -21,10 +21,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
 from chilopod.stability.problem.budget import Budget, UserCode
 from chilopod.stability.problem.capabilities import KnowsOrbit, Scaled, SystemLike
@@ -34,8 +33,6 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
 from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
-
-Array = NDArray[np.float64]
 
 Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
@@ -104,6 +101,7 @@ class Evaluated(ReadOnlyArrays):
     place: Place  # place, and the return map there
     image: ReturnMap
     jacobian: Array  # Jacobian of the return map in units of the frame, shape (n, n)
+    error: Array  # bounds on the errors of its entries
     residual: Array  # left sides of the equations, shape (m + k,)
     right: Array  # v and w, shape (n, k), which are null vectors where the residual is zero; in units of the frame
     left: Array
@@ -147,15 +145,11 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     unknowns. Widths of the box are the parameters' units."""
 
     first: Spot  # first point of the curve
+    precision = ROUND_OFF
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
-        self._family2 = family2
-        self.target = target
-        self.known = known
-        self.box = box
-        self.widths = box[:, 1] - box[:, 0]
-        self.budget = budget
-        self.precision = ROUND_OFF
+        self._family2, self.target, self.known = family2, target, known
+        self.box, self.widths, self.budget = box, box[:, 1] - box[:, 0], budget
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
@@ -164,7 +158,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             return self._family2(first, second)
 
     def begin(self, place: Place) -> Spot:
-        """The point of the curve nearest to a place that is close to it."""
+        """The point of the curve nearest to a place beside it."""
         system = self.system(place.values)
         section = None if self.known else section_at(system, place.state)
         place, image = self._mapped(place, section, False)
@@ -181,8 +175,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return self.spot(found.place, anchor.frame, None)
 
     def _nearest(self, anchor: Spot) -> Evaluated:
-        """The equations at the point of the curve nearest to a spot beside it; on an edge of the box if the point lies
-        outside."""
+        """The equations at the point of the curve nearest to a spot beside it, or on an edge of the box before it."""
         try:
             return self.along(anchor, 0.0)
         except OutsideBoxError as error:
@@ -192,8 +185,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             return self.step(anchor, Guess(plane.target * row, anchor.matrix), plane).found
 
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
-        """Description of a point on the curve, in a frame adapted to it; its tangent has the direction of the one
-        ``before``."""
+        """A point on the curve, in a frame adapted to it, with its tangent along the one ``before``."""
         system = self.system(place.values)
         section = frame.section
         if section is not None:
@@ -257,8 +249,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
 
     def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and the coordinates that identify it: a system that does not
-        depend on time may return to the same orbit at another instant."""
+        """Displacement of the first point, its tangent, and coordinates that do not change with the time 0."""
         frame, first = anchor.frame, self.first
         seen = slice(0 if frame.section is None else frame.parameters.start, None)
         return frame.between(anchor.place, first.place), frame.carried(first.tangent, first.frame), seen
@@ -325,11 +316,12 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _equations(self, place: Place, image: ReturnMap, frame: Frame) -> Evaluated:
         jacobian = image.jacobian * frame.size / frame.size[:, None]
+        error = np.broadcast_to(image.error, jacobian.shape) * frame.size / frame.size[:, None]
         right, left, inverse = _bordered(self._critical(jacobian, place.cosine), frame.column, frame.row)
         k = right.shape[1]
         orbit = frame.basis.T @ ((image.state - place.state) / frame.size)
         residual = np.concatenate([orbit, frame.mixture @ inverse[-k:, -k:].ravel()])
-        return Evaluated(place, image, jacobian, residual, right, left, float(np.linalg.norm(inverse, 2)))
+        return Evaluated(place, image, jacobian, error, residual, right, left, float(np.linalg.norm(inverse, 2)))
 
     def _derivative(self, at: Evaluated, frame: Frame) -> Array:
         """Derivative of the equations with respect to the coordinates, exact or by differences."""
@@ -347,15 +339,13 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return matrix
 
     def _uncertainty(self, at: Evaluated, frame: Frame) -> Array:
-        size = frame.size
-        error = np.broadcast_to(np.asarray(at.image.error, dtype=np.float64), at.jacobian.shape) * size / size[:, None]
-        wrong = error
+        error = wrong = at.error
         if not self.target:
             own = np.abs(at.jacobian)
             wrong = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error
         rounding = 4.0 * np.finfo(float).eps
         # The error of the derivative determines that of the returned state.
-        returned = error.sum(axis=1) + rounding * np.abs(at.place.state) / size
+        returned = error.sum(axis=1) + rounding * np.abs(at.place.state) / frame.size
         critical = np.abs(frame.mixture) @ (np.abs(at.left.T) @ wrong @ np.abs(at.right)).ravel()
         norms = np.linalg.norm(at.left) * np.linalg.norm(at.right) * np.linalg.norm(frame.mixture, 2)
         power = 1 if self.target else 2

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, mark, rows
@@ -18,9 +17,6 @@ from chilopod.stability.tracing.ending import Ending
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 class CodimensionTwo(Labelled):
@@ -79,9 +75,8 @@ class Point2(ReadOnlyArrays):
     frequency
         Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
     coefficient, coefficient_error
-        Coefficient and coefficient error of the normal form, for the map of a :class:`BifurcationPoint` (over two
-        periods at a period doubling): the quadratic one at a fold or a transcritical point, the cubic one at all
-        others; None if undefined or not computed.
+        Coefficient of the normal form and its error, for the map of a :class:`BifurcationPoint`: the quadratic one at
+        a fold or a transcritical point, else the cubic one; None if undefined or not computed.
     """
 
     values: Array
@@ -102,14 +97,12 @@ class SpecialPoint2(Point2):
     Attributes
     ----------
     kind
-        Kind of the point. The error of its ``values`` is also that of the test function over its rate of change along
-        the curve.
+        Kind of the point.
     next_coefficient, next_coefficient_error
         Next coefficient where that of the curve's normal form vanishes, for the same map and amplitude, and a bound on
-        its error. That is c of a -> a + c a^3 at a cusp and a degenerate
-        transcritical point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised
-        period doubling; the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point.
-        None elsewhere.
+        its error: c of a -> a + c a^3 at a cusp and a degenerate transcritical point; e of a -> a + e a^5 at a
+        degenerate pitchfork and a generalised period doubling, and of |a| -> |a| + e |a|^5, the second Lyapunov
+        coefficient, at a Chenciner point. None elsewhere.
     """
 
     kind: CodimensionTwo
@@ -164,8 +157,7 @@ class Curve2(Result):
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the curve over both parameters, with points of codimension two marked, on axes of matplotlib or on new
-        ones."""
+        """Draw the curve over both parameters, with points of codimension two, on given or new axes of matplotlib."""
         axes = axes_for(axes)
         axes.plot(*self.values.T, label=self.kind.label)
         mark(axes, [(each.kind.label, each.values[0], each.values[1]) for each in self.special])

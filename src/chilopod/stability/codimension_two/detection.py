@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Frame, Spot
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates
-from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
-from chilopod.stability.normal_forms.quintic import Quintic, quintic
+from chilopod.stability.normal_forms.normal_form import NormalForm, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import Spectrum, spectrum
@@ -30,9 +29,6 @@ from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.tracing.tracer import Parts
 from chilopod.stability.unit_circle.spectra import TARGETS, Event
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _SAFETY = 1.5
 _BESIDE = 1e-3  # step of the differences of a test function, relative to the curve's step
@@ -45,8 +41,7 @@ _EPSILON = float(np.finfo(float).eps)
 
 
 class Own(enum.Enum):
-    """Test functions of the critical multiplier: the coefficient of the normal form, and w . v, which is zero where the
-    multiplier is double."""
+    """Coefficient of the normal form, and w . v of the critical eigenvectors, zero for a double multiplier."""
 
     COEFFICIENT = enum.auto()
     DOUBLE = enum.auto()
@@ -84,12 +79,6 @@ class Critical(ReadOnlyArrays):
     left: ComplexArray
     overlap: float  # overlap of the two, each a unit vector in the frame: 0 for a double multiplier, NaN for a pair
 
-    @property
-    def error(self) -> Array:
-        """Bounds on the errors of the return map's derivative in units of the frame, shape (n, n)."""
-        size = self.frame.size
-        return np.asarray(np.broadcast_to(self.at.image.error, self.at.jacobian.shape) * size / size[:, None])
-
 
 def critical(target: int, at: Evaluated, frame: Frame, shift: Array | None = None) -> Critical:
     """A place of a curve, with the critical multipliers separated from the others."""
@@ -126,8 +115,7 @@ class Station:
 
 
 class Detector:
-    """Test functions along a curve of bifurcations of some kind, with that of the normal form if coefficients are
-    requested."""
+    """Test functions along a curve of bifurcations, with that of the normal form if ``coefficients``."""
 
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
         self._curve, self._kind, self._coefficients = curve, kind, coefficients
@@ -160,7 +148,7 @@ class Detector:
         if here.shift is not None:
             frame, m = here.frame, here.frame.basis.shape[1]
             orbit_error = float(np.abs(here.left) @ (frame.size * (np.abs(frame.basis) @ here.shift[:m])))
-            error = float(here.error.max())
+            error = float(here.at.error.max())
         return normal_form(
             *self.sampled(here),
             uncertainty=error / float(np.linalg.norm(here.at.jacobian)),
@@ -195,7 +183,7 @@ class Detector:
         if isinstance(signal, CodimensionTwo):
             return here.at.place.cosine - _COSINES[signal], 0.0 if here.shift is None else float(here.shift[-1])
         if signal is Own.DOUBLE:
-            return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.error))
+            return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.at.error))
         if signal is Own.COEFFICIENT:
             if not self._curve.target and abs(here.at.place.cosine) >= 1.0:
                 return np.nan, np.nan  # past the end of the curve: two real multipliers with product 1
@@ -213,8 +201,7 @@ class Detector:
     def _located(
         self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
     ) -> list[tuple[float, Spot, SpecialPoint2]]:
-        """The point where a test function vanishes within a step, and its distance along the step; None for a zero
-        without meaning."""
+        """Points where a test function vanishes within a step, with their distances along the step."""
         curve, start, length = self._curve, parts.step.start, parts.step.size
         seen: dict[float, tuple[float, float]] = {}
 
@@ -250,8 +237,7 @@ class Detector:
         return [(root, spot, point)]
 
     def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
-        """A point with its next coefficient, whose error includes part of the change to a place ``beside``, as the
-        point may be off by that distance."""
+        """A point with its next coefficient, whose error includes its change over the error of the place."""
         terms, forms = [], [self.form(each) for each in (here, beside)]
         for each, form in zip((here, beside), forms, strict=True):
             value, error = form.cubic, form.cubic_error
@@ -347,8 +333,7 @@ def across(spot: Spot) -> Array:
 def _along(
     test: Callable[[float], float], parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float
 ) -> Array:
-    """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open; from
-    differences over h."""
+    """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
     try:
         slope = abs(test(root + h) - test(root - h)) / (2.0 * h)
         low, middle, high = (parts.at(root + s).found.place.values for s in (-h, 0.0, h))

@@ -12,19 +12,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.frozen import Array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, across, critical
 from chilopod.stability.codimension_two.two_parameters import BUDGET, checked_box, over_periods
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
-from chilopod.stability.normal_forms.quintic import Quintic
+from chilopod.stability.normal_forms.normal_form import Quintic
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.budget import Budget, SpentError
-
-Array = NDArray[np.float64]
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
 _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
@@ -143,8 +141,7 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
 
 
 def _across(spot: Spot, target: int) -> Array:
-    """``response`` of an unfolding, by the shortest way in the plane of the parameters; g changes by -(w . v) times the
-    change of the multiplier."""
+    """``response`` of an unfolding, by the shortest way; g changes by -(w . v) times the change of the multiplier."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.at.left[:, 0] @ spot.at.right[:, 0])
     orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, Station
@@ -26,8 +25,6 @@ from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.tracing.tracer import trace
-
-Array = NDArray[np.float64]
 
 BUDGET = 20_000
 """Default budget of a curve, in return maps with derivatives."""
@@ -60,15 +57,14 @@ def follow2(
         ``family2(p, q)`` is the system at values of both parameters.
     start
         Point from :func:`chilopod.stability.locate` in the family of p with q = ``second``; or start from
-        :func:`chilopod.stability.switch2`, which contains its q and leads away from the point of codimension two.
+        :func:`chilopod.stability.switch2`, which contains its q.
     between
         Intervals of both parameters: the box of the curve; the family is called for values inside only. Their widths
         are the parameters' units.
     second
         Value of q at the start.
     rising
-        True to start towards rising q, False towards falling q, None for both in one curve. Not used for a curve that
-        leaves another one.
+        True to start towards rising q, False towards falling q, None for both in one curve; unused from `switch2`.
     points
         Largest number of points in each direction.
     step, longest
@@ -76,16 +72,15 @@ def follow2(
     coefficients
         True to compute normal forms, which are needed to find cusps and degenerate points.
     budget, seconds
-        Number of return maps with derivatives (normal forms are counted separately), and time in s, after which the
-        curve ends.
+        Number of return maps with derivatives, beside those of normal forms, and time in s, at which the curve ends.
     progress
         Called with the number of points and the newest one.
 
     Raises
     ------
     ParameterError
-        If an argument is out of range; for a pitchfork, transcritical or branch point that neither a symmetry nor a
-        known orbit preserves as both parameters change; for a Krein collision.
+        If an argument is out of range; for a Krein collision, and a pitchfork, transcritical or branch point that
+        neither a symmetry nor a known orbit preserves.
     AnalysisError
         If no point of a curve is found at the start.
     """
@@ -170,11 +165,8 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     return target, known
 
 
-class _Looked(NamedTuple):
-    """The station at the end of a step, if any, and the events within the step."""
-
-    station: Station | None
-    special: tuple[SpecialPoint2, ...]
+_Looked = tuple[Station | None, tuple[SpecialPoint2, ...]]
+"""The station at the end of a step, if any, and the events within the step."""
 
 
 @dataclass
@@ -197,16 +189,17 @@ class _Half:
         for spot, point in self.detector.events(step, self.last.signals, station.signals):
             special += (point,)
             if self.curve.target == 0 and point.kind in _MEETINGS:
-                return _Looked(self.detector.station(spot), special), Ending.RESONANCE
-        return _Looked(None if ending is Ending.CLOSED else station, special), ending
+                return (self.detector.station(spot), special), Ending.RESONANCE
+        return (None if ending is Ending.CLOSED else station, special), ending
 
     def keep(self, found: _Looked, count: int) -> None:
         """Keep a step with its events."""
-        self.special += found.special
-        if found.station is not None:
-            self.points.append(found.station.point)
-            self.last = found.station
-            self.progress(count, found.station.point)
+        station, special = found
+        self.special += special
+        if station is not None:
+            self.points.append(station.point)
+            self.last = station
+            self.progress(count, station.point)
 
 
 def _joined(kind: Kind, origin: Station, before: _Half, after: _Half) -> Curve2:

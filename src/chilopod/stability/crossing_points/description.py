@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.frozen import ComplexArray
 from chilopod.stability.crossing_points.place import critical_multipliers
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm
@@ -26,8 +27,6 @@ from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetri
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event
-
-ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
@@ -100,8 +99,7 @@ def described(
 
 
 def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
-    """Root mean square of a mode over a return, across the motion, which does not depend on the choice of time 0; 1 for
-    a given period, which fixes time 0."""
+    """Root mean square of a mode over a return, across the motion; 1 for a given period, which fixes time 0."""
     if not is_autonomous(system):
         return 1.0
     before, parts, duration = 0.0, _FEWEST_PARTS, orbit.period / orbit.image.returns

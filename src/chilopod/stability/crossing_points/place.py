@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum import errors
@@ -20,10 +20,7 @@ from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
 
-Array = NDArray[np.float64]
-
-SAFETY = 1.5
-"""Factor on the error of a multiplier, for that of its rate of change."""
+SAFETY = 1.5  # factor on the error of a multiplier, for that of its rate of change
 
 _TOUCH_STEP = 1e-3  # distance from a touch at which the multiplier is computed, relative to the course
 _ASIDE = np.arange(1.0, 9.0) / 4.0  # nodes of the interpolation of a singular orbit on one side, in units of the reach
@@ -88,8 +85,7 @@ def critical_multipliers(spec: Spectrum, crossing: Crossing) -> NDArray[np.intp]
 
 
 def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
-    """Bound on the error of the place of a crossing on a course, from the return map there with its error bounds: the
-    error of the critical multipliers over their rate of change."""
+    """Bound on the error of the place of a crossing: error of the critical multipliers over their rate of change."""
     width = 0.5 * (crossing.bracket[1] - crossing.bracket[0])
     try:
         if crossing.collision:
@@ -163,8 +159,7 @@ Bounded = Callable[[float, Array, Array, ReturnMap], Orbit]
 
 @dataclass(frozen=True)
 class Regular(ReadOnlyArrays):
-    """An interpolated singular orbit: its place with an error bound, the ``orbit`` of a sample there, and the orbit
-    itself."""
+    """An interpolated singular orbit: place, error bound, ``orbit`` of a sample there, and the orbit itself."""
 
     place: float
     error_bound: float
@@ -173,12 +168,10 @@ class Regular(ReadOnlyArrays):
 
 
 def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regular | None:
-    """Place and orbit at a multiplier +1 of a corrected orbit.
+    """Place and orbit at a multiplier +1, where H - 1 is singular and Newton's method stops anywhere along the mode.
 
-    There H - 1 is singular, and Newton's method stops anywhere along the mode where the residual is round-off. So the
-    orbit and the determinant of H' - 1 are interpolated from regular places on both sides, or on one side at an end,
-    ever closer together until interpolations of two orders agree. None if the orbit is regular or the interval leaves
-    no room.
+    The orbit and det(H' - 1) are interpolated from regular places on both sides, or on one side at an end, ever closer
+    together until interpolations of two orders agree. None if the orbit is regular or there is no room.
     """
     if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
@@ -214,8 +207,7 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
 
 
 class _Interpolation(NamedTuple):
-    """Place and orbit by polynomials through the determinant of H' - 1 and the orbit, in units of the reach from the
-    root finder's place."""
+    """Place and orbit by polynomials through det(H' - 1) and the orbit, in units of the reach."""
 
     place: float  # zero of the determinant
     between: float  # its distance from the zero of the polynomial without the outermost two places

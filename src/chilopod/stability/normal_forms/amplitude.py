@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.center_manifold import (
@@ -23,8 +22,6 @@ from chilopod.stability.normal_forms.center_manifold import (
     images,
     turns,
 )
-
-Array = NDArray[np.float64]
 
 _TRIALS = 40  # largest number of sampled amplitudes
 _SHARE = 0.03  # wanted departure of the map from its linear part, relative to the amplitude
@@ -63,13 +60,11 @@ class Fit:
     cubic_error: float
 
 
-def fitted(mapped: ReturnedStates, at: CriticalOrbit, noise: float, resonance: int | None, radius: float) -> Fit | None:
-    """The terms at the amplitude, and with the bend of the curve, of the most accurate cubic coefficient.
-
-    The search begins at an amplitude; None if no amplitude is suitable.
-    """
+def fitted(mapped: ReturnedStates, at: CriticalOrbit, resonance: int | None, radius: float) -> Fit | None:
+    """The terms at the amplitude, and with the bend of the curve, of the most accurate cubic coefficient, from a given
+    first amplitude; None if none is suitable."""
     third: Powers = (3, 0) if at.real else (2, 1)
-    manifold = Manifold(mapped, at, noise, 3, resonance)
+    manifold = Manifold(mapped, at, 3, resonance)
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
     best = None
     best_error, status = np.inf, NormalFormStatus.LINEAR
@@ -140,8 +135,7 @@ def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: 
 
 
 def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
-    """Departure of the projected map from its linear part, relative to the amplitude; the order of its main term; and
-    True if it exceeds the noise."""
+    """Departure from linearity relative to the amplitude, order of its main term, True if it exceeds the noise."""
     share, order = 0.0, 2
     for one in found.harmonics:
         sizes = np.abs(one.coefficients[1:, -1])

@@ -17,11 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.normal_forms.extrapolation import RADII, Series, radii, series
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 ReturnedStates = Callable[[Array], Array]
 """The return map: states, shape (k, n), to their images, shape (k, n)."""
@@ -111,21 +108,17 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
     return result if np.isfinite(result).all() else None
 
 
-def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
+def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
     """Errors of images of a size, shape (n,), and of their projection, shape (n + 1,)."""
     rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
-    floor: Array = np.maximum(rounding, noise * reached)
-    return np.append(floor, np.abs(at.left) @ floor)
+    return np.append(rounding, np.abs(at.left) @ rounding)
 
 
 def solve_homological(
     at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
 ) -> ComplexArray:
-    """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both.
-
-    If nu^i conj(nu)^j is critical (``resonant``: nu, or its conjugate at the resonance 1:3), the solution has no part
-    along that critical direction.
-    """
+    """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both; without a part along the critical direction if
+    the factor is critical (``resonant``: nu, or its conjugate at the resonance 1:3)."""
     i, j = powers
     n = at.state.size
     factor = at.multiplier**i * at.multiplier.conjugate() ** j
@@ -139,18 +132,14 @@ def solve_homological(
 
 
 class Manifold:
-    """The centre manifold up to the order below that of a coefficient, improved on samples of the return map.
+    """The centre manifold up to the order below that of a coefficient, 3 or 5, improved on samples of the return map.
 
-    It has no part along q at resonant monomials. It is determined by H(W(z)) = W(g(z)), with the return map
-    H and the map g on the critical space (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.3 and 9.4;
-    Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007). The order of the coefficient is 3 or 5; at
-    the resonance 3 the conjugate of the multiplier is its square.
+    It is determined by H(W(z)) = W(g(z)), with the map g on the critical space, and has no part along q at resonant
+    monomials (Kuznetsov, sections 9.3 and 9.4; Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007).
     """
 
-    def __init__(
-        self, mapped: ReturnedStates, at: CriticalOrbit, noise: float, order: int, resonance: int | None = None
-    ) -> None:
-        self._mapped, self._at, self._noise, self._order = mapped, at, noise, order
+    def __init__(self, mapped: ReturnedStates, at: CriticalOrbit, order: int, resonance: int | None = None) -> None:
+        self._mapped, self._at, self._order = mapped, at, order
         if at.real:
             nu = at.multiplier.real
             self._resonant = {(k, 0): nu**k == nu for k in range(2, order)}
@@ -179,9 +168,7 @@ class Manifold:
             return None
         found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
         size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
-        blur, floor = (
-            _expected_noise(at, reached, self._noise) for reached in (np.abs(at.state), np.abs(at.state) + size)
-        )
+        blur, floor = (_expected_noise(at, reached) for reached in (np.abs(at.state), np.abs(at.state) + size))
         # A cosine transform spreads the noise of the samples evenly over the coefficients, smaller by this factor.
         seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
         shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0

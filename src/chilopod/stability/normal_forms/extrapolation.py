@@ -16,13 +16,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-
-RADII = 8
-"""Number of radii at which a function is sampled."""
+RADII = 8  # number of radii at which a function is sampled
 
 _SAFETY = 5.0  # factor on the noise, estimated from few samples, and the truncation, from the next two terms
 _FALL = 4.0
@@ -43,8 +39,7 @@ class Series(ReadOnlyArrays):
 
     @property
     def roughness(self) -> Array:
-        """Size of the last coefficients, shape (entries,): the noise of the samples, or the truncation error of a
-        series that has not converged."""
+        """Size of the last coefficients, shape (entries,): noise of the samples, or truncation error."""
         tail: Array = np.abs(self.coefficients[-_TAIL:]).max(axis=0)
         return tail
 
@@ -55,8 +50,7 @@ class Series(ReadOnlyArrays):
         return np.asarray(before > _FALL * self.roughness)
 
     def taylor(self, order: int, noise: Array) -> tuple[ComplexArray, Array]:
-        """Taylor coefficients of one order (of the parity of the functions, at most RADII), and bounds on their errors,
-        shape (entries,), from those on the errors of the samples."""
+        """Taylor coefficients of one order, and bounds on their errors from those of the samples, shape (entries,)."""
         weights, gains = _weights(order, self.parity)
         terms = weights[:, None] * self.coefficients
         sizes = np.abs(terms)

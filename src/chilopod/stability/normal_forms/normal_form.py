@@ -1,9 +1,9 @@
 """Normal-form coefficients at a bifurcation, from evaluations of the return map.
 
 Near the critical orbit the return map H is sampled along the critical mode, bent by its quadratic part outside the
-critical space; this gives the terms of second and third order on the critical space (Kuznetsov, *Elements of Applied
-Bifurcation Theory*, sections 5.4, 8.7 and 9.2). Only H is needed: no derivatives of the right-hand side by hand and no
-symbolic algebra. The series of H determine the amplitude at which it is sampled, so any units give the same digits.
+critical space; this gives the terms of second and third order on the critical space, and of fifth where the cubic one
+vanishes (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 5.4, 8.7, 9.2 and 9.3). Only H is needed. Its
+series determine the amplitude at which it is sampled, so any units give the same digits.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.flows.balance import numerical_balance
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fitted
-from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, images
+from chilopod.stability.spectrum.eigenvalues import eigensystem
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 _START = 0.2  # first amplitude of the search, relative to the scale of the states
 
 
@@ -28,20 +28,18 @@ class NormalForm:
     space.
 
     With a the amplitude along the unit critical mode: real multiplier +1, a -> a + quadratic a^2 + cubic a^3. A
-    multiplier -1 of the return map: the same, of the first map that has +1 again. That is the map over one period where
-    a period is an even number of returns (a pitchfork that breaks a symmetry in time). Else it is the map over two
-    periods (a period doubling): where one period maps a to -a + b a^2 + d a^3, ``cubic`` is -2 (b^2 + d), and
-    ``quadratic`` is zero. Neimark-Sacker (state = 2 Re(a mode)): |a| -> |a| + cubic |a|^3,
-    while the phase of a advances by that of the multiplier + rotation |a|^2.
+    multiplier -1 of the return map: the same, with ``quadratic`` zero, of the first map that has +1 again: over one
+    period if it is an even number of returns (a pitchfork that breaks a symmetry in time), else over two (a period
+    doubling, with ``cubic`` -2 (b^2 + d) where one period maps a to -a + b a^2 + d a^3). Neimark-Sacker (state = 2 Re(a
+    mode)): |a| -> |a| + cubic |a|^3, while the phase of a advances by that of the multiplier + rotation |a|^2.
 
-    A mode k times as long (through a change of units) has amplitudes 1/k as large, so coefficients k times (quadratic)
-    and k^2 times as large (cubic, rotation).
+    A mode k times as long has coefficients k times (quadratic) and k^2 times as large (cubic, rotation).
 
     Attributes
     ----------
     status
         Status of the numbers. If it is neither FOUND nor LINEAR they are NaN with infinite errors, except at the
-        resonances 1:3 and 1:4, where they belong to Kuznetsov's normal form but decide nothing alone.
+        resonances 1:3 and 1:4, where they decide nothing alone.
     quadratic, cubic
         Coefficients. A negative ``cubic`` bounds the growth: supercritical.
     rotation
@@ -54,7 +52,7 @@ class NormalForm:
         Number k, 1 to 4, if the pair is exp(+-2 pi i / k) within its uncertainty; else None.
     resonant, resonant_error
         Coefficient of conj(a)^2 (1:3) or conj(a)^3 (1:4) of one return; it turns with the phase of the mode.
-        ratio
+    ratio
         At 1:4: A = -i C / |D| of Kuznetsov, section 9.5.3, with C and D the coefficients of a |a|^2 and conj(a)^3.
     """
 
@@ -76,26 +74,12 @@ def normal_form(
     mapped: ReturnedStates,
     at: CriticalOrbit,
     *,
-    noise: float = 0.0,
-    uncertainty: float = 0.0,
-    scale: ArrayLike | None = None,
-    orbit_error: float | None = None,
+    uncertainty: float = 0.0,  # relative error of the derivative of the map
+    scale: ArrayLike | None = None,  # sizes of the states, shape (n,), where the search for an amplitude starts
+    orbit_error: float | None = None,  # error of the orbit along the mode; by default from its residual
 ) -> NormalForm:
-    """Normal form on the centre manifold of a critical orbit.
-
-    Parameters
-    ----------
-    mapped, at
-        Return map of several states, shape (k, n), and the critical orbit.
-    noise, uncertainty
-        Relative errors of the map, beside round-off and the noise of the samples, and of its derivative.
-    scale
-        Sizes of the states, shape (n,), where the search for an amplitude starts; by default the size of the orbit.
-    orbit_error
-        Error of the orbit along the mode; by default from its residual and the noise, large near a singular
-        H - 1.
-    """
-    values, errors = _uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
+    """Normal form on the centre manifold of a critical orbit of a map of several states, shape (k, n)."""
+    values, errors = _uncertainties(at.jacobian, max(uncertainty, 16.0 * np.finfo(float).eps))
     own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
     others = np.delete(np.arange(values.size), own)
     if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
@@ -109,11 +93,11 @@ def normal_form(
         return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=resonance)
     # An overflow far out is a valid result.
     with np.errstate(all="ignore"):
-        fit = fitted(mapped, at, noise, resonance, _start(at, scale))
+        fit = fitted(mapped, at, resonance, _start(at, scale))
     if fit is None:
         return NormalForm(NormalFormStatus.OUT_OF_REACH, resonance=resonance)
     if at.real:
-        return _of_full_period(fit, mapped, at, noise, orbit_error)
+        return _of_full_period(fit, mapped, at, orbit_error)
     cubic = at.returns * np.conj(at.multiplier) * fit.cubic
     error = at.returns * fit.cubic_error
     form = NormalForm(
@@ -130,22 +114,15 @@ def normal_form(
     return form if resonance is None else _with_resonant_terms(form, fit, at, resonance)
 
 
-def _uncertainties(jacobian: Array, relative: float) -> tuple[NDArray[np.complex128], Array]:
-    """Eigenvalues of a matrix and bounds on their errors, shape (n,) both, for a relative error of the matrix.
-
-    Norms are those of the balanced matrix, so that units do not matter.
-    """
+def _uncertainties(jacobian: Array, relative: float) -> tuple[ComplexArray, Array]:
+    """Eigenvalues of a matrix and bounds on their errors, shape (n,) both, for an error relative to its norm in units
+    that balance it."""
     units = numerical_balance(jacobian)
     balanced = jacobian * units / units[:, None]
-    values, right = np.linalg.eig(balanced)
-    try:
-        left = np.linalg.inv(right).conj().T
-    except np.linalg.LinAlgError:
-        left = np.full(right.shape, np.inf)
+    values, _, left = eigensystem(balanced)
     error = relative * np.linalg.norm(balanced)
     # To first order the condition gives each error, but even for a defective pair it is at most the square root.
-    condition = np.linalg.norm(right, axis=0) * np.linalg.norm(left, axis=0)
-    return values.astype(np.complex128), np.minimum(error * condition, np.sqrt(error))
+    return values, np.minimum(error * np.linalg.norm(left, axis=0), np.sqrt(error))
 
 
 def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
@@ -159,17 +136,15 @@ def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
     return orbit / float(mode.max()) if orbit > 0.0 else _START
 
 
-def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
-    """Error along the mode of an orbit with this residual, where H - 1 is singular.
-
-    At a distance d from the symmetric orbit of a pitchfork the residual is at least cubic d^3, with an apparent
-    quadratic term 3 cubic d; beside a transcritical point it is quadratic d^2.
-    """
+def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic: float) -> float:
+    """Error d along the mode of an orbit with this residual, where H - 1 is singular: beside the symmetric orbit of a
+    pitchfork the residual is at least cubic d^3, with an apparent quadratic term 3 cubic d; beside a transcritical
+    point it is quadratic d^2."""
     image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
     if image is None:
         return 0.0
-    rounding = max(noise, 2.0 * np.finfo(float).eps) * np.abs(at.state)
-    missed = float(abs(image[0] @ at.left)) + float(np.abs(at.left) @ rounding)
+    rounding = 2.0 * float(np.finfo(float).eps)
+    missed = float(abs(image[0] @ at.left) + rounding * (np.abs(at.left) @ np.abs(at.state)))
     if missed == 0.0:
         return 0.0
     by_cubic = float(1.5 * np.cbrt(missed / cubic)) if cubic > 0.0 else np.inf
@@ -177,16 +152,14 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic
     return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
 
 
-def _of_full_period(
-    fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float, orbit_error: float | None
-) -> NormalForm:
+def _of_full_period(fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, orbit_error: float | None) -> NormalForm:
     """Coefficients of the map with multiplier +1 from those of one return at a real multiplier."""
     quadratic, quadratic_error = fit.sampled.term((2, 0))
     cubic, cubic_error = fit.cubic.real, fit.cubic_error
     fourth, fourth_error = fit.sampled.term((4, 0))
     off = orbit_error
     if off is None:
-        off = _loose_by(mapped, at, noise, abs(quadratic), abs(cubic) + cubic_error)
+        off = _loose_by(mapped, at, abs(quadratic), abs(cubic) + cubic_error)
     if off > 0.0:
         quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
         cubic_error += 4.0 * (abs(fourth) + fourth_error) * off
@@ -218,3 +191,78 @@ def _with_resonant_terms(form: NormalForm, fit: Fit, at: CriticalOrbit, resonanc
         resonant_error=float(error),
         ratio=ratio,
     )
+
+
+_BENDS = 4  # one for every order of the manifold, and one more
+_STEP = 1.5  # ratio of successive amplitudes
+_TRIES = 8  # largest number of amplitudes each way
+_WORSE = 2  # amplitudes tried beyond the best one
+
+Term = tuple[complex, float]
+"""A coefficient and its error."""
+
+
+@dataclass(frozen=True)
+class Quintic:
+    """The map over the full period on the centre manifold, where its cubic coefficient vanishes."""
+
+    # Coefficient e of a -> a + e a^5 (a pair: |a| -> |a| + e |a|^5), of the map of the cubic coefficient of a
+    # :class:`~chilopod.stability.normal_forms.normal_form.NormalForm`, and a bound on its error.
+    coefficient: float
+    error: float
+    curve: Curve  # the centre manifold, up to fourth order
+    amplitude: float  # largest amplitude at which the return map was sampled
+
+
+def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float) -> Quintic | None:
+    """The coefficient of fifth order at a critical orbit, from the amplitude with the smallest error; the search starts
+    at that of the normal form of third order. None if the map is undefined at all amplitudes. A multiplier +1 belongs
+    to a pitchfork, whose symmetry excludes terms of even order."""
+    best: Quintic | None = None
+    manifold = Manifold(mapped, at, 5)
+    curve: Curve = manifold.curve
+    for factor, radius in ((_STEP, amplitude), (1.0 / _STEP, amplitude / _STEP)):
+        worse, tries = 0, 0
+        while worse < _WORSE and tries < _TRIES:
+            manifold.curve = dict(curve)
+            with np.errstate(all="ignore"):
+                found = _measured(manifold, at, radius * factor**tries)
+            tries, worse = tries + 1, worse + 1
+            if found is not None and (best is None or found.error < best.error):
+                best, curve, worse = found, found.curve, 0
+    return best
+
+
+def _measured(manifold: Manifold, at: CriticalOrbit, radius: float) -> Quintic | None:
+    found = manifold.sample(radius)
+    for _ in range(_BENDS):
+        if found is None or not manifold.bend(found):
+            break
+        found = manifold.sample(radius)
+    if found is None:
+        return None
+    powers = ((3, 0), (5, 0)) if at.real else ((2, 1), (3, 2))
+    third, fifth = (manifold.coefficient(found, each) for each in powers)
+    coefficient, error = _fifth_of_full_period(at, third, fifth)
+    return Quintic(coefficient, error, manifold.curve, found.radius) if np.isfinite(error) else None
+
+
+def _fifth_of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[float, float]:
+    """Coefficient of fifth order over a full period, or over two, from the terms of one return."""
+    (c, c_error), (e, e_error) = third, fifth
+    cubic, cubic_error, value, error, times = c.real, c_error, e.real, e_error, at.returns
+    if not at.real:
+        # z -> nu z (1 + c |z|^2 + e |z|^4): |1 + u| = 1 + Re u + (Im u)^2 / 2 + ...
+        c, e = c * at.multiplier.conjugate(), e * at.multiplier.conjugate()
+        cubic, value = c.real, e.real + 0.5 * c.imag * c.imag
+        error += (abs(c.imag) + 0.5 * c_error) * c_error
+    elif at.multiplier.real < 0.0:
+        # a -> -a + c a^3 + e a^5 twice: a -> a - 2 c a^3 + (3 c^2 - 2 e) a^5.
+        value = 3.0 * cubic * cubic - 2.0 * value
+        error = 2.0 * error + 3.0 * (2.0 * abs(cubic) + cubic_error) * cubic_error
+        cubic, cubic_error = -2.0 * cubic, 2.0 * cubic_error
+        times = times // 2 if times % 2 == 0 else times
+    # a -> a + c a^3 + e a^5, iterated.
+    pairs = 1.5 * times * (times - 1)
+    error = times * error + pairs * (2.0 * abs(cubic) + cubic_error) * cubic_error
+    return times * value + pairs * cubic * cubic, error

@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.frozen import Array
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap, flow_with_error
 from chilopod.stability.problem.scales import sizes
 from chilopod.stability.spectrum.eigenvalues import normal_basis
-
-Array = NDArray[np.float64]
 
 _WORST_CONDITION = 1e6
 _FEWEST, _MOST = 8, 32768  # numbers of parts of moderate condition
@@ -25,8 +23,7 @@ _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, ab
 
 @dataclass(frozen=True)
 class Cut:
-    """A return in parts, with orthonormal bases at the borders: of the planes across the motion if the system does not
-    depend on time, else of the whole space."""
+    """A return in parts, with orthonormal bases at the borders: of the planes across the motion, or of the space."""
 
     times: Array  # times of the borders, shape (parts + 1,)
     states: Array  # states there, shape (parts + 1, n)
@@ -59,16 +56,8 @@ def equal_cut(system: SystemLike, x: Array, image: ReturnMap, count: int) -> Cut
 
 
 def moderate_cut(system: SystemLike, x: Array, image: ReturnMap) -> Cut:
-    """A return from a state on the orbit in parts of moderate condition.
-
-    Only parts that contract too strongly are halved, which gives a relaxation oscillation a few short ones. The return
-    of a map, which has no parts, stays whole.
-
-    Raises
-    ------
-    AnalysisError
-        If no parts are of moderate condition.
-    """
+    """A return from a state on the orbit in parts of moderate condition: those that contract too strongly are halved.
+    The return of a map, which has no parts, stays whole. Raises AnalysisError if no parts are of moderate condition."""
     units = _units(system, x, image)
     parts = _equal_parts(system, x, image, _FEWEST, units)
     if not is_autonomous(system):

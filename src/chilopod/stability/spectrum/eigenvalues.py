@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.flows.balance import numerical_balance
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
 
@@ -32,6 +28,18 @@ class Spectrum(ReadOnlyArrays):
         return int(np.abs(self.values - target).argmin())
 
 
+def eigensystem(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Eigenvalues by falling modulus, unit right eigenvectors as columns, and left ones with left[:, i]^H right[:, i] =
+    1; these are infinite for a defective matrix, whose conditions give no bound."""
+    values, right = np.linalg.eig(matrix)
+    order = falling_order(values)
+    values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
+    try:
+        return values, right, np.linalg.inv(right).conj().T
+    except np.linalg.LinAlgError:
+        return values, right, np.full_like(right, np.inf)
+
+
 def spectrum(image: ReturnMap) -> Spectrum:
     """Eigenvalues of a return map with their condition, without the zero of the direction of motion."""
     into, out_of = _across(image)
@@ -39,13 +47,7 @@ def spectrum(image: ReturnMap) -> Spectrum:
     # In units that make all entries similar, the errors of the eigenvalue solver are small relative to each.
     units = numerical_balance(jacobian)
     scaled = jacobian * units / units[:, None]
-    values, right = np.linalg.eig(scaled)
-    order = falling_order(values)
-    values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
-    try:
-        left = np.linalg.inv(right).conj().T
-    except np.linalg.LinAlgError:  # a defective matrix: conditions give no bound
-        left = np.full_like(right, np.nan)
+    values, right, left = eigensystem(scaled)
     # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
     error = 4.0 * _EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
     right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
@@ -68,8 +70,7 @@ def return_multipliers(image: ReturnMap) -> ComplexArray:
 
 
 def _across(image: ReturnMap) -> tuple[Array, Array]:
-    """Coordinates on the section of a return map: (n, n-1) from them, and (n-1, n) to them along the motion; two unit
-    matrices without a section."""
+    """Coordinates on the section of a return map: matrices (n, n-1) from them, and (n-1, n) to them."""
     n = image.state.size
     if image.velocity is None or image.normal is None:
         return np.eye(n), np.eye(n)

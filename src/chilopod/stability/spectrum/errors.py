@@ -12,14 +12,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from chilopod.frozen import Array, ComplexArray
 
-SAFETY, DRAWS = 10.0, 8
-"""Factor on the largest change of a result under random changes, and their number."""
+SAFETY, DRAWS = 10.0, 8  # factor on the largest change of a result under random changes, and their number
 
-FIRST_ORDER = 1e-6
-"""Error, relative to the largest eigenvalue, up to which first-order bounds hold."""
+FIRST_ORDER = 1e-6  # error, relative to the largest eigenvalue, up to which first-order bounds hold
 
 VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
 """Words for the results of :func:`stable_within`."""
@@ -38,16 +35,14 @@ def stable_within(values: ComplexArray, bound: float, bounds: Array | float | No
 
 
 def falling_order(values: ComplexArray) -> NDArray[np.intp]:
-    """Order of eigenvalues by falling modulus; moduli that differ by round-off are equal, and the two of a pair stand
-    together, positive frequency first."""
+    """Order by falling modulus within round-off; the two of a pair stand together, positive frequency first."""
     modulus = np.abs(values)
     relative = np.round(modulus / max(float(modulus.max()), 1e-300), 12)
     return np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -relative))
 
 
 def disturbed(matrix: Array, error: Array, draws: int = DRAWS) -> Array:
-    """Copies of a matrix, or of a stack of matrices, every entry changed by its error with a random sign, shape (draws,
-    ...)."""
+    """Copies of matrices, shape (draws, ...), every entry changed by its error with a random sign."""
     signs = np.random.default_rng(0).choice(np.array([-1.0, 1.0]), (draws, *matrix.shape))
     return np.asarray(matrix + error * signs)
 

@@ -11,13 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.spectrum.errors import DRAWS, SAFETY
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _GAP = 1.0  # least gap of ln|eigenvalue| between groups
 _PASSES = 40  # through the product: a gap of 1 leaves exp(-40) of the neighbouring group
@@ -78,10 +75,7 @@ def split_product(
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
-    """The same for the ``count`` directions that grow most, of factors that may map the others to zero.
-
-    A gap must separate these from the others, and the factors must be of moderate condition on them.
-    """
+    """The same for the ``count`` directions that grow most, separated by a gap from the others."""
     bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]
     following = [*bases[1:], bases[0]]
     restricted = [after.T @ f @ before for f, before, after in zip(factors, bases, following, strict=True)]
@@ -137,8 +131,7 @@ def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
 def _moved(
     factors: Sequence[Array], errors: Sequence[Array], groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]
 ) -> Array:
-    """Change of the logarithms when factors change by their errors, group by group: the largest over random signs (in
-    one draw the contributions may cancel), with a safety factor."""
+    """Largest change of the logarithms when factors change by their errors with random signs, with a safety factor."""
     nodes = [np.hstack(bases) for bases in zip(*groups, strict=True)]
     sizes = np.cumsum([0, *(len(values) for values in known)])
     moved = np.zeros(sizes[-1])

@@ -9,18 +9,15 @@ Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.implicit.flow import Stretched
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.problem.capabilities import FlowsFrames, SystemLike, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.cut import Cut, equal_cut, section_basis, turn_in_units
 from chilopod.stability.spectrum.errors import SAFETY, disturbed
 from chilopod.stability.spectrum.splitting import intersection, split_leading
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _DRAWS = 3  # each costs as much as the result
 _PARTS = 64
@@ -43,12 +40,7 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
 
     Directions that the derivative of the flow resolves are split by it; the others, which must be real and of different
     sizes, have the stretch of the frame and its sign. The fastest has all digits, by Liouville's formula; several share
-    an error, which must not exceed 1e-6 of either.
-
-    Raises
-    ------
-    AnalysisError
-        If the error is larger.
+    an error; AnalysisError if that exceeds 1e-6 of either.
     """
     cut = equal_cut(system, x, image, _PARTS)
     frame, logarithms, signs, unsure = _carried(system, cut)
@@ -74,8 +66,7 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
 
 
 def _carried(system: FlowsFrames, cut: Cut) -> tuple[Array, Array, Array, Array]:
-    """The frame at time 0 on the section, the logarithms of its stretch in every part, its signs on return (0 if lost),
-    and the errors of the sums of the logarithms."""
+    """The frame at time 0, its logarithms of stretch by parts, its signs on return (0 if lost), errors of the sums."""
     units, n = cut.units, cut.units.size
     along = 1 if is_autonomous(system) else 0
     frame = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
@@ -108,11 +99,8 @@ def _carried(system: FlowsFrames, cut: Cut) -> tuple[Array, Array, Array, Array]
 def _stretched(
     system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, most: int
 ) -> tuple[Stretched, int]:
-    """A frame over a part, and the number of halvings of the part, at most ``most``.
-
-    A part is halved if two computations differ: a direction that turns from a fast decay to a slow one needs short
-    steps, as after a start.
-    """
+    """A frame over a part, and the number of halvings of the part, at most ``most``: it is halved if two computations
+    differ, as where a direction turns from a fast decay to a slow one."""
     n = units.size
     sums, turned, halved = np.zeros((2, n)), np.ones(n), 0
     ends = [t1]
@@ -151,10 +139,8 @@ def _orthonormal(matrix: Array) -> tuple[Array, Array]:
 
 
 def _fastest(system: SystemLike, cut: Cut, k: int) -> Array:
-    """Orthonormal basis of the directions at time 0 that decay faster than the first k, on the section.
-
-    They are contracted most by the flow, over a time so short that they are still above round-off.
-    """
+    """Orthonormal basis of the directions at time 0 that decay faster than the first k, on the section: those that the
+    flow contracts most, over a time so short that they are still above round-off."""
     if k == 0:
         return np.eye(cut.sections[0].shape[1])
     duration = float(cut.times[-1])

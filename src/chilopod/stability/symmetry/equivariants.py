@@ -13,13 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.stability.symmetry.groups import Images
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.spectra import Event
-
-Array = NDArray[np.float64]
 
 _ALIGNED = 1e-9  # difference from one of a cosine that counts as one: an angle of 4e-5 (elements differ by 6e-4)
 _NULL = 1e-8  # difference of equal eigenvalues of elements; 1 - cos(2 pi / 10 000) is 2e-7
@@ -66,14 +64,11 @@ class AxialBranch(ReadOnlyArrays):
     Attributes
     ----------
     direction
-        Unit vector w of the irreducible representation, shape (d,). The new orbits leave along
-        ``block.mode(a, w)``, with a the critical eigenvector of the reduced matrix.
+        Unit vector w of the irreducible representation, shape (d,): the new orbits leave along ``block.mode(a, w)``.
     isotropy
-        Indices of the elements with rho(P) w = w, at -1 also with rho(P) w = -w, shape (k,): the symmetries of the new
-        orbits, at -1 together with a shift by one return.
+        Indices of the elements with rho(P) w = w, at -1 also those with -w, shape (k,): symmetries of the new orbits.
     reversed
-        True if an element, or at -1 the shift by one return, maps w to -w: both halves of the branch are then images
-        of each other.
+        True if an element, or at -1 the shift by one return, maps w to -w: both halves are images of each other.
     """
 
     direction: Array
@@ -90,8 +85,7 @@ class SymmetricCrossing:
     kind
         Kind of the crossing.
     quadratic
-        Number of linearly independent quadratic maps that commute with the representation (with its negatives too at
-        -1; with phase shifts too at a pair): terms of the normal form.
+        Number of quadratic terms of the normal form: linearly independent maps that commute with the representation.
     branches
         Axial branches, those with the most symmetries first; not computed for a pair.
     complete
@@ -131,18 +125,14 @@ def _kind(block: Block, critical: Event, quadratic: int, returns: int) -> Symmet
 
 
 def _quadratics(rho: Array) -> int:
-    """Number of quadratic equivariants V -> V: multiplicity of V in its symmetric square (Sattinger, Group Theoretic
-    Methods in Bifurcation Theory, Springer 1979)."""
+    """Number of quadratic equivariants V -> V: multiplicity of V in its symmetric square."""
     one, two = (np.trace(power, axis1=1, axis2=2) for power in (rho, rho @ rho))
     return round(float((one * (one**2 + two)).mean() / 2.0))
 
 
 def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
-    """Unit vectors of the lines that are the fixed-point space of a subgroup, one of each class of conjugate ones, and
-    True if the search was complete.
-
-    Every fixed-point space is an intersection of those of single elements, at -1 with either sign.
-    """
+    """Unit vectors of the lines that are the fixed-point space of a subgroup (an intersection of those of single
+    elements, at -1 with either sign), one of each class of conjugate ones; and True if the search was complete."""
     rho = _once(rho)
     most = _MOST_ENTRIES // rho.shape[1] ** 2
     signed = np.concatenate([rho, -rho]) if critical is Event.MINUS else rho

@@ -19,9 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
-from chilopod.frozen import ReadOnlyArrays, read_only
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, ReadOnlyArrays, read_only
 
 _PROBES = 3  # probe vectors: a single one may by chance lie close to a mirror plane
 _SAME = 1e-7  # two elements of a cyclic group of ten thousand are 6e-4 apart; round-off of as many products is 1e-11
@@ -38,27 +36,18 @@ _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Group(ReadOnlyArrays):
-    """A finite group of matrices; :func:`finite_group` makes one.
+    """A finite group of matrices; :func:`finite_group` makes one."""
 
-    Attributes
-    ----------
-    generators, elements
-        Generators, and all elements, the identity first, shape (any, n, n) both.
-    to_orthogonal, from_orthogonal
-        Coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both.
-    scales
-        Scales of the coordinates x, shape (n,): entry (i, j) of an element is of the order of ``scales[i] / scales[j]``
-        at most. Between coordinates that no element mixes they have no meaning.
-    component
-        Number of each coordinate's set, shape (n,), such as one kind of state over all cells of a ring: neither
-        elements nor ``to_orthogonal`` mix the sets, so their units are independent.
-    """
-
-    generators: Array
-    elements: Array
+    generators: Array  # shape (generators, n, n)
+    elements: Array  # all of them, the identity first, shape (order, n, n)
+    # coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both
     to_orthogonal: Array
     from_orthogonal: Array
+    # scales of the coordinates x, shape (n,): entry (i, j) of an element is of the order of scales[i] / scales[j] at
+    # most; without meaning between coordinates that no element mixes
     scales: Array
+    # number of each coordinate's set, shape (n,), such as one kind of state over all cells of a ring: neither elements
+    # nor `to_orthogonal` mix the sets, so their units are independent
     component: NDArray[np.intp]
 
     @property
@@ -109,24 +98,18 @@ def _needed(by: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
-    """The isotropy subgroup of a state, shape (n,), with a bound on its error: all P of a group with P x = x.
-
-    One state suffices for symmetries that hold at every instant: by uniqueness of the flow its whole orbit is
-    invariant.
-    """
+    """The isotropy subgroup of a state, shape (n,), with a bound on its error: all P of a group with P x = x. By
+    uniqueness of the flow they leave its whole orbit invariant."""
     moved = np.abs(group.elements @ x - x)
     allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (error + _SAME * np.abs(x))
     return _subgroup(group, np.all(moved <= allowed, axis=1), "orbit")
 
 
 def centraliser(group: Group, gamma: Array) -> Group:
-    """The subgroup of all P that commute with the spatial part of a symmetry in space and time, gamma f(t, x) =
-    f(t + T/k, gamma x): the source of blocks of a return map M = gamma Phi.
+    """The subgroup of all P that commute with a symmetry in time, gamma f(t, x) = f(t + T/k, gamma x): those that
+    commute with the derivative of the flow on an invariant orbit then do so with the return map gamma Phi.
 
-    Where the whole group leaves an orbit invariant, P commutes with the derivative Phi of the flow, and with M exactly
-    if it does with gamma.
-
-    It must normalise the group: gamma P gamma^-1 is an element for every element P.
+    The symmetry must normalise the group: gamma P gamma^-1 is an element for every element P.
     """
     matrix = _scaled(gamma, group.scales)
     own = _scaled(group.elements, group.scales)
@@ -145,8 +128,7 @@ def centraliser(group: Group, gamma: Array) -> Group:
 
 
 def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
-    """Commutator of the derivative of a return map with a group, relative to the bound on the error of its entries and
-    round-off: at most 1 if it commutes."""
+    """Commutator of a return map's derivative with a group, relative to its errors: at most 1 if it commutes."""
     n = group.dimension
     sizes = group.scales[:, None] / group.scales
     pairs = group.component[:, None], group.component[None, :]
@@ -195,11 +177,10 @@ def _powers(matrix: Array, most: int) -> tuple[Array, Array]:
 def _coordinate_scales(envelope: Array) -> Array:
     """Scales s, shape (n,), such that the entries of a group, divided by s_i / s_j, are of order one.
 
-    A symmetry in a user's units is S P S^-1 with P well scaled and S diagonal. With P orthogonal, the inverse of one of
-    its powers is its transpose and another power, so that s_i / s_j is the root of the ratio of the entries (i, j) and
-    (j, i) of the envelope: by least squares of the logarithms, where round-off has little weight but gives the units of
-    coordinates that nothing else connects. Coordinates that act on others but not in reverse (positions relative to a
-    first one) are balanced afterwards.
+    A symmetry in a user's units is S P S^-1 with S diagonal. With P orthogonal, the inverse of a power is its transpose
+    and another power, so s_i / s_j is the root of the ratio of the entries (i, j) and (j, i) of the envelope: by least
+    squares of the logarithms, where round-off has little weight but connects what nothing else does. Coordinates that
+    act on others but not in reverse (positions relative to a first one) are balanced afterwards.
     """
     envelope = np.where(envelope < _CHANCE * (envelope @ envelope), 0.0, envelope)
     weights = (np.sqrt(envelope) * np.sqrt(envelope.T)) ** _LEVELLED

@@ -17,11 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.symmetry.groups import Group
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _TRIES = 8  # random matrices, of which one in millions is not generic
 _DISTINCT = 1e-7  # distance of eigenvalues of a random matrix of norm one that count as equal
@@ -30,30 +27,18 @@ _EXACT = 1e-6  # distance of entries of orthogonal matrices and numbers from 0 a
 
 @dataclass(frozen=True)
 class Block(ReadOnlyArrays):
-    """An irreducible real representation of a group, with all its copies in the space of states.
+    """An irreducible real representation of a group, of dimension d, with all its m copies in the space of states."""
 
-    Attributes
-    ----------
-    real
-        True for the real type, whose representation commutes with multiples of the identity only; False for the complex
-        type, such as turns of a plane.
-    basis
-        Symmetry-adapted basis B, shape (n, m d). For the real type it has one copy after the other, with the same
-        matrices in all: P B = B (I_m ⊗ rho(P)).
-    dual
-        Left inverse of the basis, zero on the other blocks, shape (m d, n).
-    representation
-        Orthogonal matrices rho(P) of the elements, shape (order, d, d).
-    kernel
-        Elements that act as the identity, truth values of shape (order,): new orbits always keep these
-        symmetries.
-    """
-
+    # True for the real type, whose representation commutes with multiples of the identity only; False for the complex
+    # type, such as turns of a plane
     real: bool
+    # symmetry-adapted basis B, shape (n, m d); for the real type one copy after the other: P B = B (I_m ⊗ rho(P))
     basis: Array
-    dual: Array
-    representation: Array
-    kernel: NDArray[np.bool_]
+    dual: Array  # left inverse of the basis, zero on the other blocks, shape (m d, n)
+    representation: Array  # orthogonal matrices rho(P) of the elements, shape (order, d, d)
+    kernel: NDArray[
+        np.bool_
+    ]  # truth values, shape (order,), of elements that act as the identity: new orbits keep them
 
     @property
     def dimension(self) -> int:
@@ -76,16 +61,14 @@ class Block(ReadOnlyArrays):
         return self.dimension if self.real else 1
 
     def reduced(self, matrices: ArrayLike) -> Array:
-        """Reduced form of matrices M, shape (..., n, n), that commute with the group.
+        """Reduced form of matrices M, shape (..., n, n), that commute with the group (else of the mean of P M P^-1).
 
-        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; a matrix that does not commute is replaced by
-        the mean of P M P^-1 over the group. Complex type: dual @ M @ basis, shape (..., m d, m d).
+        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d. Complex type: dual @ M @ basis.
         """
         return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
-        """Bound on the absolute error of the reduced matrices, from that of the matrices' entries (one number or all)
-        and round-off."""
+        """Bound on the error of the reduced matrices, from that of the entries (one number or all) and round-off."""
         round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
         entries = np.asarray(error, dtype=np.float64) + round_off
         return self._diagonal(np.abs(self.dual) @ entries @ np.abs(self.basis))
@@ -105,11 +88,8 @@ class Block(ReadOnlyArrays):
 
 
 def isotypic(group: Group) -> tuple[Block, ...]:
-    """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel.
-
-    Raises AnalysisError if the matrices are not exact enough to separate its representations, or one of these is of
-    quaternionic type.
-    """
+    """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel; AnalysisError
+    if its matrices are not exact enough, or a representation is of quaternionic type."""
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
         blocks = _blocks(group, random)
@@ -175,8 +155,7 @@ def _mean(q: Array, matrix: Array) -> Array:
 
 
 def _image(projector: Array, coordinates: NDArray[np.intp]) -> Array:
-    """Orthonormal basis, shape (n, any), of the image under a projector of the space of some of the coordinates, which
-    it does not mix with others, as these may have other units."""
+    """Orthonormal basis, shape (n, any), of a projector's image of some coordinates, which it mixes with no others."""
     values, vectors = np.linalg.eigh(projector[np.ix_(coordinates, coordinates)])
     embedded = np.zeros((len(projector), int((values > 0.5).sum())))
     embedded[coordinates] = vectors[:, values > 0.5]

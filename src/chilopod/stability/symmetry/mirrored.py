@@ -5,12 +5,10 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.groups import finite_group
-
-Array = NDArray[np.float64]
 
 _LOOSE = 1e-6  # largest residual of a symmetry of a state, relative to the size of the states
 
@@ -36,7 +34,7 @@ def _elements(generators: bytes, n: int) -> Array:
     return finite_group(np.frombuffer(generators).reshape(-1, n, n)).elements
 
 
-def reverses(system: SystemLike, mode: NDArray[np.complex128], size: Array) -> bool:
+def reverses(system: SystemLike, mode: ComplexArray, size: Array) -> bool:
     """True if a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
     own = np.abs(mode / size).max()
     return any(

@@ -5,11 +5,10 @@ from __future__ import annotations
 import bisect
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.stability.unit_circle.critical import (
     LOST,
@@ -24,8 +23,6 @@ from chilopod.stability.unit_circle.critical import (
 from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
 
-Array = NDArray[np.float64]
-
 _CLEARLY, _ROOM = 1e-5, 1e3  # distance from the circle, and multiple of errors elsewhere, that needs no error estimate
 _GREY = 32.0  # distance from the circle, in errors, up to which a multiplier may have left it or not
 _ROUNDS = 200  # rounds of balancing: each adds a root, joins two or counts nearer to one
@@ -35,13 +32,13 @@ _SHADOW = 1.5  # distance of a crossing that explains a touch, in widths of the 
 _EPSILON = float(np.finfo(float).eps)
 
 
+@dataclass
 class Report:
     """Remarks of a search, a sentence each, and flags for a spent budget and for open questions."""
 
-    def __init__(self) -> None:
-        self.remarks: list[str] = []
-        self.spent = False
-        self.open = False
+    remarks: list[str] = field(default_factory=list)
+    spent: bool = False
+    open: bool = False
 
     def leave(self, remark: str) -> None:
         """Note a remark on an open question."""
@@ -230,8 +227,7 @@ class Accounts:
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
     def _followed(self, x: float, y: float, before: int, after: int) -> list[Root]:
-        """Roots of the multipliers whose ranks are inside the circle at one end of a gap and outside at the
-        other."""
+        """Roots of the multipliers whose ranks are inside the circle at one end of a gap and outside at the other."""
         changed, spectra = f"{after - before:+d} multipliers outside", self._spectra
         if spectra.conservative and not spectra.holes(x, y):
             return self._bisected(x, y, before, after)

@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Spectra
 
-Array = NDArray[np.float64]
-
-UNKNOWN = 1.0
-"""Error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined."""
+UNKNOWN = 1.0  # error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined
 
 LOST = "multipliers near the circle are known no better than their distance from it"
 
@@ -44,8 +41,7 @@ def rooted(
     event: Event | None,
     within: float = 0.0,
 ) -> Root:
-    """The root of a function of the eigenvalues between two places with opposite signs, to within a distance or to the
-    last digits."""
+    """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
     most = min(200, max(spectra.left, 1))
     finest = max(within, 5e-324)
     place = float(brentq(function, low, high, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
@@ -124,7 +120,7 @@ def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
     return found
 
 
-def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _meeting(upper: ComplexArray) -> ComplexArray:
     """The two nearest to each other."""
     if upper.size < 2:
         return upper[:0]

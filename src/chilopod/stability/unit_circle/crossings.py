@@ -13,19 +13,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.stability.unit_circle.counts import Accounts, Report
 from chilopod.stability.unit_circle.critical import LOST, Crossing, Root, rooted
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, Spectra, factors, margins
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
-Array = NDArray[np.float64]
-
-BUDGET = 5000
-"""Default budget of matrices of a search."""
+BUDGET = 5000  # default budget of matrices of a search
 
 _DECADES = 4.0
 _SEARCH = 0.7  # part of the budget for the zeros of the functions; the rest is for counting

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
 from chilopod.stability.spectrum.errors import DRAWS, SAFETY, disturbed
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
 entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, for a missing matrix,
@@ -133,8 +132,7 @@ class Spectra:
         return self._known[value] is not None
 
     def beside(self, place: float, apart: float = 0.0) -> tuple[float, float]:
-        """The nearest values with a matrix on either side of a place, at a least distance; without one, the place or
-        the value beyond it."""
+        """The nearest values with a matrix beside a place, at a least distance; else the place, or one beyond it."""
         here = bisect.bisect_left(self.values, place)
         left = next((v for v in reversed(self.values[:here]) if place - v >= apart), min(self.values[0], place))
         after = self.values[bisect.bisect_right(self.values, place) :]
@@ -163,8 +161,7 @@ class Spectra:
         return bool(((2.0 * least - most > 0.0) | (2.0 * most - least < 0.0)).all())
 
     def disturbed(self, values: Array) -> ComplexArray:
-        """Eigenvalues of matrices whose entries are changed within their errors, shape (k, draws, m); NaN for a missing
-        matrix."""
+        """Eigenvalues of matrices changed within their errors, shape (k, draws, m); NaN for a missing matrix."""
         missing = sorted({value for value in values.tolist() if value not in self._disturbed})
         if missing:
             self.at(np.array(missing))

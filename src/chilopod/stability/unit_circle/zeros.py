@@ -18,11 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.stability.unit_circle.interpolation import DEGREE, DENSE, PLACES, interpolated
 
-Array = NDArray[np.float64]
 Interval = tuple[float, float]
 SignedLog = Callable[[Array], tuple[Array, Array]]
 """A function given as ``numpy.linalg.slogdet`` gives a determinant: signs, shape (k,), and logarithms of sizes, shape
