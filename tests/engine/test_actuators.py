@@ -43,11 +43,12 @@ def test_stiffness_is_what_the_equations_of_ramp_and_lag_give(commands, lag, rat
         told(actuators, time, goal, within)
         wanted, u = float(np.clip(goal, 0.5, 4.0)), reference(time)
         length = max(within, abs(wanted - u) / rate if rate else 0.0)
+        length = length if length >= 1e-9 else 0.0  # a jump, and no interval for a quadrature
         if wanted != goal_before or time + length < kink:  # else it goes on as it was
             kink, goal_before = time + length, wanted
 
             def reference(t, begun=time, u=u, wanted=wanted, length=length):
-                return wanted if t - begun >= length or length < 1e-9 else u + (wanted - u) * (t - begun) / length
+                return wanted if t - begun >= length else u + (wanted - u) * (t - begun) / length
 
         end = time + lasts
         edges = [time, *([kink] if time < kink < end else []), end]

@@ -480,7 +480,8 @@ def test_an_orbit_may_be_given_where_an_impact_is_due_or_just_was():
 
     away = brentq(lambda v: flight(v)[1] - v, 5.0, 30.0, xtol=1e-14)
     slope = (flight(away + 1e-5)[1] - flight(away - 1e-5)[1]) / 2e-5
-    for state in ([0.2, 1.0], [-1.0, away], [-1.0, -away / restitution], [-1.0 + 1e-14, -away / restitution]):
+    before = -away / restitution
+    for state in ([0.2, 1.0], [-1.0, away], [-1.0 + 1e-9, away], [-1.0, before], [-1.0 + 1e-14, before]):
         found = multipliers(oscillator, state)
         assert found.period == pytest.approx(flight(away)[0], rel=1e-12)
         assert found.values == pytest.approx([slope], rel=1e-8)

@@ -1,9 +1,10 @@
 """The return map of a system, whose fixed points are the periodic orbits.
 
 For a known period T it is H = S flow(T/k), with S the symmetry of order k, if any. If the system does not depend on
-time, H carries a state to the next crossing of its motion, turned by S, with a section, a hyperplane: a Poincare map
-in the coordinates of the states (Parker & Chua, *Practical Numerical Algorithms for Chaotic Systems*, 1989,
-ch. 2). Its derivative then maps the direction of the motion to zero, exactly, in place of the trivial multiplier 1.
+time, H carries a state to the next crossing of its motion, turned by S, with a section, a hyperplane, in the direction
+of its normal: a one-sided Poincare map in the coordinates of the states (Parker & Chua, *Practical Numerical Algorithms
+for Chaotic Systems*, 1989, ch. 2). Its derivative then maps the direction of the motion to zero, exactly, in place of
+the trivial multiplier 1.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ REPEATED = 10.0
 
 @dataclass(frozen=True)
 class Section(ReadOnlyArrays):
-    """A hyperplane that the orbit of a system without a period of its own crosses once a return.
+    """A hyperplane that the orbit of a system without a period of its own crosses once a return along its normal.
 
     Attributes
     ----------
@@ -279,8 +280,8 @@ def crossing(
 
 
 def _time_to_section(system: Autonomous, before: Array, section: Section, rest: float) -> float | None:
-    """Remaining time of a state near its return to the section, by Newton's method; None if it does not arrive, or has
-    passed it."""
+    """Remaining time of a state near its return to the section, by Newton's method; None if it does not arrive, has
+    passed it or crosses it backwards."""
     best = np.inf
     for _ in range(_CROSSING_ROUNDS):
         state = turned(system, carried(system, before[None], 0.0, rest))[0]
@@ -290,7 +291,7 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
             return None
         move = abs(off / speed)
         if move <= 4e-16 * section.duration or (move <= 1e-10 * section.duration and move >= 0.5 * best):
-            return rest
+            return rest if speed > 0.0 else None
         best = min(best, move)
         rest -= off / speed
         if not 0.0 < rest < _FARTHEST * section.duration:
