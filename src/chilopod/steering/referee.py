@@ -122,7 +122,7 @@ class CourseReferee:
             self._number[gone], self._since[gone] = self._counts[gone], np.nan
         if moved.any():
             self._next(walk, pose, moved)
-        self._present, self._first = np.count_nonzero(~np.isnan(self._since)), np.fmin.reduce(self._since)
+        self._present, self._first = int(np.count_nonzero(~np.isnan(self._since))), np.fmin.reduce(self._since)
         return judged
 
     def _away(self, pose: Array) -> Array:
