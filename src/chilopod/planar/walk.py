@@ -173,7 +173,8 @@ class PlanarWalk(BatchWalk):
 
     def halt(self, which: NDArray[np.bool_]) -> None:
         marked = as_marks("which", which, len(self._robots))
-        self._arrive(marked)
+        for final, here in zip((self._states, self._step, self._status), self._now(), strict=True):
+            final[marked] = here[marked]
         marked &= self._status == stretch.WALKING
         self._status[marked] = stretch.HALTED
         if self._here is not None:
@@ -268,13 +269,6 @@ class PlanarWalk(BatchWalk):
         # Failures are judged where the walk stops for good; a robot that cannot be integrated further has NaN.
         gone = (self._status != stretch.WALKING) | (status == stretch.DIVERGED)
         return np.where(gone[:, None], np.nan, states[:, first:])
-
-    def _arrive(self, which: NDArray[np.bool_]) -> None:
-        """Make the states at the present time final for some robots."""
-        if self._timeline.is_at_cut(self._time):
-            return
-        for mine, here in zip((self._states, self._step, self._status), self._now(), strict=True):
-            mine[which] = here[which]
 
     def _carry(
         self,

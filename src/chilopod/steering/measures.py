@@ -14,8 +14,7 @@ _UNITS = {"path": "m", "effort": "rad^2*s", "spring_work": "J", "drive_work": "J
 
 
 def lengths(data: xr.Dataset) -> dict[str, NDArray[np.intp]]:
-    """Numbers of samples, ``time``, and of commands, ``event``, up to the end of each robot's course, shape
-    (robots,)."""
+    """Numbers of samples, ``time``, and commands, ``event``, to the end of each robot's course, shape (robots,)."""
     last = np.nanmax(data.goal_end.values, axis=1) + _SAME_INSTANT
     commands = data.event.values if "event" in data.dims else _NONE
     return {"time": np.searchsorted(data.time.values, last, "right"), "event": np.searchsorted(commands, last)}
@@ -46,9 +45,8 @@ def add_measures(data: xr.Dataset, period: float) -> None:
     if "command_torque" in data:
         torques, seen, commands = (data[name].values for name in ("command_torque", "seen_joint_angles", "event"))
     samples, counts = data.time.values, lengths(data)
-    begins, ends = data.goal_begin.values, data.goal_end.values
-    found = np.empty((len(_UNITS), *ends.shape))
-    for robot, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+    found = np.empty((len(_UNITS), *data.goal_end.shape))
+    for robot, (begin, end) in enumerate(zip(data.goal_begin.values, data.goal_end.values, strict=True)):
         # The time that other robots of its batch walked on does not count.
         moving, told = ((slice(counts[name][robot]), robot) for name in ("time", "event"))
         times = samples[moving[0]]

@@ -114,12 +114,11 @@ class CourseReferee:
         over = (now - self._since >= self._common.patience - _ROUNDING) & ~(arrived | gone)
         judged = Judged(arrived, over & self._seen_once, over & ~self._seen_once, gone, begins)
         moved = judged.moved
-        if (moved | gone).any():
-            self._judge(gone, now, Verdict.STOPPED)
-            self._judge(arrived, now, Verdict.ARRIVED)
-            self._judge(judged.late, now, Verdict.LATE)
-            self._judge(judged.unseen, now, Verdict.UNSEEN)
-            self._number[gone], self._since[gone] = self._counts[gone], np.nan
+        self._judge(gone, now, Verdict.STOPPED)
+        self._judge(arrived, now, Verdict.ARRIVED)
+        self._judge(judged.late, now, Verdict.LATE)
+        self._judge(judged.unseen, now, Verdict.UNSEEN)
+        self._number[gone], self._since[gone] = self._counts[gone], np.nan
         if moved.any():
             self._next(walk, pose, moved)
         self._present, self._first = int(np.count_nonzero(~np.isnan(self._since))), np.fmin.reduce(self._since)
@@ -139,10 +138,8 @@ class CourseReferee:
         if self._missed is not None and missed is not None:
             self._missed[which] = missed
         self._number[which], self._verdicts[which], self._seen_once[which] = -1, "", False
-        for each in (
-            *(self._places, self._seen_from, self._begin, self._end, self._nearest),
-            *(self._aims, self._since, self._least),
-        ):
+        of_goals = self._places, self._seen_from, self._begin, self._end, self._nearest
+        for each in (*of_goals, self._aims, self._since, self._least):
             each[which] = np.nan
         self._present = -1
 
