@@ -257,7 +257,7 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
     failed = np.isnan(data.heading.values)
     if failed.any():
         for name, values in data.data_vars.items():
-            if values.dims[:2] == ("time", "robot"):
+            if values.dims[:2] == ("time", "robot") and not np.isnan(values.values[failed]).all():
                 data[name] = (values.dims, values.values.copy(), values.attrs)
                 data[name].values[failed] = np.nan
 

@@ -98,7 +98,7 @@ def test_a_trial_names_its_engines_version(monkeypatch):
 
 def test_batches_are_as_large_as_cores_and_memory_allow():
     trials = [Trial(ROBOT, 1.0, seed) for seed in range(100)]
-    assert [len(batch) for batch in batches(trials, on_cores=3)] == [48, 48, 4]
+    assert [len(batch) for batch in batches(trials, on_cores=1)] == [32, 32, 32, 4]
     long = [dataclasses.replace(trial, duration=3000.0) for trial in trials]
     sizes = [len(batch) for batch in batches(long, on_cores=64)]
     assert sum(sizes) == 100

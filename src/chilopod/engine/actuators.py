@@ -118,7 +118,7 @@ class Actuators:
         yaw = self._rows("leg_yaw", command.leg_yaw, 2, walking)
         stiffness = self._rows("stiffness", command.stiffness, self.lag.shape[1], walking)
         torque = self._rows("joint_torque", command.joint_torque, self.lag.shape[1], walking)
-        if yaw is not None and (np.abs(yaw[walking]) > _MOST_YAW).any():
+        if yaw is not None and ((np.abs(yaw) > _MOST_YAW) & walking[:, None]).any():
             worst = float(np.abs(yaw[walking]).max())
             raise ParameterError(
                 "must be at most a right angle", field="command.leg_yaw", value=worst, allowed="-pi/2 to pi/2 rad"
@@ -215,22 +215,23 @@ class Actuators:
         array, shape = as_array(f"command.{name}", value), (len(walking), columns)
         if array.ndim == 0 or array.shape not in (shape, (1, columns), (columns,)):
             raise ParameterError("has the wrong shape", field=f"command.{name}", value=array.shape, allowed=str(shape))
-        rows = np.array(np.broadcast_to(array, shape))
-        if not np.isfinite(rows[walking]).all():
+        rows = np.empty(shape)
+        rows[:] = array
+        if not (np.isfinite(rows) | ~walking[:, None]).all():
             raise ParameterError(
                 "must be finite", field=f"command.{name}", allowed="finite numbers for every robot that still walks"
             )
         return rows
 
     def _check(self, stiffness: Array, walking: NDArray[np.bool_]) -> None:
-        if not (stiffness[walking] > 0.0).all():
+        if ((stiffness <= 0.0) & walking[:, None]).any():
             value = float(stiffness[walking].min())
             raise ParameterError("must be positive", field="command.stiffness", value=value, allowed="N*m/rad")
         present = self.profile[GOAL]
         changed = np.abs(stiffness - present) > _SAME * present
-        wrong = np.argwhere(changed & ~self._adjustable & walking[:, None])
-        if len(wrong):
-            robot, joint = (int(each) for each in wrong[0])
+        wrong = changed & ~self._adjustable & walking[:, None]
+        if wrong.any():
+            robot, joint = (int(each) for each in np.argwhere(wrong)[0])
             raise ParameterError(
                 f"the spring of joint {joint + 1} is not adjustable",
                 field="command.stiffness",

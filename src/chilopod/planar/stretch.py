@@ -26,9 +26,6 @@ WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
 """Largest bend of a yaw joint, rad: beyond it modules collide."""
 
-_A_GROUP, _GROUPS = LANES, 4
-"""Least number of robots in a group for a thread, and largest number of groups for each thread."""
-
 _WORTH_WAKING, _A_STEP = 2e-4, 2.5e-7
 """Least work for several threads, and approximate work of a step for one module in lanes, s."""
 
@@ -367,7 +364,7 @@ def carry(
     """
     what = (rows, pieces, robots, tolerance, states, step, status, record)
     threads = numba.get_num_threads()
-    groups = min(rows.size // _A_GROUP, _GROUPS * threads)
+    groups = min(rows.size // LANES, threads)  # each thread gets as many, whatever their size, and fills lanes anew
     if threads > 1 and groups > 1 and _work(rows, pieces, step) > _WORTH_WAKING:
         fits = walk(groups, *what)
     elif rows.size > 1:
@@ -379,6 +376,6 @@ def carry(
 
 
 def _work(rows: Any, pieces: Pieces, step: Any) -> float:
-    """Estimated time on one thread, s: at least one step in each piece, each as long as the last one."""
-    steps = pieces.widths.size * rows.size + (pieces.widths.sum() / np.maximum(step[rows], 1e-6)).sum()
+    """Estimated time on one thread, s: at least one step in each piece, each as long as the last one of a robot."""
+    steps = rows.size * (pieces.widths.size + pieces.widths.sum() / max(step[rows[0]], 1e-6))
     return float(_A_STEP * pieces.contact.shape[1] * steps)

@@ -30,7 +30,7 @@ traits = Traits(
     name="planar",
     sentence="the paper's planar model",
     exact=True,
-    robots_per_core=16,
+    robots_per_core=32,
     walks_per_round=48,
     duration_ratio=1.6,
 )
@@ -161,14 +161,15 @@ class PlanarWalk(BatchWalk):
         return self._observation(bearing, distance, states[:, 3 : n + 2])
 
     def pose(self) -> Array:
-        return self._seen()[:, 2 * self._modules + 1 :]
+        return self._seen(2 * self._modules + 1)
 
     def aim(self, target: ArrayLike) -> None:
         self._targets.move(self._time, target)
 
     def halt(self, which: NDArray[np.bool_]) -> None:
         marked = as_marks("which", which, len(self._robots))
-        self._arrive(marked)
+        for final, here in zip((self._states, self._step, self._status), self._now(), strict=True):
+            final[marked] = here[marked]
         marked &= self._status == stretch.WALKING
         self._status[marked] = stretch.HALTED
         if self._here is not None:
@@ -199,9 +200,9 @@ class PlanarWalk(BatchWalk):
             self._actuators.restart(marked)
 
     def command(self, command: Command) -> None:
-        *_, status = self._now()
-        self._actuators.command(self._time, command, status == stretch.WALKING)
-        self._arrive(np.ones(len(self._robots), dtype=np.bool_))
+        here = self._now()
+        self._actuators.command(self._time, command, here[-1] == stretch.WALKING)
+        self._states, self._step, self._status = here
         self._timeline.cut_at(self._time)
         self._here = None
 
@@ -257,19 +258,12 @@ class PlanarWalk(BatchWalk):
             self._carry(self._timeline.rest(self._time), *self._here)
         return self._here
 
-    def _seen(self) -> Array:
-        """Copy of the states at the present time, NaN for robots that no longer walk."""
+    def _seen(self, first: int = 0) -> Array:
+        """Copy of the states at the present time from a column on, NaN for robots that no longer walk."""
         states, _, status = self._now()
         # Failures are judged where the walk stops for good; a robot that cannot be integrated further has NaN.
         gone = (self._status != stretch.WALKING) | (status == stretch.DIVERGED)
-        return np.where(gone[:, None], np.nan, states)
-
-    def _arrive(self, which: NDArray[np.bool_]) -> None:
-        """Make the states at the present time final for some robots."""
-        if self._timeline.is_at_cut(self._time):
-            return
-        for mine, here in zip((self._states, self._step, self._status), self._now(), strict=True):
-            mine[which] = here[which]
+        return np.where(gone[:, None], np.nan, states[:, first:])
 
     def _carry(
         self,

@@ -5,7 +5,7 @@ from chilopod.steering.actuated import ActuatedAxis
 from chilopod.steering.course import COURSES, Course, Goal, course_named, random_course
 from chilopod.steering.criteria import Criteria, Outcome, arrivals, earliest_arrival, evaluate
 from chilopod.steering.leg_yaw import LegYawController
-from chilopod.steering.measures import of_course
+from chilopod.steering.measures import add_measures
 from chilopod.steering.radius_law import RadiusLaw
 from chilopod.steering.referee import CourseReferee, Judged, Verdict, decisions
 from chilopod.steering.shortest import shortest_path
@@ -44,12 +44,12 @@ __all__ = [
     "Strategy",
     "Target",
     "Verdict",
+    "add_measures",
     "arrivals",
     "course_named",
     "decisions",
     "earliest_arrival",
     "evaluate",
-    "of_course",
     "random_course",
     "shortest_path",
     "strategy_named",

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from chilopod.record import Array
-from chilopod.robot import Robot
 
-_OVER = ("robot", "goal")
-_READ = ("position", "leg_yaw", "joint_angle", "stiffness", "command_torque", "seen_joint_angles")
+_SAME_INSTANT = 1e-9  # s
+_NONE = np.zeros(0)
+_UNITS = {"path": "m", "effort": "rad^2*s", "spring_work": "J", "drive_work": "J"}
 
 
-def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Dataset:
-    """Record of one robot on a course, completed by :class:`chilopod.steering.CourseReferee`, up to its end, with
-    measures of every target; without variables over time and events if ``brief``.
+def lengths(data: xr.Dataset) -> dict[str, NDArray[np.intp]]:
+    """Numbers of samples, ``time``, and commands, ``event``, to the end of each robot's course, shape (robots,)."""
+    last = np.nanmax(data.goal_end.values, axis=1) + _SAME_INSTANT
+    commands = data.event.values if "event" in data.dims else _NONE
+    return {"time": np.searchsorted(data.time.values, last, "right"), "event": np.searchsorted(commands, last)}
 
-    The measures over (robot, goal) cover the time from the setting of a target to its end:
+
+def add_measures(data: xr.Dataset, period: float) -> None:
+    """Add measures of every target to the record of robots on courses, in place.
+
+    :class:`chilopod.steering.CourseReferee` has completed the record; ``period`` is that of the gait, s. The measures
+    over (robot, goal) cover the time from the setting of a target to its end:
 
     ``goal_path``
         Path length of module 1, m, from gait cycle to gait cycle; sway within a cycle is not counted.
@@ -27,26 +35,30 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
     ``goal_drive_work``
         Work of joint torques, joint by joint and command by command, where it is positive, J.
     """
-    begin, end = (record[f"goal_{name}"].values[0] for name in ("begin", "end"))
-    over = float(np.nanmax(end))
-    last = over + 1e-9
-    # The time that other robots of its batch walked on does not count.
-    data = (record[[name for name in _READ if name in record]] if brief else record).isel(
-        time=record.time.values <= last, **({"event": record.event.values < last} if "event" in record.dims else {})
+    place, yaw, angles = (data[name].values for name in ("position", "leg_yaw", "joint_angle"))
+    springs, torques, seen, commands = (
+        np.broadcast_to(data.stiffness.values, angles.shape),
+        angles[:0],
+        angles[:0],
+        _NONE,
     )
-    sums = {
-        "path": (_path(data, robot.gait.period), "m"),
-        "effort": (_effort(data), "rad^2*s"),
-        "spring_work": (_spring_work(data), "J"),
-        "drive_work": (_drive_work(data), "J"),
-    }
-    found = {}
-    for name, ((times, so_far), unit) in sums.items():
-        between = np.interp(end, times, so_far) - np.interp(begin, times, so_far)
-        found[f"goal_{name}"] = (_OVER, between[None], {"units": unit})
-    # All variables at once, because adding them one by one takes several times as long.
-    kept = record.drop_dims(["time", "event"], errors="ignore") if brief else data
-    return kept.assign(found).assign_attrs(duration=over)
+    if "command_torque" in data:
+        torques, seen, commands = (data[name].values for name in ("command_torque", "seen_joint_angles", "event"))
+    samples, counts = data.time.values, lengths(data)
+    found = np.empty((len(_UNITS), *data.goal_end.shape))
+    for robot, (begin, end) in enumerate(zip(data.goal_begin.values, data.goal_end.values, strict=True)):
+        # The time that other robots of its batch walked on does not count.
+        moving, told = ((slice(counts[name][robot]), robot) for name in ("time", "event"))
+        times = samples[moving[0]]
+        sums = (
+            _path(times, place[moving], period),
+            _effort(times, yaw[moving]),
+            _spring_work(times, angles[moving], springs[moving]),
+            _drive_work(commands[told[0]], seen[told], torques[told]),
+        )
+        found[:, robot] = [np.interp(end, *so_far) - np.interp(begin, *so_far) for so_far in sums]
+    for (name, unit), values in zip(_UNITS.items(), found, strict=True):
+        data[f"goal_{name}"] = (("robot", "goal"), values, {"units": unit})
 
 
 def _so_far(times: Array, steps: Array) -> tuple[Array, Array]:
@@ -54,35 +66,28 @@ def _so_far(times: Array, steps: Array) -> tuple[Array, Array]:
     return times, np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
 
 
-def _path(data: xr.Dataset, period: float) -> tuple[Array, Array]:
-    recorded = data.time.values
-    place = data.position.values[:, 0]
+def _path(recorded: Array, place: Array, period: float) -> tuple[Array, Array]:
     times = np.append(np.arange(recorded[0], recorded[-1], period), recorded[-1])
     known = np.isfinite(place[:, 0])
     at = np.stack([np.interp(times, recorded[known], each) for each in place[known].T], axis=1)
     return _so_far(times, np.linalg.norm(np.diff(at, axis=0), axis=1))
 
 
-def _effort(data: xr.Dataset) -> tuple[Array, Array]:
-    yaw = data.leg_yaw.values[:, 0]
+def _effort(times: Array, yaw: Array) -> tuple[Array, Array]:
     # Exact where the yaw is straight between samples.
     square = (yaw[1:] ** 2 + yaw[1:] * yaw[:-1] + yaw[:-1] ** 2).sum(axis=1) / 3.0
-    return _so_far(data.time.values, square * np.diff(data.time.values))
+    return _so_far(times, square * np.diff(times))
 
 
-def _spring_work(data: xr.Dataset) -> tuple[Array, Array]:
-    times = data.time.values
-    if "time" not in data.stiffness.dims:
-        return _so_far(times, np.zeros(len(times) - 1))
-    squares = 0.5 * data.joint_angle.values[:, 0] ** 2
-    work = 0.5 * (squares[1:] + squares[:-1]) * np.diff(data.stiffness.values[:, 0], axis=0)
+def _spring_work(times: Array, angles: Array, springs: Array) -> tuple[Array, Array]:
+    squares = 0.5 * angles**2
+    work = 0.5 * (squares[1:] + squares[:-1]) * np.diff(springs, axis=0)
     return _so_far(times, np.maximum(work, 0.0).sum(axis=1))
 
 
-def _drive_work(data: xr.Dataset) -> tuple[Array, Array]:
-    if "command_torque" not in data or len(data.event) < 2:
-        return _so_far(data.time.values[:1], np.zeros(0))
+def _drive_work(events: Array, seen: Array, torques: Array) -> tuple[Array, Array]:
+    if len(events) < 2:
+        return np.zeros(1), np.zeros(1)
     # A torque is held from one command to the next, so its work is exact.
-    moved = np.diff(data.seen_joint_angles.values[:, 0], axis=0)
-    work = data.command_torque.values[:-1, 0] * moved
-    return _so_far(data.event.values, np.maximum(work, 0.0).sum(axis=1))
+    work = torques[:-1] * np.diff(seen, axis=0)
+    return _so_far(events, np.maximum(work, 0.0).sum(axis=1))

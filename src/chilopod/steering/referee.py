@@ -25,6 +25,9 @@ LOOK = 0.1
 """Time between two looks at the positions of the robots, s, in which the paper's robot moves 6 mm."""
 
 
+_ROUNDING = 1e-9  # s
+
+
 class Verdict(Labelled):
     """Outcome of a target of a course; each member's ``sentence`` describes it in words."""
 
@@ -83,43 +86,49 @@ class CourseReferee:
         self._counts = np.array([len(each.goals) for each in courses])
         self._common = courses[0]
         self._number = np.full(robots, -1)
-        self._places = np.full((robots, most, 2), np.nan)
-        self._begin, self._end = np.full((2, robots, most), np.nan)
-        self._shortest, self._nearest = np.full((2, robots, most), np.nan)
+        self._places, self._seen_from = np.full((2, robots, most, 2), np.nan)
+        self._begin, self._end, self._nearest = np.full((3, robots, most), np.nan)
         self._verdicts = np.full((robots, most), "", dtype=object)
+        # Of the present target, NaN for robots without one: position, time of its setting, and least distance so far.
+        self._aims, (self._since, self._least) = np.full((robots, 2), np.nan), np.full((2, robots), np.nan)
+        self._present, self._first = -1, np.nan  # number of robots with a target, -1 before any; earliest setting, s
         self._seen_once = np.zeros(robots, dtype=np.bool_)
-        self._aims = np.full((robots, 2), np.nan)
         self._log: list[Observation] = []
 
     def look(self, walk: Walk) -> bool:
         """Judge the targets, set the next ones, halt finished robots; return True if any robot walks on."""
-        moved = self.judge(walk).moved
-        done = moved & ~self.busy
+        far = np.count_nonzero(self._away(walk.pose()) >= ARRIVAL_RADIUS)
+        if far == self._present > 0 and walk.time - self._first < self._common.patience - _ROUNDING:
+            return True  # nothing to judge, as nearly always
+        moved, busy = self.judge(walk).moved, self.busy
+        done = moved & ~busy
         if done.any():
             walk.halt(done)
-        return bool(self.busy.any())
+        return bool(busy.any())
 
     def judge(self, walk: Walk) -> Judged:
         """Judge the targets and set the next ones."""
         now, pose, begins = walk.time, walk.pose(), self._number < 0
-        busy = self.busy & ~begins
-        gone = busy & np.isnan(pose[:, 0])
-        rows, numbers = np.arange(len(pose)), np.minimum(self._number, self._places.shape[1] - 1)
-        away = np.hypot(*(self._places[rows, numbers] - pose[:, :2]).T)
-        self._nearest[rows[busy], numbers[busy]] = np.fmin(self._nearest[rows[busy], numbers[busy]], away[busy])
-        arrived = busy & (away < ARRIVAL_RADIUS)
-        over = busy & ~arrived & ~gone & (now - self._begin[rows, numbers] >= self._common.patience - 1e-9)
-        late, unseen = over & self._seen_once, over & ~self._seen_once
-        if gone.any() or arrived.any() or over.any():
-            self._judge(gone, now, Verdict.STOPPED)
-            self._judge(arrived, now, Verdict.ARRIVED)
-            self._judge(late, now, Verdict.LATE)
-            self._judge(unseen, now, Verdict.UNSEEN)
-            self._number[gone] = self._counts[gone]
-        judged = Judged(arrived, late, unseen, gone, begins)
-        if judged.moved.any():
-            self._next(walk, pose, judged.moved)
+        away = self._away(pose)
+        arrived, gone = away < ARRIVAL_RADIUS, np.isnan(away) & ~np.isnan(self._since)
+        over = (now - self._since >= self._common.patience - _ROUNDING) & ~(arrived | gone)
+        judged = Judged(arrived, over & self._seen_once, over & ~self._seen_once, gone, begins)
+        moved = judged.moved
+        self._judge(gone, now, Verdict.STOPPED)
+        self._judge(arrived, now, Verdict.ARRIVED)
+        self._judge(judged.late, now, Verdict.LATE)
+        self._judge(judged.unseen, now, Verdict.UNSEEN)
+        self._number[gone], self._since[gone] = self._counts[gone], np.nan
+        if moved.any():
+            self._next(walk, pose, moved)
+        self._present, self._first = int(np.count_nonzero(~np.isnan(self._since))), np.fmin.reduce(self._since)
         return judged
+
+    def _away(self, pose: Array) -> Array:
+        """Distance of the target, m, shape (robots,), NaN without one or without a walk; the least is kept."""
+        away: Array = np.hypot(*(self._aims - pose[:, :2]).T)
+        np.fmin(self._least, away, out=self._least)
+        return away
 
     def restart(self, which: NDArray[np.bool_], courses: Sequence[Course], missed: NDArray[np.bool_] | None) -> None:
         """Restart with robots that were restarted, by a mask of shape (robots,), each with a course, no longer than the
@@ -129,8 +138,10 @@ class CourseReferee:
         if self._missed is not None and missed is not None:
             self._missed[which] = missed
         self._number[which], self._verdicts[which], self._seen_once[which] = -1, "", False
-        for each in (self._places, self._begin, self._end, self._shortest, self._nearest, self._aims):
+        of_goals = self._places, self._seen_from, self._begin, self._end, self._nearest
+        for each in (*of_goals, self._aims, self._since, self._least):
             each[which] = np.nan
+        self._present = -1
 
     @property
     def aims(self) -> Array:
@@ -140,9 +151,8 @@ class CourseReferee:
     def time_left(self, now: float) -> Array:
         """Time to the end of the last target's patience if no target is reached, s, shape (robots,); 0 for finished
         robots."""
-        patience, number = self._common.patience, np.maximum(self._number, 0)
-        begin = self._begin[np.arange(len(number)), np.minimum(number, self._begin.shape[1] - 1)]
-        until = np.where(np.isnan(begin), now, begin) + patience * (self._counts - number)
+        begin = np.where(np.isnan(self._since), now, self._since)
+        until = begin + self._common.patience * (self._counts - np.maximum(self._number, 0))
         return np.where(self.busy, until - now, 0.0)
 
     @property
@@ -177,7 +187,7 @@ class CourseReferee:
         for name, values, unit in (
             ("begin", self._begin, "s"),
             ("end", self._end, "s"),
-            ("shortest", self._shortest, "m"),
+            ("shortest", shortest_path(self._seen_from, self._common.tightest), "m"),
             ("nearest", self._nearest, "m"),
         ):
             data[f"goal_{name}"] = (over, values, {"units": unit})
@@ -188,26 +198,25 @@ class CourseReferee:
                 data[f"seen_{name}"] = (("event", "robot", *dims), shown, {"units": unit})
 
     def _judge(self, which: NDArray[np.bool_], now: float, verdict: Verdict) -> None:
-        for robot in np.flatnonzero(which).tolist():
-            number, count = self._number[robot], self._counts[robot]
-            self._end[robot, number], self._verdicts[robot, number] = now, verdict.label
-            if verdict is Verdict.STOPPED:
-                self._verdicts[robot, number + 1 : count] = verdict.label
+        robots = np.flatnonzero(which)
+        present = robots, self._number[robots]
+        self._end[present], self._nearest[present], self._verdicts[present] = now, self._least[robots], verdict.label
+        if verdict is Verdict.STOPPED:
+            for robot in robots.tolist():
+                self._verdicts[robot, self._number[robot] + 1 : self._counts[robot]] = verdict.label
 
     def _next(self, walk: Walk, pose: Array, which: NDArray[np.bool_]) -> None:
         """Set the next target that can be reached."""
         now, most = walk.time, self._common.patience * self._speed
+        self._aims[which], self._since[which], self._least[which] = np.nan, np.nan, np.nan
         for robot in np.flatnonzero(which).tolist():
-            self._aims[robot] = np.nan
             for number in range(self._number[robot] + 1, len(self._courses[robot].goals)):
                 place = self._courses[robot].goals[number].place(pose[robot : robot + 1])[0]
                 bearing, away = bearing_and_distance(pose[robot, :2], pose[robot, 2], place)
-                seen_from = away * np.array([np.cos(bearing), np.sin(bearing)])
-                path = float(shortest_path(seen_from, self._common.tightest))
-                self._number[robot], self._places[robot, number] = number, place
-                self._begin[robot, number], self._shortest[robot, number] = now, path
+                self._seen_from[robot, number] = away * np.cos(bearing), away * np.sin(bearing)
+                self._number[robot], self._places[robot, number], self._begin[robot, number] = number, place, now
                 if away - ARRIVAL_RADIUS <= most:
-                    self._aims[robot] = place
+                    self._aims[robot], self._since[robot] = place, now
                     break
                 self._end[robot, number], self._verdicts[robot, number] = now, Verdict.TOO_FAR.label
             else:

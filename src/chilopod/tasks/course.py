@@ -71,7 +71,7 @@ class Driver(Short):
 @dataclass(frozen=True)
 class Driven(Pathed):
     """Walks along a course by a driver, with their trials and records, each up to its end, see
-    :func:`chilopod.steering.of_course`."""
+    :func:`chilopod.steering.add_measures`."""
 
     driver: Driver
     records: tuple[xr.Dataset, ...]

@@ -12,10 +12,11 @@ import xarray as xr
 from chilopod.cores import cores
 from chilopod.engine import Walk, engine_named, event_times, steer
 from chilopod.errors import AnalysisError
-from chilopod.steering import CourseReferee, Target, of_course
+from chilopod.steering import CourseReferee, Target, add_measures
+from chilopod.steering.measures import lengths
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
 from chilopod.trials.disturbance import Drawn, conditions, draw
-from chilopod.trials.record_check import check_finite, check_record
+from chilopod.trials.record_check import check_record
 from chilopod.trials.trial import Trial
 
 NOT_KEPT = "not kept"
@@ -62,10 +63,8 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     data = check_record(walk.to_dataset(), walk, trials, drawn)
     if referee is not None:
         referee.add_to(data, walk)
-    records = _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)
-    if referee is None:
-        return records
-    return [of_course(record, trial.robot, trial.brief) for record, trial in zip(records, trials, strict=True)]
+        add_measures(data, first.robot.gait.period)
+    return _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)
 
 
 def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], CourseReferee | None]:
@@ -119,18 +118,21 @@ def _doubts(trial: Trial) -> str:
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
-    """Records of single robots."""
+    """Records of single robots, each up to the end of its course."""
+    counts = lengths(data) if trials[0].course else {}
+    ends = np.nanmax(data.goal_end.values, axis=1) if counts else np.full(len(trials), data.attrs["duration"])
+    if trials[0].brief:
+        data, counts = data.drop_dims(["time", "event"], errors="ignore"), {}
     # Numbering each robot 0 afterwards would take longer than everything else.
     data = data.assign_coords(robot=np.zeros(len(trials), dtype=np.int64))
     records = []
     for index, trial in enumerate(trials):
-        view = data.isel(robot=slice(index, index + 1))
+        own = {"robot": slice(index, index + 1), **{name: slice(count[index]) for name, count in counts.items()}}
+        view = data.isel(own, missing_dims="ignore")
         # Numbers that lie otherwise in memory are added up in another order: sums have the same bits whether a walk was
         # one of many, alone, or read.
-        values = {str(name): np.ascontiguousarray(each.values) for name, each in view.data_vars.items()}
-        check_finite(values, trial.engine)
-        record = view.copy(data=values)
-        record.attrs = {**data.attrs, "robot": file_text(trial.robot), "trial": trial.text}
+        record = view.copy(data={name: np.ascontiguousarray(each.values) for name, each in view.data_vars.items()})
+        record.attrs |= {"duration": float(ends[index]), "robot": file_text(trial.robot), "trial": trial.text}
         records.append(record)
     return records
 

@@ -38,21 +38,6 @@ def check_record(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence
     return data
 
 
-def check_finite(values: Mapping[str, Any], engine: str) -> None:
-    """Raise AnalysisError unless a robot's variables by name, shape (times, 1, ...), are finite while it walks, and NaN
-    from some sample on if it failed or was halted."""
-    label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
-    count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)
-    for name in MOTION:
-        if count == len(there) and np.isfinite(values[name].sum()):  # as nearly always
-            continue
-        finite = np.isfinite(values[name][:, 0]).reshape(len(there), -1).all(axis=1)
-        if not finite[:count].all() or finite[count:].any():
-            raise _refused(
-                f"{name} of a robot with status {label} must be finite while it walks and NaN afterwards", engine
-            )
-
-
 def _refused(wrong: str, engine: str) -> AnalysisError:
     return AnalysisError(f"must return the records of the trials it received: {wrong}", field=f"engine {engine}")
 
@@ -125,6 +110,14 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
     for name, each in data.data_vars.items():
         if name != "status" and (np.abs(each.values) > LARGEST).any():
             return f"{name} has numbers beyond {LARGEST:g}"
+    there = np.isfinite(data["heading"].values)
+    counts = np.where(np.array(status) == Status.WALKED.label, len(there), there.sum(axis=0))
+    walks = np.arange(len(there))[:, None] < counts
+    for name in MOTION:
+        fits = np.isfinite(data[name].values) == walks.reshape(*walks.shape, *[1] * (data[name].ndim - 2))
+        if not fits.all():
+            label = status[int(np.argwhere(~fits)[0, 1])]
+            return f"{name} of a robot with status {label} must be finite while it walks and NaN afterwards"
     angle, heading, position, yaw = (data[name].values[0] for name in ("joint_angle", "heading", "position", "leg_yaw"))
     places = data["target"].transpose(..., "robot", "axis").values if isinstance(first.target, Target) else None
     springs = data["stiffness"].transpose(..., "robot", "joint").values.reshape(-1, *data["joint_angle"].shape[1:])[0]

@@ -79,7 +79,7 @@ def driven(context: Context, cases: Sequence[Case], seeds: Sequence[int], progre
 
     Returns
     -------
-    Dataset over (case, course, goal): ``arrived``, ``seconds`` (s), and as :func:`chilopod.steering.of_course` has them
+    Dataset over (case, course, goal): ``arrived``, ``seconds`` (s), and, as in :func:`chilopod.steering.add_measures`,
     ``goal_path`` and ``goal_shortest`` (m), ``goal_effort`` (rad^2 s), ``goal_spring_work`` and ``goal_drive_work``
     (J); over (course, goal): ``bearing`` (rad) and ``away`` (m) of the target when its turn comes.
     """
