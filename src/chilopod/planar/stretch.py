@@ -375,12 +375,8 @@ def carry(
     else:
         fits = walk_alone(*what)
     if not fits:
-        raise ParameterError(
-            "must fit the number of modules and walks",
-            field="states",
-            value=states.shape,
-            allowed="the shapes that carry() documents",
-        )
+        said = "must fit the number of modules and walks"
+        raise ParameterError(said, field="states", value=states.shape, allowed="the shapes that carry() documents")
 
 
 def _work(rows: Any, pieces: Pieces, step: Any) -> float:

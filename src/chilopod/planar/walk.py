@@ -102,12 +102,8 @@ def start(
     tolerance, expected = in_range("tolerance", tolerance, 1e-2), check_wishes(record, expected)
     given = as_robots(robots)
     if record is not None and record.poses:
-        raise ParameterError(
-            "must be False: the planar model has no poses in space",
-            field="poses",
-            value=True,
-            allowed="False, or the engine twin",
-        )
+        said = "must be False: the planar model has no poses in space"
+        raise ParameterError(said, field="poses", value=True, allowed="False, or the engine twin")
     if any(common(robot) != common(given[0]) for robot in given[1:]):
         raise ParameterError("must have the same gait and number of modules", field="robots")
     standing_still = initial_states(given[0])

@@ -81,19 +81,11 @@ def normal_form(
     scale: ArrayLike | None = None,
     orbit_error: float | None = None,
 ) -> NormalForm:
-    """Normal form on the centre manifold of a critical orbit.
+    """Normal form on the centre manifold of a critical orbit, from the return map of several states, shape (k, n).
 
-    Parameters
-    ----------
-    mapped, at
-        Return map of several states, shape (k, n), and the critical orbit.
-    noise, uncertainty
-        Relative errors of the map, beside round-off and the noise of the samples, and of its derivative.
-    scale
-        Sizes of the states, shape (n,), where the search for an amplitude starts; by default the size of the orbit.
-    orbit_error
-        Error of the orbit along the mode; by default from its residual and the noise, large near a singular
-        H - 1.
+    ``noise`` and ``uncertainty`` are relative errors of the map, beside round-off and the noise of the samples, and of
+    its derivative; ``scale`` has sizes of the states, shape (n,), where the search for an amplitude starts (by default
+    the size of the orbit); ``orbit_error`` is that along the mode (by default from its residual and the noise).
     """
     values, errors = _uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
     own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
