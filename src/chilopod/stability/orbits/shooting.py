@@ -205,7 +205,7 @@ class _Equations:
         if system.symmetry is not None:
             for last in (self._ends, self._factors, self._by_time, self._by_value):
                 last[-1] = system.symmetry @ last[-1]
-        self._off = self._ends - np.roll(self.nodes.states, -1, axis=0)
+        self._off = self._ends - (nodes.states if m == 1 else np.roll(self.nodes.states, -1, axis=0))
         sizes, x = frame.sizes, nodes.states[0]
         if free is None and x.any():
             sizes = np.maximum(sizes, np.maximum(np.abs(nodes.states), np.abs(self._ends)).max(axis=0))

@@ -230,9 +230,9 @@ def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: f
         what = "(state, derivative, error)" if with_error else "(state, derivative)"
         raise ParameterError(f"must return {what}", field="flow", value=type(found).__name__)
     state, derivative = found[:2]
-    if type(state) is type(derivative) is np.ndarray and not with_error:  # the usual case, as fast as can be
-        if state.shape == (n,) and derivative.shape == (n, n) and state.dtype == derivative.dtype == np.float64:
-            return found
+    usual = type(state) is type(derivative) is np.ndarray and state.dtype == derivative.dtype == np.float64
+    if usual and not with_error and state.shape == (n,) and derivative.shape == (n, n):
+        return found
     shapes = [np.shape(each) for each in found]
     if shapes[:2] != [(n,), (n, n)] or shapes[2:] not in ([], [()], [(n, n)]):
         said = f"gives shapes {' and '.join(map(str, shapes))}"
