@@ -2,13 +2,24 @@
 they touch and no more."""
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Budget, Ending, PeriodicSystem, follow, from_rhs, locate
+from chilopod.stability import (
+    Budget,
+    Ending,
+    PeriodicSystem,
+    exponents,
+    find_orbit,
+    follow,
+    from_rhs,
+    locate,
+    multipliers,
+)
 from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
@@ -240,3 +251,29 @@ def test_the_first_orbit_is_within_the_time():
     ):
         with pytest.raises(SpentError, match="the time limit is reached"):
             search()
+
+
+@pytest.mark.parametrize("guess", [[1e8, 1e8, 1e8], [1e8, 0.0, 0.0]])
+def test_a_hopeless_guess_is_refused_after_one_flow(guess):
+    def lorenz(t, x):
+        return [10.0 * (x[1] - x[0]), 24.0 * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
+
+    with pytest.raises(AnalysisError, match=r"^orbit: the motion from the guess takes too many steps"):
+        multipliers(from_rhs(lorenz, 3, None, guess_period=0.6), guess)
+
+
+def test_time_limits_reach_flows_of_the_user_and_settling():
+    """Without a limit this search would take hundreds of flows."""
+    asked = []
+
+    def flow(x, t0, t1):
+        asked.append(t0)
+        time.sleep(0.01)
+        return x + 1.0 + np.sin(37.0 * x), np.eye(1)
+
+    system = PeriodicSystem(1, 1.0, flow, scale=[1.0])
+    for search in (multipliers, exponents, find_orbit):
+        asked.clear()
+        with pytest.raises(SpentError, match="the time limit is reached"):
+            search(system, [0.5], seconds=0.05)
+        assert len(asked) < 20

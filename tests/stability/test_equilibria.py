@@ -449,7 +449,7 @@ class TestRefusals:
         [
             (lambda m: from_rhs(lambda t, x: [x[1] ** 2 + 1.0, x[0]], 2, None, guess_period=1.0), [0.1, 0.0],
              AnalysisError, "no equilibrium found"),
-            (lambda m: from_rhs(lambda t, x: [x[1], -x[0] + np.cos(t)], 2, 6.0), [0.1, 0.0],
+            (lambda m: from_rhs(lambda t, x: [x[1], -x[0] + np.cos(t)], 2, 2 * np.pi), [0.1, 0.0],
              ParameterError, "must not depend on time"),
             (oscillator, [np.nan, 0.0], ParameterError, "must be finite"),
             (oscillator, [0.0], ParameterError, "wrong shape"),

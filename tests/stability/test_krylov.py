@@ -33,14 +33,14 @@ def leading(generator, count):
 @pytest.mark.parametrize(
     "system",
     [
-        from_rhs(lambda t, x: np.array([x[1], -x[0] - 0.1 * np.sign(x[1]) + np.cos(3 * t), x[0] * x[2]]), 3, 2.0),
+        from_rhs(lambda t, x: np.array([x[1], -x[0] - 0.1 * np.sign(x[1]) + np.cos(np.pi * t), x[0] * x[2]]), 3, 2.0),
         from_rhs(
             lambda t, x: np.array([x[1], -9.81 + 0.0 * x[0], np.sin(x[0])]),
             3,
             2.0,
             events=[Event(lambda t, x: x[0], lambda t, x: np.array([x[0], -0.8 * x[1], x[2] + x[1]]), -1)],
         ),
-        from_rhs(lambda t, x: np.array([x[1], np.floor(3 * x[0]), (t % 0.3) * x[0]]), 3, 2.0),
+        from_rhs(lambda t, x: np.array([x[1], np.floor(3 * x[0]), (t % 0.4) * x[0]]), 3, 2.0),
     ],
     ids=["switch", "impact", "steps"],
 )

@@ -7,12 +7,15 @@ import pytest
 
 from chilopod.errors import ParameterError
 from chilopod.stability import (
+    PeriodicSystem,
     find_orbit,
+    follow,
     from_map,
     from_rhs,
     locate,
     multipliers,
     proceed,
+    sweep,
     switch,
     switch2,
 )
@@ -59,6 +62,35 @@ def test_the_derivative_is_within_its_bound():
         *(
             (lambda s=s: locate(logistic, (2.5, 3.2), [0.6], seconds=s), r"seconds.*: must be a number of seconds")
             for s in (-1.0, math.nan, "3", True)
+        ),
+        *(
+            (lambda b=b: locate(logistic, (2.5, 3.2), [0.6], budget=b), r"budget.*: must be a whole number")
+            for b in (-1, 0, 2.5, "x", None, math.inf, [])
+        ),
+        *(
+            (lambda o=o: follow(logistic, [0.6], (2.5, 3.2), **o), f"{next(iter(o))}.*: must be {said}")
+            for o, said in (
+                ({"budget": -1}, "a whole number"),
+                ({"progress": 3}, "a function"),
+                ({"precision": 0}, "positive"),
+                ({"step": "1"}, "a number"),
+                ({"longest": None}, "a number|finite"),
+                ({"closely": 1}, "a truth value"),
+            )
+        ),
+        (lambda: locate(logistic(2.5), (2.5, 3.2), [0.6]), r"family = .*: must be a function"),
+        (lambda: locate(lambda p: 3, (2.5, 3.2), [0.6]), r"family = 2.5: must return a system, not int"),
+        (lambda: follow(logistic, [0.6], {1.0, 2.0}), r"between = .*: must be numbers"),
+        (lambda: multipliers(logistic(2.5), [[0.6], [0.7, 0.8]]), r"orbit = .*: must be numbers"),
+        (lambda: multipliers(logistic(2.5), [10**400]), r"orbit = .*: must be numbers"),
+        (lambda: find_orbit(logistic(2.5), [0.6], section=3), r"section = 3: must be a section"),
+        (lambda: find_orbit(logistic(2.5), [0.6], budget=3), r"budget = 3: must be a budget"),
+        (lambda: PeriodicSystem(1, "1", lambda x, t0, t1: x), r"period = '1': must be a number"),
+        (lambda: multipliers(PeriodicSystem(1, 1.0, lambda x, t0, t1: None), [0.5]), r"flow = 'NoneType': must return"),
+        (lambda: sweep(3), r"systems = 3: must be a list"),
+        (
+            lambda: from_rhs(lambda t, x: [x[1], -x[0] + np.cos(1.3 * t)], 2, 2 * math.pi),
+            r"period = 6.28.*: must be a period of the right-hand side",
         ),
     ],
 )

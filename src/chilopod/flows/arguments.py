@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array, read_only
 
+LARGEST = 1_000_000
+"""Largest number of states."""
+
 _COARSEST = 1e-3
 SIZES = (1e-6, 1e-3, 1.0, 1e3)
 _SAME = 1e-6
@@ -25,12 +28,7 @@ def checked_arguments(
     """Check dimension, args and tolerance."""
     if not callable(rhs):
         raise ParameterError("must be a function", field="rhs", value=rhs, allowed="rhs(t, x, *args)")
-    try:
-        size = operator.index(dimension)  # type: ignore[arg-type]
-    except TypeError:
-        size = 0
-    if size < 1:
-        raise ParameterError("must be a whole number", field="dimension", value=dimension, allowed="1 or more")
+    size = checked_count("dimension", dimension, LARGEST)
     if not isinstance(args, tuple):
         raise ParameterError("must be a tuple", field="args", value=args, allowed="such as (0.5,)")
     error = float(finite_array(tolerance, (), "tolerance"))
@@ -39,14 +37,12 @@ def checked_arguments(
     return size, args, error
 
 
-def checked_duration(field: str, value: object) -> float:
-    """A period, or a guess of it, as a positive number."""
-    if value is None:
-        raise ParameterError("must be given", field=field, value=None, allowed="about the period of the orbit")
-    duration = float(finite_array(value, (), field))
-    if not duration > 0:
+def positive(field: str, value: object) -> float:
+    """A positive finite number."""
+    number = float(finite_array(value, (), field))
+    if not number > 0:
         raise ParameterError("must be positive and finite", field=field, value=value)
-    return duration
+    return number
 
 
 def checked_count(field: str, value: object, most: int) -> int:
@@ -62,10 +58,14 @@ def checked_count(field: str, value: object, most: int) -> int:
 
 def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
     """``value`` as finite numbers in an array of the given shape."""
+    what = "must be numbers" if shape else "must be a number"
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError("must be numbers", field=field, value=value) from None
+        array = np.array(value)
+        if array.dtype.kind not in "iufO":
+            raise TypeError("strings, truth values, complex numbers or dates")
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(what, field=field, value=value) from None
     if array.shape != shape:
         raise ParameterError("has the wrong shape", field=field, value=array.shape, allowed=str(shape))
     if not np.isfinite(array).all():
@@ -121,6 +121,13 @@ Slopes = Callable[[Array, Array], Array]
 """``slopes(times, states) -> dx/dt``, shapes (samples,), (n, samples) and (n, samples); NaN where undefined."""
 
 
+_SYMMETRIES = {
+    "period": ("period", "T with f(t + T, x) = f(t, x); a function of one period takes t % T"),
+    "symmetry": ("symmetry", "S with S f(t, x) = f(t + T/2, S x)"),
+    "spatial_symmetry": ("symmetry", "P with P f(t, x) = f(t, P x)"),
+}
+
+
 @functools.lru_cache
 def _waves(n: int) -> Array:
     """Displacements of all sizes, two of each, shape (n, 2 sizes)."""
@@ -131,7 +138,8 @@ def _waves(n: int) -> Array:
 def check_symmetry(
     field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
 ) -> None:
-    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes."""
+    """Test S f(t, x) = f(t + shift, S x) at some times, modulo the period, and states of all sizes: a wrong symmetry
+    would give wrong multipliers without an error. A period is the symmetry S = 1 with itself as the shift."""
     x = np.tile(base[:, None] + _waves(base.size), times.size)
     t = np.repeat(times, x.shape[1] // times.size)
     both = slopes(np.concatenate([t, (t + shift) % period]), np.concatenate([x, matrix @ x], axis=1))
@@ -145,11 +153,9 @@ def check_symmetry(
     largest = np.where(np.isfinite(terms), terms, 0.0).reshape(alike).max(axis=(1, 3), keepdims=True)
     wrong = (off.reshape(alike) > _SAME * largest).reshape(off.shape).any(axis=0)
     if wrong.any():
-        raise ParameterError(
-            f"must be a symmetry of the right-hand side, but fails at t = {t[wrong][0]:g}",
-            field=field,
-            allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
-        )
+        what, allowed = _SYMMETRIES[field]
+        said = f"must be a {what} of the right-hand side, but fails at t = {t[wrong][0]:g}"
+        raise ParameterError(said, field=field, value=shift if field == "period" else None, allowed=allowed)
 
 
 def check_timeless(slopes: Slopes, base: Array, duration: float) -> None:

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import numbers
-from chilopod.flows.carrying import pieces
+from chilopod.flows.carrying import TooManySteps, pieces
 from chilopod.flows.jumps import UndeclaredSwitch, longest_step
 from chilopod.frozen import Array
 
@@ -32,6 +32,7 @@ _DIFFERENCE_FLOOR = 1e-8
 _SMALL = 1e-4
 _DISAGREES = 1e-5
 _MOST_CALLS = 2_000_000
+_PATIENCE, _HOPELESS = 50_000, 4.0  # calls, and factor on the largest number beyond which no more are tried
 
 
 class NotAnalytic(UserWarning):
@@ -174,12 +175,11 @@ class CalledFlow:
         def finite(t: float, y: Array) -> Array:
             nonlocal calls
             calls += 1
-            if calls > _MOST_CALLS:
-                raise AnalysisError(
-                    f"takes too many steps: the integration stopped at t = {t:g}",
-                    field="rhs",
-                    allowed="a less stiff right-hand side, or one without branches, which can be traced",
-                )
+            ahead = calls * (b - a) > _HOPELESS * _MOST_CALLS * (t - a)  # at the mean length of the steps so far
+            if calls > _MOST_CALLS or (calls > _PATIENCE and ahead):
+                said = f"takes too many steps: the integration stopped at t = {t:g}"
+                allowed = "a less stiff right-hand side, or one without branches, which can be traced"
+                raise TooManySteps(said, field="rhs", allowed=allowed)
             if ended[0] != 0.0:
                 raise deadline.over()
             t, state = min(max(t, inner_a), inner_b), y[:n].copy()
@@ -205,10 +205,8 @@ class CalledFlow:
             max_step=longest_step(self.fast, float(self.edges[-1]), a, b),
         )
         if not answer.success:
-            raise AnalysisError(
-                f"the integration from {a:g} to {b:g} stopped: the motion is singular, or jumps with the state",
-                field="rhs",
-            )
+            said = f"the integration from {a:g} to {b:g} stopped: the motion is singular, or jumps with the state"
+            raise AnalysisError(said, field="rhs")
         return np.asarray(answer.y)
 
 

@@ -24,16 +24,14 @@ class SpentError(AnalysisError):
 
 
 class Deadline:
-    """A time limit; within its context a flow ends at the limit, even inside an integration.
-
-    It is given in s from now, infinite for none; time that numba spends compiling is not counted.
-    """
+    """A time limit, s from now, infinite for none; within its context a flow ends at the limit, even inside an
+    integration. Time that numba spends compiling is not counted."""
 
     def __init__(self, seconds: float = math.inf) -> None:
         given: object = seconds
         if isinstance(given, bool) or not isinstance(given, Real) or not seconds >= 0.0:
             raise ParameterError("must be a number of seconds", field="seconds", value=seconds, allowed="0 or more")
-        self._ends = _now() + seconds
+        self._ends = _now() + (seconds if seconds < threading.TIMEOUT_MAX else math.inf)
         self._stop = np.zeros(1)
         self._token: Token[Array | None] | None = None
         self._timer: threading.Timer | None = None
@@ -68,25 +66,23 @@ class Deadline:
         if self.late:
             self._stop[0] = 1.0
             return
-        self._timer = threading.Timer(min(max(self._ends - _now(), 0.0) + 1e-3, threading.TIMEOUT_MAX), self._wait)
+        self._timer = threading.Timer(max(self._ends - _now(), 0.0) + 1e-3, self._wait)
         self._timer.daemon = True
         self._timer.start()
 
 
 def stop() -> Array:
-    """Flag for compiled code, shape (1,): not zero once the limit is reached.
-
-    Raises
-    ------
-    SpentError
-        If the limit is reached already.
-    """
+    """Flag for compiled code, shape (1,): not zero once the limit is reached; a SpentError if it is already."""
+    check()
     found = _STOP.get()
-    if found is None:
-        return np.zeros(1)
-    if found[0] != 0.0:
+    return np.zeros(1) if found is None else found
+
+
+def check() -> None:
+    """Raise a SpentError if the limit is reached."""
+    found = _STOP.get()
+    if found is not None and found[0] != 0.0:
         raise over()
-    return found
 
 
 def over() -> SpentError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -34,10 +35,10 @@ class Event:
     direction: int = 0
 
     def __post_init__(self) -> None:
-        for name, value in (("guard", self.guard), ("reset", self.reset or self.guard)):
+        for name, value in (("guard", self.guard), ("reset", self.guard if self.reset is None else self.reset)):
             if not callable(value):
                 raise ParameterError("must be a function", field=name, value=value, allowed=f"{name}(t, x, *args)")
-        if self.direction not in (-1, 0, 1):
+        if not (isinstance(self.direction, Real) and self.direction in (-1, 0, 1)):
             raise ParameterError("must be -1, 0 or 1", field="direction", value=self.direction)
 
 

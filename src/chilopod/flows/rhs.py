@@ -83,7 +83,8 @@ class RightHandSide:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
-        if self.method not in get_args(Method):
+        method: object = self.method
+        if not (isinstance(method, str) and method in get_args(Method)):
             raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
         self.dimension, self.args, self.tolerance = checked_arguments(
             self.rhs, self.dimension, self.args, self.tolerance
@@ -264,7 +265,7 @@ def _edges(switch_times: Sequence[float], period: float) -> Array:
     try:
         switches = np.unique(np.array(switch_times, dtype=np.float64))
         valid = np.ndim(switch_times) == 1 and bool(((switches >= 0) & (switches < period)).all())
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         valid = False
     if not valid:
         raise ParameterError(

@@ -41,12 +41,8 @@ class Chains(NamedTuple):
 
 @lru_cache(maxsize=256)
 def pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Cut [t0, t1] at the switches.
-
-    Returns
-    -------
-    Start of each piece in its contact interval, s, its duration, s, and the number of the interval in the period.
-    """
+    """Pieces of [t0, t1] between switches: starts in their contact intervals, s, durations, s, and numbers of the
+    intervals in the period."""
     if not (np.isfinite(t0) and np.isfinite(t1) and t0 <= t1):
         raise ParameterError("must be finite and ascending", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
     period = gait.period

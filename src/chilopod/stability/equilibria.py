@@ -15,12 +15,13 @@ import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import finite_array
+from chilopod.flows.arguments import finite_array, numbers
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.normal_forms.extrapolation import radii, series
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality
+from chilopod.stability.problem.arguments import check_system, system_of
 from chilopod.stability.problem.budget import UserCode
 from chilopod.stability.problem.capabilities import (
     Autonomous,
@@ -134,13 +135,14 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
 
 def equilibrium_at(family: Family, value: float, guess: ArrayLike) -> tuple[Autonomous, Equilibrium]:
     """The system of a family at a value of the parameter, and its equilibrium near a guess."""
+    system = autonomous(system_of(family, value))
     with UserCode("family", value):
-        system = autonomous(family(value))
         return system, find_equilibrium(system, guess)
 
 
 def autonomous(system: SystemLike) -> Autonomous:
     """Check that a system does not depend on time."""
+    check_system(system)
     if not is_autonomous(system):
         raise ParameterError("must not depend on time", field="system", allowed="period=None, and no t in the function")
     return system
@@ -193,7 +195,7 @@ def _solved(matrix: Array, right: Array, units: Array) -> Array:
 
 def _velocity(system: Autonomous, x: Array) -> Array:
     with np.errstate(all="ignore"):
-        return np.asarray(system.velocity(np.array(x)), dtype=np.float64)
+        return numbers(system.velocity(np.array(x)), x.shape, "velocity")
 
 
 def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
@@ -302,11 +304,8 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
     over the root of that of the parameter, shape (n,)."""
     rate = point.rate
     if rate is None or point.criticality in (None, Criticality.UNDECIDED):
-        raise ParameterError(
-            "is a Hopf point whose coefficients leave the side of its cycles undecided",
-            field="point",
-            value=point.value,
-        )
+        said = "is a Hopf point whose coefficients leave the side of its cycles undecided"
+        raise ParameterError(said, field="point", value=point.value)
     here, _ = equilibrium_at(family, point.value, point.orbit)
     form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
     units = numerical_balance(linear_part(here, point.orbit)[1])

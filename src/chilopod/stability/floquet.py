@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -11,10 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.cores import cores
+from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
+from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
+from chilopod.stability.problem.arguments import check_system
 from chilopod.stability.problem.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
 from chilopod.stability.problem.returns import return_maps
 from chilopod.stability.problem.system import PeriodicSystem
@@ -149,7 +153,9 @@ def full_period(nu: ComplexArray, error: Array, k: int, state: Array, period: fl
     return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), errors, state, period)
 
 
-def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int | None = None) -> Multipliers:
+def multipliers(
+    system: SystemLike, orbit: ArrayLike | None = None, leading: int | None = None, *, seconds: float = math.inf
+) -> Multipliers:
     """Floquet multipliers of a periodic orbit.
 
     Parameters
@@ -162,14 +168,20 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
         Number of largest multipliers, counted with multiplicity, or one more to complete a pair; all by default. For
         100 states or more and a system with ``flow_tangents`` (any right-hand side that can be traced) they take no
         derivative of the flow as a matrix.
+    seconds
+        Time, s, after which the search for the orbit, or for leading multipliers, ends.
 
     Raises
     ------
     AnalysisError
         If no orbit is found.
     """
+    if seconds != math.inf:
+        with Deadline(seconds):
+            return multipliers(system, orbit, leading)
     if leading is None:
         return _multipliers(find_orbit(system, orbit))
+    check_system(system)
     count = checked_count("leading", leading, system.dimension - (system.period is None))
     if flows_tangents(system) and system.dimension >= LARGE:
         image, size = find_large_orbit(system, orbit)
@@ -198,6 +210,10 @@ def _leading_of(every: Multipliers, count: int) -> tuple[Multipliers, float]:
 
 def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
     """Multipliers of many systems at their known orbits, on all cores if the systems allow it."""
+    if not isinstance(systems, Sequence):
+        raise ParameterError("must be a list", field="systems", value=systems, allowed="a list of systems")
+    for system in systems:
+        check_system(system)
     if not systems:
         return []
     if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
@@ -213,9 +229,15 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
     ]
 
 
-def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
-    """All Floquet exponents and modes, the strongly damped ones included: the state space is split along the factors of
-    the period, so a multiplier of 1e-60 has the same relative accuracy as one of 0.5."""
+def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: float = math.inf) -> Exponents:
+    """All Floquet exponents and modes, the strongly damped ones included; arguments as for :func:`multipliers`.
+
+    The state space is split along the factors of the period, so a multiplier of 1e-60 has the same relative accuracy as
+    one of 0.5.
+    """
+    if seconds != math.inf:
+        with Deadline(seconds):
+            return exponents(system, orbit)
     found = find_orbit(system, orbit)
     image = found.image
     if is_stiff(system, found.state, image.period / image.returns):

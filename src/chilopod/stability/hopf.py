@@ -23,10 +23,10 @@ from chilopod.stability.branches.fold import Fold
 from chilopod.stability.crossing_points.place import Course, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
+from chilopod.stability.problem.arguments import check_arguments, checked_interval
 from chilopod.stability.problem.budget import UserCode
 from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.problem.system import PeriodicSystem
-from chilopod.stability.search.locate import checked_interval
 from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
@@ -91,6 +91,7 @@ def locate_hopf(
         If no equilibrium is found at the lower end of the interval, or ``family`` raises an exception there.
     """
     low, high = checked_interval(between)
+    check_arguments(family=family, budget=budget)
     family = functools.lru_cache(_KEPT)(family)
     system, start = equilibrium_at(family, low, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)

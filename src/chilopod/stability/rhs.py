@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.flows.arguments import check_symmetry, checked_duration
+from chilopod.flows.arguments import check_symmetry, positive
 from chilopod.flows.events import Event
 from chilopod.flows.rhs import TOLERANCE, Method, RightHandSide
 from chilopod.stability.problem.capabilities import spatial_symmetries
 from chilopod.stability.problem.system import PeriodicSystem
+
+_TIMES = np.array([0.01, 0.023])  # in periods: just after its start, as a pulse may be given for one period alone
 
 
 def from_rhs(
@@ -81,7 +83,7 @@ def from_rhs(
         If the derivative of such a function needs differences.
     """
     autonomous = period is None
-    length = checked_duration("guess_period" if autonomous else "period", guess_period if autonomous else period)
+    length = positive("guess_period" if autonomous else "period", guess_period if autonomous else period)
     given = RightHandSide(
         rhs, dimension, length, autonomous, args, events, switch_times, jacobian, orbit, method, tolerance
     )
@@ -97,6 +99,8 @@ def from_rhs(
         orbit=given.start,
         **rest,
     )
+    if not autonomous:
+        check_symmetry("period", np.eye(given.dimension), length, slopes, _TIMES * length, given.base, np.inf)
     if not given.events:  # a symmetry would also have to hold for these
         if system.symmetry is not None:
             shift = 0.0 if autonomous else length / system.symmetry_order

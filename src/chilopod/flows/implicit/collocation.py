@@ -28,6 +28,7 @@ from chilopod.flows.carrying import BUDGET, DONE, NOT_FINITE, STALLED, TIME_OVER
 from chilopod.flows.implicit.stages import Problem, Step, estimated, stages, turn
 from chilopod.flows.tracing.series import loaded, slope_at
 
+_PATIENCE, _HOPELESS = 2048, 16.0  # steps, and factor on the budget, beyond which the mean step is hopelessly short
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
 
@@ -152,7 +153,8 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
                 h = min(t1 - t, 1.0 / rate) if rate > 0.0 else t1 - t
             fresh = False
         steps += 1
-        if steps > control.most_steps:
+        far = steps * (t1 - interval.t0) > _HOPELESS * control.most_steps * (t - interval.t0)
+        if steps > control.most_steps or (steps > _PATIENCE and far):
             status = BUDGET
             break
         if control.stop[0] != 0.0:

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.flows.arguments import checked_count
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
@@ -26,6 +25,7 @@ from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.arguments import check_arguments, checked_interval
 from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
@@ -155,7 +155,7 @@ class Branch(Result):
             Number of the state, from 0.
         """
         values, orbits = map(np.array, columns(self.points, "value", "orbit").values())
-        if state not in range(orbits.shape[1]):
+        if not (isinstance(state, Real) and state in range(orbits.shape[1])):
             raise ParameterError("must be a state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
         axes, color, state = axes_for(axes), None, int(state)
         for verdict, first, last in self._stretches():
@@ -230,8 +230,8 @@ def follow(
         If no orbit is found at the start.
     """
     low, high = _checked(between, points, longest)
-    if not step > 0:
-        raise ParameterError("must be positive", field="step", value=step)
+    options: dict[str, object] = {"closely": closely, "precision": precision, "budget": budget, "progress": progress}
+    check_arguments(family=family, step=step, symmetric=symmetric, **options)
     allowed = Budget(budget, seconds)
     curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=allowed)
     with allowed:
@@ -277,14 +277,13 @@ def proceed(
         As :func:`follow`, and if the branch ends at an end of the interval.
     """
     low, high = _checked(between, points, longest)
+    check_arguments(family=family, closely=closely, precision=precision, budget=budget, progress=progress)
     if not isinstance(branch, Branch):
         raise ParameterError("must be a branch", field="branch", value=branch, allowed="a Branch from `follow`")
     end = branch.points[-1]
     if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
-        raise ParameterError(
-            "must extend beyond the branch's last point", field="between", value=between,
-            allowed=f"an interval around {end.value!r}",
-        )  # fmt: skip
+        said = "must extend beyond the branch's last point"
+        raise ParameterError(said, field="between", value=between, allowed=f"an interval around {end.value!r}")
     orbits: dict[str, Any] = {"periods": branch.periods, "symmetric": branch.symmetric, "precision": precision}
     allowed = Budget(budget, seconds)
     curve = Curve(family, branch.scale, branch.sizes, between=between, budget=allowed, **orbits)
@@ -298,16 +297,11 @@ def proceed(
 
 
 def _checked(between: tuple[float, float], points: int | None, longest: float) -> tuple[float, float]:
-    low, high = between
-    if not (np.isfinite(low) and np.isfinite(high) and low < high and np.isfinite(high - low)):
-        raise ParameterError("must rise from a lower to a higher finite value", field="between", value=between)
+    low, high = checked_interval(between)
     if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
         raise ParameterError("is too narrow for double precision", field="between", value=between)
-    if points is not None:
-        checked_count("points", points, sys.maxsize)
-    if not longest > 0:
-        raise ParameterError("must be positive", field="longest", value=longest)
-    return float(low), float(high)
+    check_arguments(points=points, longest=longest)
+    return low, high
 
 
 def _anchored(
@@ -315,12 +309,10 @@ def _anchored(
 ) -> Anchor:
     """Anchor of the first step; the curve gets the sizes of its states."""
     if isinstance(start, BifurcationPoint):
-        raise ParameterError(
-            "is a bifurcation point", field="start", value=start.kind.label, allowed="a start from `switch`"
-        )
+        said = "is a bifurcation point"
+        raise ParameterError(said, field="start", value=start.kind.label, allowed="a start from `switch`")
     if not isinstance(start, Start | BranchPoint):
-        guess = start.state if isinstance(start, Orbit) else start
-        start = begin(family, low, guess, symmetric=curve.symmetric)
+        start = begin(family, low, start, symmetric=curve.symmetric)
     if not curve.between[0] <= start.value <= curve.between[1]:
         raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
     if isinstance(start, Start):

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import checked_count, finite_array
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.flows.arguments import finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
@@ -18,6 +18,7 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.orbits.orbit import bounded, find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.arguments import check_arguments, system_of
 from chilopod.stability.problem.budget import UserCode
 from chilopod.stability.problem.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
 from chilopod.stability.problem.returns import Section, returned_states, whole_period
@@ -28,7 +29,6 @@ Array = NDArray[np.float64]
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
 
-_MOST_PERIODS = 1000
 _RESTS = 0.01  # distance, relative to each state, within which a failed guess counts as an equilibrium
 _BESIDE = 1e-3  # step of second differences, in units
 _SINGULAR = 1e-9  # singular value, relative to the largest, below which another curve crosses
@@ -115,10 +115,10 @@ def begin(
     AnalysisError
         If there is no orbit near the guess, or ``family`` raises an exception.
     """
-    periods = checked_count("periods", periods, _MOST_PERIODS)
-    (value,) = finite_array([value], (1,), "value").tolist()
+    check_arguments(family=family, rising=rising, periods=periods, symmetric=symmetric)
+    value = float(finite_array(value, (), "value"))
     with Deadline(seconds), UserCode("family", value):
-        system = family(value)
+        system = system_of(family, value)
         guess = known_state(system) if orbit is None else orbit
         studied = system if symmetric else whole_period(system, periods)
         try:
@@ -127,27 +127,27 @@ def begin(
             _check_moving(system, guess)
             raise
     period = found.period if is_autonomous(system) else None
-    return Start(float(value), found.state, rising, periods=periods, period=period)
+    return Start(value, found.state, rising, periods=periods, period=period)
 
 
 def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
     """Check that a guess of an orbit is not an equilibrium, a frequent mistake."""
     if not is_autonomous(system):
         return
-    x = np.asarray(guess, dtype=np.float64)
     try:
+        x = finite_array(guess, (system.dimension,), "orbit")
         rest = find_equilibrium(system, x).state
-    except AnalysisError:
+    except ChilopodError:
         return
     if (np.abs(x - rest) <= _RESTS * np.maximum(np.abs(x), np.abs(rest))).all():
-        raise AnalysisError(
-            "is an equilibrium, not an orbit",
-            field="orbit",
-            allowed="a state on an orbit; locate_hopf, then switch, find the cycles of an equilibrium",
-        )
+        said = "is an equilibrium, not an orbit"
+        allowed = "a state on an orbit; locate_hopf, then switch, find the cycles of an equilibrium"
+        raise AnalysisError(said, field="orbit", allowed=allowed)
 
 
-def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: int = 1) -> tuple[Start, ...]:
+def switch(
+    family: Family, point: BifurcationPoint | BranchPoint, *, periods: int = 1, seconds: float = math.inf
+) -> tuple[Start, ...]:
     """The starts of the branches that leave a bifurcation point.
 
     Parameters
@@ -158,6 +158,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         Located point, special point on a branch, or Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
         Number of the systems' periods in one period of the old branch's orbits.
+    seconds
+        Time, s, after which the search for an orbit ends.
 
     Returns
     -------
@@ -171,7 +173,11 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     ParameterError
         If no branch that can be followed leaves the point, or it is not a special point.
     """
-    old, periods = None, checked_count("periods", periods, _MOST_PERIODS)
+    if seconds != math.inf:
+        with Deadline(seconds):
+            return switch(family, point, periods=periods)
+    check_arguments(family=family, periods=periods)
+    old = None
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
             raise ParameterError("must be a special point", field="point", value=point.value)
@@ -186,10 +192,12 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         value, cycle, outward = hopf_cycle(family, point)
         return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
     modes = point.mode.real[None] if point.modes is None else point.modes.real.T
-    system = family(point.value)
     period = None
-    if is_autonomous(system):
-        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False, shortest=periods == 1).period
+    with UserCode("family", point.value):
+        system = system_of(family, point.value)
+        if is_autonomous(system):
+            whole = whole_period(system, periods)
+            period = find_orbit(whole, point.orbit, with_error=False, shortest=periods == 1).period
     if kind is Kind.PERIOD_DOUBLING:
         twice = None if period is None else 2.0 * period
         return tuple(
@@ -286,9 +294,8 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     units = curve.units(n)
     matrix = curve.matrix(image.jacobian, derivative, np.zeros(n + 1))[:-1]
     if not np.isfinite(matrix).all():
-        raise AnalysisError(
-            "the flow is not finite at neighbouring values of the parameter", field="start", allowed="another value"
-        )
+        said = "the flow is not finite at neighbouring values of the parameter"
+        raise AnalysisError(said, field="start", allowed="another value")
     if start.mode is None:
         tangent = _along(matrix, start.rising)
         if start.outward is not None and float(tangent[:-1] @ (start.outward / units[:-1])) < 0.0:
@@ -316,11 +323,8 @@ def _along(matrix: Array, rising: bool) -> Array:
     """Unit null vector of a matrix, shape (n, n+1)."""
     _, values, rows = np.linalg.svd(matrix)
     if values[-1] <= _SINGULAR * max(1.0, float(values[0])):
-        raise AnalysisError(
-            "branches meet here: the orbit alone does not determine one",
-            field="start",
-            allowed="another value, or switch from the located point",
-        )
+        said = "branches meet here: the orbit alone does not determine one"
+        raise AnalysisError(said, field="start", allowed="another value, or switch from the located point")
     tangent: Array = rows[-1]
     # At a fold the parameter does not rise: the largest part of the state gives the direction.
     along = tangent[-1] if abs(tangent[-1]) > IN_FOLD else tangent[np.abs(tangent).argmax()]

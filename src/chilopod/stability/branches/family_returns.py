@@ -10,17 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, UserCode
 from chilopod.stability.problem.capabilities import Family, FlowsEach, SystemLike, returns_per_period
 from chilopod.stability.problem.returns import (
-    CUTS,
     ReturnMap,
     Section,
-    carried,
+    in_parts,
     return_map,
     returned_states,
     section_at,
-    turned,
     whole_period,
 )
 
@@ -71,8 +70,7 @@ class FamilyReturns:
         """The family's system and the system under study."""
         known = self._known.get(value)
         if known is None:
-            with UserCode("family", value):
-                own = self._family(value)
+            own = system_of(self._family, value)
             self._dimension = self._dimension or own.dimension
             if own.dimension != self._dimension:
                 raise AnalysisError(
@@ -131,12 +129,9 @@ class FamilyReturns:
     def noise(self, x: Array, value: float, section: Section | None) -> float:
         """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
         image, system = self.image(x, value, section), self.system(value)
-        duration, passing = image.period / image.returns, x[None]
-        times = [part * duration for part in CUTS] + [duration]
         with UserCode("flow", value):
-            for a, b in zip(times, times[1:], strict=False):
-                passing = carried(system, passing, a, b)
-        return float(np.abs((turned(system, passing)[0] - image.state) / self.units(x.size)[:-1]).max())
+            other = in_parts(system, x, image.period / image.returns)
+        return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
     def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
         """True if a system implements ``FlowsEach``; cached for each class, as the test is slower than some flows."""

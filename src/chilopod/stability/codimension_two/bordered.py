@@ -25,6 +25,7 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
+from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, UserCode
 from chilopod.stability.problem.capabilities import KnowsOrbit, Scaled, SystemLike
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
@@ -153,9 +154,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
-        first, second = float(values[0]), float(values[1])
-        with UserCode("family", (first, second)):
-            return self._family2(first, second)
+        return system_of(self._family2, *values.tolist())
 
     def begin(self, place: Place) -> Spot:
         """The point of the curve nearest to a place beside it."""

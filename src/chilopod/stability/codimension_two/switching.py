@@ -18,10 +18,11 @@ from chilopod.frozen import Array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, across, critical
-from chilopod.stability.codimension_two.two_parameters import BUDGET, checked_box, over_periods
+from chilopod.stability.codimension_two.two_parameters import BUDGET, over_periods
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
 from chilopod.stability.normal_forms.normal_form import Quintic
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
 from chilopod.stability.problem.budget import Budget, SpentError
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
@@ -80,6 +81,7 @@ def switch2(
     if kind is None:
         why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, from which no curve can be followed")
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
+    check_arguments(family2=family2, budget=budget)
     allowed = Budget(budget, seconds)
     periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
     folds = CriticalCurve(over_periods(family2, periods), 1, False, box, allowed)
@@ -116,7 +118,7 @@ class _Unfolding:
 
 
 def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, budget: Budget) -> _Unfolding:
-    system = family2(*point.values.tolist())
+    system = system_of(family2, *point.values.tolist())
     targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
     target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
     equations = CriticalCurve(family2, target, knows_orbit(system), box, budget)

@@ -13,11 +13,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from chilopod.errors import ParameterError
-from chilopod.frozen import Array
+from chilopod.flows.arguments import finite_array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, Station
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
 from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.returns import return_duration, whole_period
 from chilopod.stability.problem.scales import sizes
@@ -41,7 +42,7 @@ def follow2(
     *,
     second: float | None = None,
     rising: bool | None = None,
-    points: int = 100,
+    points: int | None = 100,
     step: float = 0.01,
     longest: float = 0.05,
     coefficients: bool = True,
@@ -66,7 +67,7 @@ def follow2(
     rising
         True to start towards rising q, False towards falling q, None for both in one curve; unused from `switch2`.
     points
-        Largest number of points in each direction.
+        Largest number of points in each direction; None for any number.
     step, longest
         First and largest step along the curve, in units of the box and of the states.
     coefficients
@@ -85,9 +86,8 @@ def follow2(
         If no point of a curve is found at the start.
     """
     box = checked_box(between)
-    for name, number in (("points", points), ("step", step), ("longest", longest), ("budget", budget)):
-        if not number > 0:
-            raise ParameterError("must be positive", field=name, value=number)
+    check_arguments(family2=family2, points=points, step=step, longest=longest, budget=budget, progress=progress)
+    check_arguments(coefficients=coefficients, rising=True if rising is None else rising)
     outward, periods = None, 1
     if isinstance(start, Start2):
         outward, periods, second = start.outward, start.periods, start.second
@@ -96,7 +96,7 @@ def follow2(
         raise ParameterError("must be a located point", field="start", value=start, allowed="a point from `locate`")
     if second is None:
         raise ParameterError("must be given", field="second", allowed="the value of q at the start")
-    values = np.array([start.value, second], dtype=np.float64)
+    values = np.array([start.value, finite_array(second, (), "second")], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
         raise ParameterError("must hold the start", field="between", value=between, allowed=f"around {values}")
     target, known = _what(family2, start, second)
@@ -125,19 +125,6 @@ def follow2(
         return _joined(start.kind, origin, half(-upward) if rising is None else nothing, ahead)
 
 
-def checked_box(between: object) -> Array:
-    """Intervals of both parameters, shape (2, 2)."""
-    try:
-        box = np.array(between, dtype=np.float64)
-    except (TypeError, ValueError):
-        box = np.zeros(0)
-    if box.shape != (2, 2) or not (np.isfinite(box).all() and (box[:, 0] < box[:, 1]).all()):
-        raise ParameterError(
-            "must be two intervals", field="between", value=between, allowed="((p_low, p_high), (q_low, q_high))"
-        )
-    return box
-
-
 def over_periods(family2: Family2, periods: int) -> Family2:
     """The same systems for orbits over several periods, or without their symmetry in time."""
     return lambda p, q: whole_period(family2(p, q), periods)
@@ -145,7 +132,7 @@ def over_periods(family2: Family2, periods: int) -> Family2:
 
 def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
     """The critical multiplier, 0 for a pair, and True if the orbit is known."""
-    system = family2(start.value, second)
+    system = system_of(family2, start.value, second)
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
     if start.kind is Kind.KREIN_COLLISION:
@@ -157,11 +144,9 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     if target < 0 or start.kind is Kind.FOLD or known:
         return target, known
     if not reverses(system, start.mode, sizes(system, start.orbit, return_duration(system))):
-        raise ParameterError(
-            f"is a {start.kind.label} that the second parameter unfolds",
-            field="start",
-            allowed="a point that spatial_symmetry preserves, or systems with a known orbit",
-        )
+        said = f"is a {start.kind.label} that the second parameter unfolds"
+        allowed = "a point that spatial_symmetry preserves, or systems with a known orbit"
+        raise ParameterError(said, field="start", allowed=allowed)
     return target, known
 
 

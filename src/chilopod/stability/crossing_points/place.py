@@ -3,6 +3,7 @@ multiplier +1 of the return map H, where H - 1 is singular, place and orbit are 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -40,12 +41,12 @@ class Sample(ReadOnlyArrays):
     orbit: Array
     image: ReturnMap
 
-    @property
+    @functools.cached_property
     def off_plus_one(self) -> float:
         """Distance of the return map's multipliers from +1, without the one along the motion."""
         return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
 
-    @property
+    @functools.cached_property
     def beside_plus_one(self) -> float:
         """Signed distance of the nearest real multiplier from +1; NaN if a pair is nearer."""
         off = return_multipliers(self.image) - 1.0

@@ -12,8 +12,14 @@ from scipy.interpolate import CubicSpline
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
-from chilopod.stability.problem.capabilities import Autonomous, SystemLike, is_autonomous, returns_per_period
-from chilopod.stability.problem.returns import carried, checked_flow, return_duration, returned_states
+from chilopod.stability.problem.capabilities import (
+    Autonomous,
+    SystemLike,
+    checked_flow,
+    is_autonomous,
+    returns_per_period,
+)
+from chilopod.stability.problem.returns import carried, return_duration, returned_states
 from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
@@ -35,15 +41,20 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     if hasattr(guess, "coords") and "time" in guess.coords:
         guess = guess.coords["time"].values, guess.values
     n, whole = system.dimension, return_duration(system) * returns_per_period(system)
-    if isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[1]) == 2:
-        states = finite_array(guess[1], (len(guess[1]), n), "orbit")
-        times = finite_array(guess[0], (len(states),), "orbit")
-    elif np.ndim(guess) == 2:
-        states = finite_array(guess, (np.shape(guess)[0], n), "orbit")
+    timed = isinstance(guess, tuple) and len(guess) == 2 and hasattr(guess[1], "__len__")
+    times, states = guess if timed else (None, guess)
+    try:
+        shape = np.shape(states)
+    except ValueError:  # rows of different lengths
+        return None
+    if len(shape) != 2:
+        return None
+    states = finite_array(states, (shape[0], n), "orbit")
+    if timed:
+        times = finite_array(times, shape[:1], "orbit")
+    else:
         states = np.vstack([states, states[:1]])
         times = np.linspace(0.0, whole, len(states))
-    else:
-        return None
     if len(states) < _FEWEST_ROWS:
         raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
     if not (np.diff(times) > 0.0).all():

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
+import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import finite_array
+from chilopod.flows.arguments import finite_array, positive
+from chilopod.flows.carrying import TooManySteps
+from chilopod.flows.deadline import Deadline
 from chilopod.frozen import ReadOnlyArrays, in_one_line
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, shot
+from chilopod.stability.problem.arguments import check_arguments, check_system
 from chilopod.stability.problem.budget import Budget, SpentError
 from chilopod.stability.problem.capabilities import (
     FlowsTangents,
@@ -28,11 +32,11 @@ from chilopod.stability.problem.capabilities import (
     spatial_symmetries,
 )
 from chilopod.stability.problem.returns import (
-    CUTS,
     REPEATED,
     ReturnMap,
     Section,
     carried,
+    in_parts,
     return_duration,
     return_map,
     section_at,
@@ -87,6 +91,10 @@ class Orbit(Shown, ReadOnlyArrays):
             return None
         return Section(self.state, self.image.normal, self.image.period / self.image.returns)
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        """The state, so that an orbit serves wherever a guess of one is wanted."""
+        return np.array(self.state, dtype=dtype)
+
     def _lines(self) -> list[str]:
         return [
             f"Orbit: period {self.period:.10g}, {self.image.returns} return{'s' * (self.image.returns > 1)} in it",
@@ -99,9 +107,8 @@ def known_state(system: SystemLike) -> Array:
     """The system's own state on its orbit; an AnalysisError if it has none."""
     orbit = known_orbit(system)
     if orbit is None:
-        raise AnalysisError(
-            "this system has no known periodic orbit", field="orbit", allowed="a first guess of the orbit"
-        )
+        said = "this system has no known periodic orbit"
+        raise AnalysisError(said, field="orbit", allowed="a first guess of the orbit")
     return np.asarray(orbit, dtype=np.float64)
 
 
@@ -113,6 +120,8 @@ def find_orbit(
     settle: bool = True,
     budget: Budget | None = None,
     shortest: bool = True,
+    *,
+    seconds: float = math.inf,
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
@@ -121,16 +130,17 @@ def find_orbit(
     period that branches off at a period doubling does not close earlier.)
 
     If Newton's method fails at the guess, it is tried from a state further along the motion, provided that every state
-    may be time 0, and then after the motion has settled on an attracting orbit.
+    may be time 0, and then after the motion has settled on an attracting orbit. A guess whose motion takes too many
+    steps of the integration is refused at once.
 
     Parameters
     ----------
     system
         System; one that knows its orbit needs no guess.
     guess
-        State at time 0 near the orbit, shape (n,); or a whole orbit near it, for multiple shooting: states at even
-        times over one period, shape (times, n), or times and states, shapes (times,) and (times, n), as a tuple or an
-        ``xarray.DataArray`` over ``time``. The result then has the period of the guess.
+        State at time 0 near the orbit, shape (n,), or an :class:`Orbit`; or a whole orbit near it, for multiple
+        shooting: states at even times over one period, shape (times, n), or times and states, shapes (times,) and
+        (times, n), as a tuple or an ``xarray.DataArray`` over ``time``. The result then has the period of the guess.
     with_error
         True to bound errors.
     section
@@ -142,14 +152,23 @@ def find_orbit(
         Budget of return maps: up to 60 are taken for every start of Newton's method, and 100 for settling.
     shortest
         True to find the shortest period, if no section is given.
+    seconds
+        Time, s, after which the search ends.
 
     Raises
     ------
     AnalysisError
-        If no start converges.
+        If no start converges, or the budget or the time is spent.
     """
-    if not hasattr(system, "flow"):
-        raise ParameterError("must be a system", field="system", value=system, allowed="a system from `from_rhs`")
+    if seconds != math.inf:
+        with Deadline(seconds):
+            return find_orbit(system, guess, with_error, section, settle, budget, shortest)
+    check_system(system)
+    check_arguments(with_error=with_error, settle=settle, shortest=shortest)
+    if not isinstance(budget, Budget | None):
+        raise ParameterError("must be a budget", field="budget", value=budget, allowed="Budget(allowed), or None")
+    if section is not None:
+        _check_section(section, system)
     if guess is None:
         return from_known(system, known_state(system), with_error, budget=budget)
     whole = whole_orbit(guess, system)
@@ -163,16 +182,33 @@ def find_orbit(
         return _shortest(system, found, with_error, budget) if shortened else found
     except SpentError:
         raise
+    except TooManySteps as error:
+        allowed = "a guess closer to the orbit and its period, or method='implicit' for a stiff system"
+        said = f"the motion from the guess {error.problem}"
+        raise TooManySteps(said, field="orbit", allowed=allowed) from error
     except AnalysisError as failed:
         if not settle:
             raise
         if budget is not None:
             budget.take(_SETTLING)
         for nearer, careful in nearer_orbits(system, x):
-            with contextlib.suppress(AnalysisError):
+            try:
                 found = _solved(system, nearer, with_error, budget, careful=careful)
                 return _shortest(system, found, with_error, budget) if shortened else found
+            except SpentError:
+                raise
+            except AnalysisError:
+                continue
         raise failed
+
+
+def _check_section(section: object, system: SystemLike) -> None:
+    if not isinstance(section, Section) or not is_autonomous(system):
+        allowed = "a Section, for a system that does not depend on time"
+        raise ParameterError("must be a section", field="section", value=section, allowed=allowed)
+    for name in ("point", "normal"):
+        finite_array(getattr(section, name), (system.dimension,), f"section.{name}")
+    positive("section.duration", section.duration)
 
 
 def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
@@ -202,6 +238,8 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
         duration /= parts
         try:
             orbit = _solved(system, Nodes(orbit.state[None], duration), with_error, budget)
+        except SpentError:
+            raise
         except AnalysisError:
             break
         duration = orbit.period / orbit.image.returns
@@ -248,11 +286,9 @@ def from_known(
         return Orbit(x, image, np.zeros(x.size))
     if off <= _KNOWN:
         return _solved(system, Nodes(x[None], return_duration(system)), with_error, budget)
-    raise AnalysisError(
-        f"must be a periodic orbit: one return moves the state by {float(moved.max()):.1e}",
-        field="orbit",
-        allowed="a state on the orbit at time 0, or a first guess, which is then improved",
-    )
+    said = f"must be a periodic orbit: one return moves the state by {float(moved.max()):.1e}"
+    allowed = "a state on the orbit at time 0, or a first guess, which is then improved"
+    raise AnalysisError(said, field="orbit", allowed=allowed)
 
 
 def _relative(values: Array, size: Array) -> float:
@@ -292,11 +328,8 @@ def _solved(
 def _found(system: SystemLike, x: Array, duration: float, size: Array, with_error: bool) -> Orbit:
     """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states."""
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
-        raise AnalysisError(
-            "the corrector found an equilibrium near the guess",
-            field="orbit",
-            allowed="a guess closer to an orbit",
-        )
+        said = "the corrector found an equilibrium near the guess"
+        raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         return _bounded(system, x, duration)
     image = return_map(system, x, False, section_at(system, x, duration=duration))
@@ -334,7 +367,7 @@ def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None 
         flow = _matrix(image.error, size) @ size
         stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():
-            twice = REPEATED * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
+            twice = REPEATED * np.abs(in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
             flow = flow + twice if stiff else np.minimum(flow, twice)
         wrong = np.abs(image.state - x) + flow
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
@@ -344,13 +377,6 @@ def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None 
     beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
     bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / _BESIDE)
     return Orbit(x, replace(image, error=_matrix(image.error, size) + bend), error)
-
-
-def _in_parts(system: SystemLike, x: Array, duration: float) -> Array:
-    """Return of a state, by other steps than those of the flow over the whole return."""
-    for part, following in itertools.pairwise((*CUTS, 1.0)):
-        x = carried(system, x[None], part * duration, following * duration)[0]
-    return np.asarray(turned(system, x[None])[0])
 
 
 def _matrix(error: float | Array, size: Array) -> Array:

@@ -9,6 +9,7 @@ Problems*, section 4.3), the time to that at which the return ends on the sectio
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -20,8 +21,8 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.convergence import NODES, RETURN
 from chilopod.stability.problem.budget import Budget, SpentError
-from chilopod.stability.problem.capabilities import Autonomous, SystemLike, is_autonomous
-from chilopod.stability.problem.returns import Section, carried, checked_flow, crossing, section_at
+from chilopod.stability.problem.capabilities import Autonomous, SystemLike, checked_flow, is_autonomous
+from chilopod.stability.problem.returns import Section, carried, crossing, section_at
 
 Array = NDArray[np.float64]
 
@@ -103,23 +104,11 @@ def shot(
 ) -> Closed:
     """The orbit near some nodes, by Newton's method, damped while the parameter is given.
 
-    Parameters
-    ----------
-    system_at, start
-        System at a value of the parameter, and guess.
-    sizes
-        Sizes of the states, shape (n,); they grow with the states while the parameter is given.
-    section
-        Section of the first state, for a system without a period of its own; else None.
-    free
-        Equation for the parameter; None for a given one.
-        shared
-        Basis of the space of the first state's corrections, shape (n, k); None for all.
-        budget
-        Budget, from which every evaluation takes a return.
-        careful
-        True to take short steps and a free return time until the motion nearly closes; a single node's motion then need
-        not return to the section.
+    ``sizes`` of the states, shape (n,), grow with these while the parameter is given. The first state has a ``section``
+    if the system has no period of its own. ``free`` is the equation for the parameter, None for a given one. ``shared``
+    is a basis of the space of the first state's corrections, shape (n, k). Every evaluation takes a return of the
+    budget. With ``careful`` the steps are short and the return time is free until the motion nearly closes; a single
+    node's motion then need not return to the section.
     """
     equations = _Equations(
         _Problem(system_at, free, shared, budget, careful), start, _Frame(sizes, sizes, section, careful)
@@ -151,11 +140,8 @@ def shot(
             correction = equations.correction(equations, cutoff)
         else:
             break
-    raise AnalysisError(
-        f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)",
-        field="orbit",
-        allowed="a guess closer to the orbit",
-    )
+    said = f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)"
+    raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
 
 
 @dataclass(frozen=True)
@@ -219,7 +205,7 @@ class _Equations:
         if system.symmetry is not None:
             for last in (self._ends, self._factors, self._by_time, self._by_value):
                 last[-1] = system.symmetry @ last[-1]
-        self._off = self._ends - np.roll(self.nodes.states, -1, axis=0)
+        self._off = self._ends - (nodes.states if m == 1 else np.roll(self.nodes.states, -1, axis=0))
         sizes, x = frame.sizes, nodes.states[0]
         if free is None and x.any():
             sizes = np.maximum(sizes, np.maximum(np.abs(nodes.states), np.abs(self._ends)).max(axis=0))
@@ -231,7 +217,9 @@ class _Equations:
         self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
         self._frame = frame._replace(sizes=sizes, reach=np.minimum(sizes, frame.reach))
         if not np.isfinite(self.residual):
-            raise AnalysisError("the motion is not finite between two nodes", field="orbit")
+            lost = np.flatnonzero(~np.isfinite(self._ends).all(axis=1))
+            where = f"node {lost[0]} of {m}: " if lost.size else ""
+            raise AnalysisError(f"{where}the motion is not finite between two nodes", field="orbit")
 
     @property
     def astray(self) -> bool:
@@ -262,7 +250,7 @@ class _Equations:
         if not frame.astray:
             try:
                 near = replace(frame.section, duration=duration)
-                start, rest, (before, first) = crossing(system, x, near, system.flow)
+                start, rest, (before, first) = crossing(system, x, near, functools.partial(checked_flow, system))
                 self._ends[0], second = checked_flow(system, before, 0.0, rest)
                 self._factors[0] = second @ first
                 self.nodes, self._returned = replace(self.nodes, duration=start + rest), True

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
 
-from chilopod.errors import AnalysisError, ChilopodError, in_words
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words
 from chilopod.flows.deadline import Deadline, SpentError, over
 
 __all__ = ["Budget", "SpentError", "UserCode", "UserError"]
@@ -47,6 +48,9 @@ class Budget(Deadline):
 
     def __init__(self, allowed: float, seconds: float = math.inf) -> None:
         super().__init__(seconds)
+        given: object = allowed
+        if isinstance(given, bool) or not (isinstance(given, Real) and allowed >= 0):
+            raise ParameterError("must be a number", field="allowed", value=allowed, allowed="0 or more")
         self.left = allowed
 
     @property
@@ -55,13 +59,7 @@ class Budget(Deadline):
         return self.left <= 0 or self.late
 
     def take(self, count: int = 1) -> None:
-        """Count flows before they are computed.
-
-        Raises
-        ------
-        SpentError
-            If too few are left.
-        """
+        """Count flows before they are computed; a SpentError if too few are left."""
         if self.left <= 0:
             raise SpentError("the budget of flows is spent", field="budget")
         if self.late:

@@ -12,11 +12,14 @@ derivative has the derivative of state i with respect to state j at the start in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, Self, TypeGuard, runtime_checkable
+from typing import Any, Protocol, Self, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows import deadline
+from chilopod.flows.arguments import numbers
 from chilopod.flows.implicit.flow import Stretched
 
 Array = NDArray[np.float64]
@@ -215,6 +218,27 @@ def flows_states(system: SystemLike) -> TypeGuard[FlowsStates]:
 def flows_tangents(system: SystemLike) -> TypeGuard[FlowsTangents]:
     """True if a system carries directions instead of the full derivative."""
     return getattr(system, "flow_tangents", None) is not None
+
+
+def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: float, with_error: bool = False) -> Any:
+    """The flow and its derivative of the right shapes, with the system's own bound on its error if wanted; a SpentError
+    after a time limit."""
+    deadline.check()
+    flow: Any = getattr(system, "flow_with_error" if with_error else "flow")
+    found, n = flow(np.array(x), t0, t1), x.size  # a system may write into its argument
+    if not (isinstance(found, tuple | list) and len(found) == 2 + with_error):
+        what = "(state, derivative, error)" if with_error else "(state, derivative)"
+        raise ParameterError(f"must return {what}", field="flow", value=type(found).__name__)
+    state, derivative = found[:2]
+    usual = type(state) is type(derivative) is np.ndarray and state.dtype == derivative.dtype == np.float64
+    if usual and not with_error and state.shape == (n,) and derivative.shape == (n, n):
+        return found
+    shapes = [np.shape(each) for each in found]
+    if shapes[:2] != [(n,), (n, n)] or shapes[2:] not in ([], [()], [(n, n)]):
+        said = f"gives shapes {' and '.join(map(str, shapes))}"
+        raise AnalysisError(said, field="flow", allowed=f"({n},) and ({n}, {n})")
+    parts = [numbers(each, shape, "flow") for each, shape in zip(found, shapes, strict=True)]
+    return tuple(each if each.ndim else float(each) for each in parts)
 
 
 def known_orbit(system: SystemLike) -> Array | None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.flows.arguments import checked_count, finite_array, numbers
+from chilopod.flows.arguments import LARGEST, checked_count, numbers
 from chilopod.stability.problem.system import PeriodicSystem
 
 Array = NDArray[np.float64]
@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 _SHAKE = 2.0**-52
 _OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _ROUNDING = 8.0 * float(np.finfo(float).eps)
-_LARGEST = 100_000
 
 
 def from_map(
@@ -47,16 +46,15 @@ def from_map(
     """
     if not callable(image):
         raise ParameterError("must be a function", field="image", value=image, allowed="image(x)")
-    n = checked_count("dimension", dimension, _LARGEST)
+    n = checked_count("dimension", dimension, LARGEST)
 
     def iterated(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         derivative, reach = np.eye(n), np.eye(n)
         for _ in range(math.ceil(t1) - math.ceil(t0)):
             pair: Any = image(x)
             if not (isinstance(pair, tuple | list) and len(pair) == 2):
-                raise ParameterError(
-                    "must return a pair", field="image", value=type(pair).__name__, allowed="(state, derivative)"
-                )
+                said = "must return a pair"
+                raise ParameterError(said, field="image", value=type(pair).__name__, allowed="(state, derivative)")
             x, factor = numbers(pair[0], (n,), "image"), numbers(pair[1], (n, n), "image")
             derivative, reach = factor @ derivative, np.abs(factor) @ reach
         return x, derivative, reach
@@ -72,8 +70,8 @@ def from_map(
         n,
         1.0,
         lambda x, t0, t1: iterated(x, t0, t1)[:2],
-        orbit=None if orbit is None else finite_array(orbit, (n,), "orbit"),
-        spatial_symmetry=None if spatial_symmetry is None else np.asarray(spatial_symmetry, dtype=np.float64),
-        scale=None if scale is None else np.asarray(scale, dtype=np.float64),
+        orbit=orbit,  # type: ignore[arg-type]  # checked and converted there, like the next two
+        spatial_symmetry=spatial_symmetry,  # type: ignore[arg-type]
+        scale=scale,  # type: ignore[arg-type]
         flow_with_error=flow_with_error,
     )

@@ -9,25 +9,30 @@ the trivial multiplier 1.
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows import deadline
+from chilopod.flows.arguments import numbers
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.problem.capabilities import (
     Autonomous,
     FlowsMany,
     SystemLike,
+    checked_flow,
     flows_states,
     flows_tangents,
     flows_with_error,
-    given_scale,
     is_autonomous,
     returns_per_period,
-    spatial_symmetries,
 )
 from chilopod.stability.problem.scales import sizes
 
@@ -96,30 +101,17 @@ class ReturnMap(ReadOnlyArrays):
     normal: Array | None = None
 
 
-class _WholePeriod:
-    """A system without its symmetry in time and its known orbit, over some periods."""
-
-    symmetry = None
-
-    def __init__(self, system: SystemLike, periods: int) -> None:
-        self.dimension = system.dimension
-        self.period = None if system.period is None else periods * system.period
-        self.flow = system.flow
-        symmetries = spatial_symmetries(system)
-        self.spatial_symmetry = np.stack(symmetries) if symmetries else None
-        self.scale = given_scale(system)
-        self.flow_with_error = system.flow_with_error if flows_with_error(system) else None
-        self.flow_states = system.flow_states if flows_states(system) else None
-        self.flow_tangents = system.flow_tangents if flows_tangents(system) else None
-        self.velocity = None
-        if is_autonomous(system):
-            self.guess_period = periods * system.guess_period
-            self.velocity = system.velocity
+_STATED = "dimension", "spatial_symmetry", "scale", "velocity"
+_FLOWS = "flow", "flow_with_error", "flow_states", "flow_tangents"
 
 
 def whole_period(system: SystemLike, periods: int = 1) -> SystemLike:
-    """The same system for orbits without its symmetry in time, or over several periods."""
-    return _WholePeriod(system, periods)
+    """The same system for orbits without its symmetry in time and its known orbit, or over several periods."""
+    whole: Any = SimpleNamespace(**{name: getattr(system, name, None) for name in (*_STATED, *_FLOWS)})
+    whole.symmetry, whole.period = None, None if system.period is None else periods * system.period
+    if is_autonomous(system):
+        whole.guess_period = periods * system.guess_period
+    return cast(SystemLike, whole)
 
 
 def section_at(
@@ -147,7 +139,7 @@ def return_duration(system: SystemLike) -> float:
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:
-    velocity = np.asarray(system.velocity(np.array(x)), dtype=np.float64)
+    velocity = numbers(system.velocity(np.array(x)), x.shape, "velocity")
     if not np.isfinite(velocity).all():
         raise AnalysisError("the right-hand side is not finite", field="rhs")
     return velocity
@@ -158,14 +150,14 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     integrator makes independent errors in the two computations, and one with fixed steps should provide its own
     bound."""
     if flows_with_error(system):
-        return system.flow_with_error(x, t0, t1)
-    state, derivative = system.flow(x, t0, t1)
-    _check_shapes(state, derivative, x.size)
+        state, derivative, error = checked_flow(system, x, t0, t1, with_error=True)
+        return state, derivative, error
+    state, derivative = checked_flow(system, x, t0, t1)
     _check_finite(state, derivative)
     times = [t0 + part * (t1 - t0) for part in CUTS] + [t1]
     passing, product = x, np.eye(x.size)
     for a, b in zip(times, times[1:], strict=False):
-        passing, factor = system.flow(passing, a, b)
+        passing, factor = checked_flow(system, passing, a, b)
         product = factor @ product
     # In units of the states' sizes: an entry that agrees by chance is as uncertain as the others.
     size = sizes(system, x, t1 - t0)
@@ -173,20 +165,6 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     off = float((np.abs(product - derivative) / units).max())
     largest = float((np.abs(derivative) / units).max())
     return state, derivative, (REPEATED * off + 1e-15 * largest) * units
-
-
-def checked_flow(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
-    """The flow and its derivative, of the right shapes."""
-    state, derivative = system.flow(np.array(x), t0, t1)  # a system may write into its argument
-    _check_shapes(state, derivative, x.size)
-    return state, derivative
-
-
-def _check_shapes(state: Array, derivative: Array, n: int) -> None:
-    if np.shape(state) != (n,) or np.shape(derivative) != (n, n):
-        raise AnalysisError(
-            f"gives shapes {np.shape(state)} and {np.shape(derivative)}", field="flow", allowed=f"({n},) and ({n}, {n})"
-        )
 
 
 def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, section: Section | None = None) -> ReturnMap:
@@ -207,8 +185,7 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, duration)
     else:
-        state, jacobian = system.flow(x, 0.0, duration)
-    _check_shapes(state, jacobian, n)
+        state, jacobian = checked_flow(system, x, 0.0, duration)
     if system.symmetry is not None:
         state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
         if isinstance(error, np.ndarray):
@@ -234,12 +211,12 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
     assert section is not None
     count = returns_per_period(system)
     turn = np.eye(x.size) if system.symmetry is None else system.symmetry
-    start, rest, first = crossing(system, x, section, system.flow)
+    start, rest, first = crossing(system, x, section, functools.partial(checked_flow, system))
     error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, start + rest)
     else:
-        state, second = system.flow(first[0], 0.0, rest)
+        state, second = checked_flow(system, first[0], 0.0, rest)
         jacobian = second @ first[1]
     state, jacobian = turn @ state, turn @ jacobian
     velocity = _velocity(system, state)
@@ -267,16 +244,12 @@ def crossing(
     for approach in _APPROACHES:
         start = (1.0 - approach) * section.duration
         before, derivative = flow(x, 0.0, start)
-        _check_shapes(before, derivative, x.size)
         _check_finite(before, derivative)
         rest = _time_to_section(system, before, section, approach * section.duration)
         if rest is not None:
             return start, rest, (before, derivative)
-    raise AnalysisError(
-        f"the motion does not come back to where it started after about {section.duration:.6g}",
-        field="orbit",
-        allowed="a guess closer to an orbit and its period",
-    )
+    said = f"the motion does not come back to where it started after about {section.duration:.6g}"
+    raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit and its period")
 
 
 def _time_to_section(system: Autonomous, before: Array, section: Section, rest: float) -> float | None:
@@ -300,12 +273,21 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
 
 
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
-    """States at t1 of those at t0, shape (states, n) both, by the cheapest capability of the system."""
+    """States at t1 of those at t0, shape (states, n) both, by the cheapest capability of the system; a SpentError
+    after a time limit."""
+    deadline.check()
     if flows_states(system):
         return np.asarray(system.flow_states(states, t0, t1))
     if flows_tangents(system):
         return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
-    return np.array([system.flow(np.array(x), t0, t1)[0] for x in states])
+    return np.array([checked_flow(system, x, t0, t1)[0] for x in states])
+
+
+def in_parts(system: SystemLike, x: Array, duration: float) -> Array:
+    """Return of a state, shape (n,), by other steps than those of the flow over the whole return."""
+    for part, following in itertools.pairwise((*CUTS, 1.0)):
+        x = carried(system, x[None], part * duration, following * duration)[0]
+    return np.asarray(turned(system, x[None])[0])
 
 
 def turned(system: SystemLike, states: Array) -> Array:
@@ -325,7 +307,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     result = np.empty_like(states)
     for i, rest in enumerate(rests):
         if rest is None:
-            _, rest, (state, _) = crossing(system, states[i], section, system.flow)
+            _, rest, (state, _) = crossing(system, states[i], section, functools.partial(checked_flow, system))
         else:
             state = before[i]
         result[i] = turned(system, carried(system, state[None], 0.0, rest))[0]

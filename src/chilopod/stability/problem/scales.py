@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
-from chilopod.stability.problem.capabilities import SystemLike, given_scale
+from chilopod.stability.problem.capabilities import SystemLike, checked_flow, given_scale
 
 Array = NDArray[np.float64]
 
@@ -27,13 +27,13 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     given = given_scale(system)
     if given is not None:
         return given
-    later, derivative = system.flow(np.array(x), 0.0, _PART * duration)
+    later, derivative = checked_flow(system, x, 0.0, _PART * duration)
     if not (np.isfinite(later).all() and np.isfinite(derivative).all()):
         raise AnalysisError("the flow is not finite over one return", field="flow")
     size = np.maximum(np.abs(x), np.abs(later))
     if not size.any():
         if not (derivative - np.diag(np.diag(derivative))).any():  # a map has no parts
-            derivative = system.flow(np.array(x), 0.0, duration)[1]
+            derivative = checked_flow(system, x, 0.0, duration)[1]
             if not np.isfinite(derivative).all():
                 raise AnalysisError("the flow is not finite over one return", field="flow")
         return numerical_balance(derivative)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.flows.arguments import finite_array
+from chilopod.flows.arguments import LARGEST, checked_count, finite_array, positive
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.implicit.flow import Stretched
 from chilopod.frozen import ReadOnlyArrays
@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
 
+_MORE = "velocity", "flow_with_error", "flow_states", "flow_tangents", "flow_frame", "is_stiff", "velocity_series"
 _HIGHEST_ORDER = 1000
 _SAME = 1e-8  # difference of equal matrices, relative to their size
 _ROUND_OFF = 1e-7  # relative to the largest entry, in units that balance the matrix: with the above, some last digits
@@ -83,12 +84,18 @@ class PeriodicSystem(ReadOnlyArrays):
     symmetry_order: int = field(init=False, default=1, repr=False)
 
     def __post_init__(self) -> None:
-        if self.dimension < 1:
-            raise ParameterError("must be at least 1", field="dimension", value=self.dimension)
+        self._set("dimension", checked_count("dimension", self.dimension, LARGEST))
+        for name in ("flow", *_MORE):
+            function = getattr(self, name)
+            if not (callable(function) or (function is None and name != "flow")):
+                raise ParameterError("must be a function", field=name, value=function)
         if self.period is None:
-            self._check_autonomous()
-        elif not (np.isfinite(self.period) and self.period > 0):
-            raise ParameterError("must be positive and finite", field="period", value=self.period)
+            if self.velocity is None:
+                allowed = "a number, or None and a velocity"
+                raise ParameterError("must be given", field="period", value=None, allowed=allowed)
+            self._set("guess_period", positive("guess_period", self.guess_period))
+        else:
+            self._set("period", positive("period", self.period))
         if self.symmetry is not None:
             symmetry = self._of_finite_order("symmetry", self.symmetry)[0]
             self._set("symmetry", symmetry)
@@ -96,7 +103,7 @@ class PeriodicSystem(ReadOnlyArrays):
         if self.spatial_symmetry is not None:
             self._set("spatial_symmetry", self._of_finite_order("spatial_symmetry", self.spatial_symmetry))
         if self.orbit is not None:
-            self._set("orbit", np.asarray(self.orbit, dtype=np.float64))
+            self._set("orbit", finite_array(self.orbit, (self.dimension,), "orbit"))
         if self.scale is not None:
             scale = finite_array(self.scale, (self.dimension,), "scale")
             if not (scale > 0.0).all():
@@ -107,21 +114,10 @@ class PeriodicSystem(ReadOnlyArrays):
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
-    def _check_autonomous(self) -> None:
-        if self.velocity is None:
-            raise ParameterError(
-                "must be positive and finite", field="period", value=None, allowed="a number, or None and a velocity"
-            )
-        guess = self.guess_period
-        if guess is None or not (np.isfinite(guess) and guess > 0):
-            raise ParameterError(
-                "must be positive and finite", field="guess_period", value=guess, allowed="about the orbit's period"
-            )
-
     def _of_finite_order(self, name: str, given: ArrayLike) -> Array:
         try:
             matrices = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ParameterError("must be a matrix of numbers", field=name, value=given) from None
         n = self.dimension
         single = matrices.ndim == 2
@@ -130,11 +126,8 @@ class PeriodicSystem(ReadOnlyArrays):
         matrices = matrices.reshape(-1, n, n)
         for matrix in matrices:
             if _order(matrix) == 0:
-                raise ParameterError(
-                    "must have a finite order: a power that is the identity",
-                    field=name,
-                    allowed=f"an order up to {_HIGHEST_ORDER}",
-                )
+                said = "must have a finite order: a power that is the identity"
+                raise ParameterError(said, field=name, allowed=f"an order up to {_HIGHEST_ORDER}")
         return matrices
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.crossing_points.description import Formed, described
@@ -17,6 +17,7 @@ from chilopod.stability.normal_forms.normal_form import normal_form as normal_fo
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.arguments import check_arguments, checked_interval
 from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap, returned_states
@@ -82,6 +83,7 @@ def locate(
         value an exception counts as a missing orbit and gives a remark.
     """
     low, high = checked_interval(between)
+    check_arguments(family=family, normal_form=normal_form, budget=budget)
     samples = Samples(family, orbit, low, high, budget, seconds)
     return located(
         samples,
@@ -90,17 +92,6 @@ def locate(
         lambda fold: _fold(samples, fold, normal_form),
         _DESCRIBING,
     )
-
-
-def checked_interval(between: tuple[float, float]) -> tuple[float, float]:
-    """An interval as two finite numbers, the second of which is larger."""
-    try:
-        low, high = (float(value) for value in between)
-    except (TypeError, ValueError):
-        low, high = np.nan, np.nan
-    if not (np.isfinite(low) and np.isfinite(high) and low < high and np.isfinite(high - low)):
-        raise ParameterError("must be two finite values", field="between", value=between, allowed="(lower, higher)")
-    return low, high
 
 
 def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[tuple[Block | None, Crossings]]:

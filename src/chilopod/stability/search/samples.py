@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, SpentError, UserCode, UserError
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap, return_map, return_maps, section_at
@@ -63,7 +64,7 @@ class AskedFamily:
         if value in self._systems:
             return self._systems[value]
         with self.asking(value):
-            system = self._family(value)
+            system = system_of(self._family, value)
         kind = system.dimension, not is_autonomous(system)
         if self.dimension == 0:
             self.dimension, self.timed = kind
