@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import checked_count, finite_array
+from chilopod.flows.balance import numerical_balance
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
@@ -19,8 +20,15 @@ from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.orbits.orbit import bounded, find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.budget import UserCode
-from chilopod.stability.problem.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
-from chilopod.stability.problem.returns import Section, returned_states, whole_period
+from chilopod.stability.problem.capabilities import (
+    Family,
+    SystemLike,
+    given_scale,
+    is_autonomous,
+    known_orbit,
+    returns_per_period,
+)
+from chilopod.stability.problem.returns import Section, return_map, returned_states, section_at, whole_period
 from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
@@ -30,6 +38,7 @@ IN_FOLD = 1e-6
 
 _MOST_PERIODS = 1000
 _RESTS = 0.01  # distance, relative to each state, within which a failed guess counts as an equilibrium
+_DOUBLE = 1e-5  # singular value, relative to the largest, below which a mode is critical at a located collision
 _BESIDE = 1e-3  # step of second differences, in units
 _SINGULAR = 1e-9  # singular value, relative to the largest, below which another curve crosses
 _BENT = 0.3  # relative departure of a map from its linear part that defines the size of a state
@@ -147,7 +156,7 @@ def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
         )
 
 
-def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: int = 1) -> tuple[Start, ...]:
+def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: int | None = None) -> tuple[Start, ...]:
     """The starts of the branches that leave a bifurcation point.
 
     Parameters
@@ -157,25 +166,27 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     point
         Located point, special point on a branch, or Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
-        Number of the systems' periods in one period of the old branch's orbits.
+        Number of the systems' periods in one period of the old branch's orbits; by default known from a special point
+        on a branch, or from a given period of the systems, else 1.
 
     Returns
     -------
     A pitchfork has two: along the critical mode and against it. A transcritical point and a branch point have two: the
     directions of the other branch. A period doubling has one: its two sides are the same orbits, a period apart. A Hopf
     point has one, at a small cycle on the side where cycles exist, towards larger ones. With several critical modes,
-    due to a symmetry, these numbers hold for each of ``point.modes``.
+    due to a symmetry, these numbers hold for each of ``point.modes``. A collision at -1 is a period doubling,
+    one at +1 a branch point.
 
     Raises
     ------
     ParameterError
         If no branch that can be followed leaves the point, or it is not a special point.
     """
-    old, periods = None, checked_count("periods", periods, _MOST_PERIODS)
+    old, known = None, None
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
             raise ParameterError("must be a special point", field="point", value=point.value)
-        old = None if point.units is None else point.tangent * point.units
+        old, known = None if point.units is None else point.tangent * point.units, point.periods
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
@@ -187,9 +198,17 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
     modes = point.mode.real[None] if point.modes is None else point.modes.real.T
     system = family(point.value)
+    own = np.nan if system.period is None else point.period / system.period
+    known = known or (max(1, round(own)) if np.isfinite(own) else 1)
+    periods = known if periods is None else checked_count("periods", periods, _MOST_PERIODS)
     period = None
     if is_autonomous(system):
         period = find_orbit(whole_period(system, periods), point.orbit, with_error=False, shortest=periods == 1).period
+    axial = point.symmetry is not None and bool(point.symmetry.branches)
+    if kind is Kind.COLLISION:
+        modes = modes if axial else _only_mode(system, point, periods)
+        minus = point.multiplier.real < 0.0
+        kind = kind if not minus else Kind.PERIOD_DOUBLING if returns_per_period(system) % 2 else Kind.PITCHFORK
     if kind is Kind.PERIOD_DOUBLING:
         twice = None if period is None else 2.0 * period
         return tuple(
@@ -198,13 +217,25 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         )
     # With several modes each has its own branch, and the equation for a crossing of two curves holds only where a
     # symmetry separates them.
-    axial = point.symmetry is not None and bool(point.symmetry.branches)
     crossing = kind is not Kind.PITCHFORK and (len(modes) == 1 or axial)
     return tuple(
         Start(point.value, point.orbit, True, sign * mode, crossing, old, periods, period, point)
         for mode in modes
         for sign in (1.0, -1.0)
     )
+
+
+def _only_mode(system: SystemLike, point: BifurcationPoint, periods: int) -> Array:
+    """The eigenvector of two multipliers that meet at +1 or -1, shape (1, n)."""
+    studied = system if periods == 1 else whole_period(system, periods)
+    duration = point.period / returns_per_period(studied)
+    image = return_map(studied, point.orbit, section=section_at(studied, point.orbit, None, duration))
+    units = numerical_balance(image.jacobian)
+    matrix = image.jacobian * units / units[:, None] - np.copysign(1.0, point.multiplier.real) * np.eye(units.size)
+    _, values, rows = np.linalg.svd(matrix)
+    if values.size > 1 and values[-2] <= _DOUBLE * max(1.0, float(values[0])):
+        raise AnalysisError("has two critical modes without a symmetry that separates their branches", field="point")
+    return np.asarray((units * rows[-1] / np.linalg.norm(units * rows[-1]))[None])
 
 
 def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
@@ -304,7 +335,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     values, bound = curve.multipliers(known)
     special = start.bifurcation.kind if start.bifurcation is not None else None
     point = BranchPoint(
-        start.value, start.orbit, values, tangent, special, units, image.period, bound, start.bifurcation
+        start.value, start.orbit, values, tangent, special, units, image.period, bound, start.bifurcation, curve.periods
     )
     leaving = start.mode is not None
     if not leaving:
