@@ -55,6 +55,11 @@ class Deadline:
         """True once the limit is reached."""
         return _now() > self._ends
 
+    @property
+    def remaining(self) -> float:
+        """Time to the limit, s; never below zero."""
+        return max(self._ends - _now(), 0.0)
+
     def prolong(self, seconds: float) -> None:
         """Extend the limit to at least some time from now, s."""
         self._ends = max(self._ends, _now() + seconds)

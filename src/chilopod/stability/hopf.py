@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.flows.deadline import Deadline
 from chilopod.stability.branches.fold import Fold
-from chilopod.stability.crossing_points.place import Course, place_error
+from chilopod.stability.crossing_points.place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.problem.budget import UserCode
@@ -31,7 +32,7 @@ from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, find_crossings
+from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
@@ -42,8 +43,13 @@ _POINTS = 2000  # budget of return maps beside a point: those of the map cost al
 _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
 _KEPT = 64  # cached systems
+_WIDE, _SHORTER = 4.0, 0.25  # ratio of the ends of a piece, and factor on its width after a failure
+_NARROWEST = 1e-6  # width, relative to the interval, below which a piece is not made shorter
+_LEAST = 50  # least budget of a piece
+_SAME = 1e-6  # relative difference of the frequencies of the same point
 _WORDS = (
     ("a multiplier is +1", "an eigenvalue is 0"),
+    ("a multiplier", "an eigenvalue"),
     ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
     ("clear of the circle", "clear of the imaginary axis"),
     ("are on the circle", "are on the imaginary axis"),
@@ -91,10 +97,59 @@ def locate_hopf(
         If no equilibrium is found at the lower end of the interval, or ``family`` raises an exception there.
     """
     low, high = checked_interval(between)
-    family = functools.lru_cache(_KEPT)(family)
+    family, limit = functools.lru_cache(_KEPT)(family), Deadline(seconds)
+    pieces: list[Located] = []
+    at, state, left = low, equilibrium, budget
+    while at < high and not (pieces and (left < _LEAST or limit.late)):
+        end = min(high, _WIDE * at) if at > 0.0 else high
+        while True:
+            found, last = _piece(family, (at, end), state, left, limit)
+            left -= found.evaluations
+            lost = found.ending and found.status is not SearchStatus.BUDGET and last.value < end
+            if not lost or end - at <= _NARROWEST * (high - low) or left < _LEAST or limit.late:
+                break
+            end = at + _SHORTER * (end - at)
+        pieces.append(found)
+        if last.value < end:  # a fold, or the search cannot go on
+            break
+        at, state = end, last.orbit
+    status = SearchStatus.COMPLETE.worst(*(each.status for each in pieces))
+    remarks = [_of_equilibria(remark) for each in pieces for remark in each.remarks]
+    if at < high and last.value == end:
+        status = SearchStatus.BUDGET
+        remarks.append(f"the budget was spent before the equilibrium was followed beyond {at:.9g}")
+    return Located(
+        _distinct([point for each in pieces for point in each]),
+        status,
+        tuple(dict.fromkeys(remarks)),
+        budget - left,
+        (pieces[0].searched[0], pieces[-1].searched[1]),
+        _of_equilibria(pieces[-1].ending),
+    )
+
+
+def _distinct(points: list[BifurcationPoint]) -> tuple[BifurcationPoint, ...]:
+    """Points without those found twice, at an end that two pieces share."""
+    kept: list[BifurcationPoint] = []
+    for point in points:
+        same = kept and abs(point.value - kept[-1].value) <= point.error_bound + kept[-1].error_bound
+        if not (same and abs(point.frequency - kept[-1].frequency) <= _SAME * point.frequency):
+            kept.append(point)
+    return tuple(kept)
+
+
+def _piece(
+    family: Family, between: tuple[float, float], equilibrium: ArrayLike, budget: int, limit: Deadline
+) -> tuple[Located, Sample]:
+    """Hopf points in an interval, and the last equilibrium that was followed.
+
+    The step of the map suits the rates at the lower end, and the first steps of the parameter are even: over a wide
+    interval both may change by decades.
+    """
+    low, high = between
     system, start = equilibrium_at(family, low, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
-    samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, seconds)
+    samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, limit.remaining)
 
     def matrices(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
@@ -112,7 +167,7 @@ def locate_hopf(
         return _described(family, (low, high), _of_map(samples, crossing, matrices, duration), duration)
 
     found = located(samples, crossings, described, _fold_remark, _POINTS)
-    return replace(found, remarks=tuple(dict.fromkeys(_of_equilibria(remark) for remark in found.remarks)))
+    return found, samples.path[-1]
 
 
 def _fold_remark(fold: Fold) -> str:
