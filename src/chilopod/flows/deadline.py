@@ -19,6 +19,7 @@ from chilopod.errors import AnalysisError, ParameterError
 Array = NDArray[np.float64]
 
 _STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
+_SAID: ContextVar[set[str] | None] = ContextVar("said", default=None)
 
 
 class SpentError(AnalysisError):
@@ -26,7 +27,7 @@ class SpentError(AnalysisError):
 
 
 class Deadline:
-    """A time limit; within its context a flow ends at the limit, even inside an integration.
+    """A time limit; within its context a flow ends at the limit, even inside an integration, and says a thing once.
 
     Time that numba spends compiling is not counted.
 
@@ -48,6 +49,8 @@ class Deadline:
         self._ends = _now() + seconds
         self._stop = np.zeros(1)
         self._token: Token[Array | None] | None = None
+        self._said: set[str] = set()
+        self._before: Token[set[str] | None] | None = None
         self._timer: threading.Timer | None = None
 
     @property
@@ -66,6 +69,7 @@ class Deadline:
         self._stop[0] = 0.0
 
     def __enter__(self) -> Self:
+        self._before = _SAID.set(self._said if (outer := _SAID.get()) is None else outer)
         if self._ends < math.inf:  # else an outer limit holds
             self._token = _STOP.set(self._stop)
             self._wait()
@@ -74,6 +78,8 @@ class Deadline:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._before is not None:
+            _SAID.reset(self._before)
         if self._token is not None:
             _STOP.reset(self._token)
             self._token = None
@@ -104,6 +110,15 @@ def stop() -> Array:
     if found[0] != 0.0:
         raise over()
     return found
+
+
+def first_time(message: str) -> bool:
+    """True for a message that was not said before within the outermost limit."""
+    said = _SAID.get()
+    known = said is not None and message in said
+    if said is not None:
+        said.add(message)
+    return not known
 
 
 def over() -> SpentError:
