@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import checked_count, finite_array
-from chilopod.flows.balance import numerical_balance
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
@@ -28,7 +27,7 @@ from chilopod.stability.problem.capabilities import (
     known_orbit,
     returns_per_period,
 )
-from chilopod.stability.problem.returns import Section, return_map, returned_states, section_at, whole_period
+from chilopod.stability.problem.returns import Section, returned_states, whole_period
 from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
@@ -38,7 +37,6 @@ IN_FOLD = 1e-6
 
 _MOST_PERIODS = 1000
 _RESTS = 0.01  # distance, relative to each state, within which a failed guess counts as an equilibrium
-_DOUBLE = 1e-5  # singular value, relative to the largest, below which a mode is critical at a located collision
 _BESIDE = 1e-3  # step of second differences, in units
 _SINGULAR = 1e-9  # singular value, relative to the largest, below which another curve crosses
 _BENT = 0.3  # relative departure of a map from its linear part that defines the size of a state
@@ -206,7 +204,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         period = find_orbit(whole_period(system, periods), point.orbit, with_error=False, shortest=periods == 1).period
     axial = point.symmetry is not None and bool(point.symmetry.branches)
     if kind is Kind.COLLISION:
-        modes = modes if axial else _only_mode(system, point, periods)
+        modes = modes if axial else point.mode.real[None]  # two that meet have one eigenvector
         minus = point.multiplier.real < 0.0
         kind = kind if not minus else Kind.PERIOD_DOUBLING if returns_per_period(system) % 2 else Kind.PITCHFORK
     if kind is Kind.PERIOD_DOUBLING:
@@ -223,19 +221,6 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         for mode in modes
         for sign in (1.0, -1.0)
     )
-
-
-def _only_mode(system: SystemLike, point: BifurcationPoint, periods: int) -> Array:
-    """The eigenvector of two multipliers that meet at +1 or -1, shape (1, n)."""
-    studied = system if periods == 1 else whole_period(system, periods)
-    duration = point.period / returns_per_period(studied)
-    image = return_map(studied, point.orbit, section=section_at(studied, point.orbit, None, duration))
-    units = numerical_balance(image.jacobian)
-    matrix = image.jacobian * units / units[:, None] - np.copysign(1.0, point.multiplier.real) * np.eye(units.size)
-    _, values, rows = np.linalg.svd(matrix)
-    if values.size > 1 and values[-2] <= _DOUBLE * max(1.0, float(values[0])):
-        raise AnalysisError("has two critical modes without a symmetry that separates their branches", field="point")
-    return np.asarray((units * rows[-1] / np.linalg.norm(units * rows[-1]))[None])
 
 
 def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:

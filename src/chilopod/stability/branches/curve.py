@@ -216,15 +216,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         if section is not None and is_autonomous(system):
             velocity = np.asarray(system.velocity(x))
             across -= np.outer(velocity, section.normal) / float(section.normal @ velocity)
-        image = ReturnMap(
-            x,
-            across @ found.jacobian,
-            np.nan,
-            count,
-            count * found.nodes.duration,
-            velocity,
-            None if section is None else section.normal,
-        )
+        normal = None if section is None else section.normal
+        image = ReturnMap(x, across @ found.jacobian, np.nan, count, count * found.nodes.duration, velocity, normal)
         return (np.append(x, value) - start) / units, x, value, image, across @ found.by_value * self.scale
 
     def _inside(self, value: float) -> float:

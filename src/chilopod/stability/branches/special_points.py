@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -55,7 +56,9 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     point, regular = curve.arrived(within.at(crossing.value)).end.last, None
     if place.branching:  # its own tangent is any combination of those of both branches
         before, after = within.sides(crossing.value)
-        point = replace(point, tangent=(before.tangent + after.tangent) / np.linalg.norm(before.tangent + after.tangent))
+        point = replace(
+            point, tangent=(before.tangent + after.tangent) / np.linalg.norm(before.tangent + after.tangent)
+        )
     if not place.fold and (block is None or block.trivial):
 
         def bounded_at(_: float, moved: Array, error: Array, image: ReturnMap) -> Orbit:
@@ -74,15 +77,8 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     else:
         value, error = point.value, _value_error(within, place, along, orbit.image)
     point = replace(point, value=value)
-    found = described(
-        curve.system(value),
-        (value, error),
-        orbit,
-        crossing,
-        block,
-        lambda critical, uncertainty: _form(curve, point, orbit, critical, uncertainty),
-        kind=Kind.FOLD if place.fold else None,
-    )
+    kind, formed = Kind.FOLD if place.fold else None, partial(_form, curve, point, orbit)
+    found = described(curve.system(value), (value, error), orbit, crossing, block, formed, kind=kind)
     nu = found.multiplier
     off = abs(abs(nu) - 1.0) if crossing.event is Event.PAIR else abs(nu - TARGETS[crossing.event])
     if off > _CRITICAL and not crossing.collision:
