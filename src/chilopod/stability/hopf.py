@@ -173,9 +173,9 @@ def _of_map(
     frequency = abs(float(np.angle(crossing.multiplier))) / duration
     error = place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value)
     mode = vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128)
-    about = {"period": 2.0 * np.pi / frequency, "multiplicity": crossing.multiplicity}
-    place = crossing.value, error, sample.orbit
-    return BifurcationPoint(Kind.HOPF, *place, mode, crossing.multiplier, frequency, **about)
+    about: dict[str, Any] = {"period": 2.0 * np.pi / frequency, "multiplicity": crossing.multiplicity}
+    value, nu = crossing.value, crossing.multiplier
+    return BifurcationPoint(Kind.HOPF, value, error, sample.orbit, mode, nu, frequency, **about)
 
 
 def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
@@ -287,10 +287,9 @@ def _hopf_point(
     coefficient, error = form.cubic.real / frequency, wrong / frequency
     decided = Criticality.SUPERCRITICAL if coefficient < 0.0 else Criticality.SUBCRITICAL
     verdict = decided if abs(coefficient) > error else Criticality.UNDECIDED
-    formed: dict[str, Any] = {"criticality": verdict, "coefficient": coefficient, "coefficient_error": error}
-    about: dict[str, Any] = {"period": 2.0 * np.pi / frequency, "multiplicity": 2, "rate": rate}
-    place = value, bound, here.state
-    return BifurcationPoint(Kind.HOPF, *place, form.mode, 1j * frequency, frequency, **formed, **about)
+    about: dict[str, Any] = {"criticality": verdict, "coefficient": coefficient, "coefficient_error": error}
+    about |= {"period": 2.0 * np.pi / frequency, "multiplicity": 2, "rate": rate}
+    return BifurcationPoint(Kind.HOPF, value, bound, here.state, form.mode, 1j * frequency, frequency, **about)
 
 
 def _rate(

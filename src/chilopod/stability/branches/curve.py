@@ -269,8 +269,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             # H - x on the new section: it maps the direction of the motion to zero.
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
-        units, about = self.units(x.size), {"error_bound": bound, "periods": self.periods}
-        point = BranchPoint(value, x, values, tangent, units=units, period=image.period, **about)
+        point = BranchPoint(
+            value, x, values, tangent, None, self.units(x.size), image.period, bound, None, self.periods
+        )
         before = None if anchor.leaving or anchor.last.special is not None else anchor.last
         return replace(step, end=self.anchored(point, matrix, section, before, anchor.matrix))
 

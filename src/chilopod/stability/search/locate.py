@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -174,7 +175,7 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
         (fold.value, fold.error_bound),
         _formed(samples, fold.value, orbit),
     )
-    about = {"kind": Kind.FOLD, "with_normal_form": with_normal_form}
+    about: dict[str, Any] = {"kind": Kind.FOLD, "with_normal_form": with_normal_form}
     return described(system, place, orbit, crossing, None, formed, **about)
 
 
