@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import Kind, PeriodicSystem, from_rhs, locate
+from chilopod.stability import Kind, PeriodicSystem, from_map, from_rhs, locate
 from chilopod.stability.branches.branch import Ending, begin, follow, proceed, switch
 
 PERIOD = 2.0
@@ -191,3 +191,56 @@ def test_a_number_of_periods_is_a_whole_number(periods):
 
     with pytest.raises(ParameterError, match="periods"):
         begin(family, 1.0, [1.0], periods=periods)
+
+
+def driven(size):
+    """x' = a x - x^3 + cos t, in units of a size: x(t + pi) = -x(t), a symmetry that is not declared."""
+    return lambda a: from_rhs(lambda t, x: [a * x[0] - x[0] ** 3 / size**2 + size * np.cos(t)], 1, 2 * np.pi)
+
+
+@pytest.mark.parametrize(("step", "size"), [(0.02, 1.0), (0.03, 1.0), (0.1, 1.0), (0.02, 1e-4), (0.02, 1e4)])
+def test_a_branch_passes_a_pitchfork_of_a_symmetry_that_is_not_declared(step, size):
+    family = driven(size)
+    branch = follow(family, [0.0], (0.3, 3.0), step=step)
+    assert branch.ending is Ending.LEFT_INTERVAL
+    (fork,) = branch.special_points
+    assert fork.special is Kind.PITCHFORK
+    assert abs(fork.value - 1.10042841024405) <= fork.bifurcation.error_bound + 1e-14 < 1e-9
+    for point in branch.points:
+        later = family(point.value).flow(np.array(point.orbit), 0.0, np.pi)[0]
+        assert later == pytest.approx(-point.orbit, rel=1e-7)
+
+
+def test_the_branch_that_leaves_it_turns_there():
+    branch = follow(driven(1.0), begin(driven(1.0), 3.0, [0.3], rising=False), (0.3, 3.0))
+    assert (branch.ending, branch.points[-1].value) == (Ending.LEFT_INTERVAL, 3.0)
+    (fork,) = branch.special_points
+    assert abs(fork.value - 1.10042841024405) <= fork.bifurcation.error_bound + 1e-14 < 1e-8
+
+
+def area_preserving(c):
+    """Fixed points x = 0 and x = 1 - c; orbits of period two leave the first at c = -1."""
+    return from_map(lambda x: ([x[1], -x[0] + 2 * c * x[1] + 2 * x[1] ** 2], [[0, 1], [-1, 2 * c + 4 * x[1]]]), 2)
+
+
+def test_what_leaves_a_collision():
+    (meeting,) = locate(area_preserving, (-1.5, 0.5), orbit=[0.0, 0.0])
+    (start,) = switch(area_preserving, meeting)
+    doubled = follow(area_preserving, start, (-1.5, 0.5), points=4)
+    assert (doubled.ending, doubled.periods) == (Ending.ENOUGH_POINTS, 2)
+    x, c = doubled.points[-1].orbit, doubled.points[-1].value
+    assert x[0] + x[1] == pytest.approx(-1.0 - c, abs=1e-9)
+    (meeting,) = locate(area_preserving, (0.5, 1.5), orbit=[0.0, 0.0])
+    for start in switch(area_preserving, meeting):
+        point = follow(area_preserving, start, (0.5, 1.5), points=3).points[-1]
+        assert point.orbit == pytest.approx(1.0 - point.value, abs=1e-9)
+
+
+def test_switch_takes_the_periods_of_a_branch():
+    def henon(a):
+        return from_map(lambda x: ([1 - a * x[0] ** 2 + x[1], 0.3 * x[0]], [[-2 * a * x[0], 1], [0.3, 0]]), 2)
+
+    (first,) = locate(henon, (0.1, 0.8), orbit=[0.8, 0.24])
+    second = follow(henon, switch(henon, first)[0], (0.1, 1.0)).special_points[-1]
+    assert second.value == pytest.approx(0.9125, abs=1e-9)
+    assert [start.periods for each in (second, second.bifurcation) for start in switch(henon, each)] == [4, 4]

@@ -544,5 +544,19 @@ def test_hopf_points_are_found_where_growth_soon_exceeds_all_numbers():
         return from_rhs(lambda t, x: [a * x[0] - x[1] - x[0] ** 3, x[0] + a * x[1]], 2, None, guess_period=6.0)
 
     found = locate_hopf(family, (-1.0, 1000.0), [0.0, 0.0])
-    assert not found.complete
-    assert any("cannot be followed beyond" in remark for remark in found.remarks)
+    assert found.complete
+    assert found.searched == (-1.0, 1000.0)
+    assert [abs(point.value) <= point.error_bound for point in found] == [True]
+
+
+@pytest.mark.parametrize("between", [(0.01, 1000.0), (0.5, 30.0)])
+def test_the_brusselator_over_decades(between):
+    def family(b):
+        return from_rhs(
+            lambda t, x: [1 - (b + 1) * x[0] + x[0] ** 2 * x[1], b * x[0] - x[0] ** 2 * x[1]], 2, None, guess_period=6.0
+        )
+
+    found = locate_hopf(family, between, [1.0, between[0]])
+    assert found.complete
+    assert found.searched == between
+    assert [abs(point.value - 2.0) <= point.error_bound < 1e-9 for point in found] == [True]

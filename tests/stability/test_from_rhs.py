@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, multipliers
+from chilopod.stability import NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, locate, multipliers
 
 
 def oscillator(t, x):
@@ -352,3 +352,12 @@ def test_symmetries_that_hold_are_accepted():
     system = from_rhs(hill(lambda t: 1 + cos(2 * t)), 2, 2 * pi, symmetry=-np.eye(2), spatial_symmetry=-np.eye(2))
     assert isinstance(system, PeriodicSystem)
     np.testing.assert_array_equal(system.symmetry, -np.eye(2))
+
+
+def test_a_search_warns_once():
+    def family(p):
+        return from_rhs(lambda t, x: [(p - 2.0) * (fabs(x[0]) if x[0] > 0 else -fabs(x[0]))], 1, 1.0)
+
+    with pytest.warns(NotAnalytic) as said:
+        locate(family, (0.5, 0.6), orbit=[0.0])
+    assert len(said) == 1

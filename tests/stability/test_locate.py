@@ -1,6 +1,7 @@
 """Every crossing in the interval is found, none is invented, and each lies within its error bound."""
 
 import contextlib
+import time
 from math import pi
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Kind, PeriodicSystem, find_orbit, from_map, from_rhs, locate
+from chilopod.stability import Kind, PeriodicSystem, SearchStatus, find_orbit, from_map, from_rhs, locate
 
 PERIOD = 1.3
 
@@ -265,3 +266,34 @@ def test_a_search_that_is_out_of_time_after_the_first_orbit_is_a_result():
     for seconds in (0.2, 0.4, 0.8):
         with contextlib.suppress(AnalysisError):  # there is no first orbit yet
             assert not locate(ring, (0.5, 2.0), orbit=guess, seconds=seconds).complete
+
+
+@pytest.mark.parametrize("basis", [[[1.0, 0.0], [0.0, 1.0]], [[0.8, -0.6], [0.6, 0.8]], [[1.0, 1.0], [0.0, 1.0]]])
+@pytest.mark.parametrize("gap", [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_bounds_of_two_multipliers_that_cross_together(basis, gap, sign):
+    def family(a):
+        matrix = sign * np.array(basis) @ np.diag([a, a * (1.0 + gap)]) @ np.linalg.inv(basis)
+        return from_map(lambda x: (matrix @ x, matrix), 2)
+
+    found = locate(family, (0.9, 1.13), orbit=np.zeros(2))
+    assert sum(point.multiplicity for point in found) == 2
+    for point in found:
+        assert min(abs(point.value - each) for each in (1.0, 1.0 / (1.0 + gap))) <= point.error_bound
+    low, high = found[0], found[-1]
+    assert low.value - low.error_bound <= 1.0 / (1.0 + gap)
+    assert high.value + high.error_bound >= 1.0
+
+
+def test_a_slow_family_is_not_called_once_the_time_is_over():
+    calls = []
+
+    def family(p):
+        calls.append(p)
+        time.sleep(0.1)
+        return from_rhs(lambda t, x: [p * x[0] - x[0] ** 3 + np.cos(t)], 1, 2.0 * np.pi)
+
+    found = locate(family, (0.3, 3.0), orbit=[0.0], seconds=0.5)
+    assert found.status is SearchStatus.BUDGET
+    assert len(calls) < 15
+    assert f"{found.searched[0]:.9g} to {found.searched[1]:.9g}, {found.evaluations} orbits" in str(found)

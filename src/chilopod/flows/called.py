@@ -33,6 +33,10 @@ _SMALL = 1e-4
 _DISAGREES = 1e-5
 _MOST_CALLS = 2_000_000
 _PATIENCE, _HOPELESS = 50_000, 4.0  # calls, and factor on the largest number beyond which no more are tried
+_DISAGREEMENT = (
+    "the derivative of the flow disagrees with its differences: the right-hand side jumps somewhere in the state. "
+    "Write it without branches (numpy.where, sign, maximum), and the jumps are crossed exactly"
+)
 
 
 class NotAnalytic(UserWarning):
@@ -121,12 +125,8 @@ class CalledFlow:
                 return 0.0
         if off[1] < 0.5 * off[0]:
             return 0.0  # an error that falls with the difference is curvature
-        warnings.warn(
-            "the derivative of the flow disagrees with its differences: the right-hand side jumps somewhere in the "
-            "state. Write it without branches (numpy.where, sign, maximum), and the jumps are crossed exactly",
-            UndeclaredSwitch,
-            stacklevel=4,
-        )
+        if deadline.first_time(_DISAGREEMENT):
+            warnings.warn(_DISAGREEMENT, UndeclaredSwitch, stacklevel=4)
         return 2.0 * max(off) / float(np.abs(direction).min())
 
     def _slope(self, t: float, x: Array) -> Array:
@@ -138,12 +138,12 @@ class CalledFlow:
             return self._given, _ANALYTIC_FLOOR
         if _is_analytic(self.rhs, self.args, x, sizes, self.times):
             return lambda t, x: self._by_complex_steps(t, x, sizes), _ANALYTIC_FLOOR
-        warnings.warn(
+        said = (
             f"the right-hand side cannot be traced ({self.reason}) nor differentiated by a complex step: its "
-            "derivative is taken by differences, with about nine digits",
-            NotAnalytic,
-            stacklevel=4,
+            "derivative is taken by differences, with about nine digits"
         )
+        if deadline.first_time(said):
+            warnings.warn(said, NotAnalytic, stacklevel=4)
         return lambda t, x: self._by_differences(t, x, sizes), _DIFFERENCE_FLOOR
 
     def _given(self, t: float, x: Array) -> Array:

@@ -17,6 +17,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array
 
 _STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
+_SAID: ContextVar[set[str] | None] = ContextVar("said", default=None)
 
 
 class SpentError(AnalysisError):
@@ -25,7 +26,7 @@ class SpentError(AnalysisError):
 
 class Deadline:
     """A time limit, s from now, infinite for none; within its context a flow ends at the limit, even inside an
-    integration. Time that numba spends compiling is not counted."""
+    integration, and a message is shown once. Time that numba spends compiling is not counted."""
 
     def __init__(self, seconds: float = math.inf) -> None:
         given: object = seconds
@@ -34,6 +35,8 @@ class Deadline:
         self._ends = _now() + (seconds if seconds < threading.TIMEOUT_MAX else math.inf)
         self._stop = np.zeros(1)
         self._token: Token[Array | None] | None = None
+        self._said: set[str] = set()
+        self._before: Token[set[str] | None] | None = None
         self._timer: threading.Timer | None = None
 
     @property
@@ -41,12 +44,18 @@ class Deadline:
         """True once the limit is reached."""
         return _now() > self._ends
 
+    @property
+    def remaining(self) -> float:
+        """Time to the limit, s; never below zero."""
+        return max(self._ends - _now(), 0.0)
+
     def prolong(self, seconds: float) -> None:
         """Extend the limit to at least some time from now, s."""
         self._ends = max(self._ends, _now() + seconds)
         self._stop[0] = 0.0
 
     def __enter__(self) -> Self:
+        self._before = _SAID.set(self._said if (outer := _SAID.get()) is None else outer)
         if self._ends < math.inf:  # else an outer limit holds
             self._token = _STOP.set(self._stop)
             self._wait()
@@ -55,6 +64,8 @@ class Deadline:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._before is not None:
+            _SAID.reset(self._before)
         if self._token is not None:
             _STOP.reset(self._token)
             self._token = None
@@ -83,6 +94,15 @@ def check() -> None:
     found = _STOP.get()
     if found is not None and found[0] != 0.0:
         raise over()
+
+
+def first_time(message: str) -> bool:
+    """True for a message that was not said before within the outermost limit."""
+    said = _SAID.get()
+    known = said is not None and message in said
+    if said is not None:
+        said.add(message)
+    return not known
 
 
 def over() -> SpentError:

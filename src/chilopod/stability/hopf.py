@@ -12,6 +12,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -19,19 +20,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.flows.deadline import Deadline
 from chilopod.stability.branches.fold import Fold
-from chilopod.stability.crossing_points.place import Course, place_error
+from chilopod.stability.crossing_points.place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_interval
-from chilopod.stability.problem.budget import UserCode
+from chilopod.stability.problem.budget import SpentError, UserCode
 from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, find_crossings
+from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
@@ -42,8 +44,12 @@ _POINTS = 2000  # budget of return maps beside a point: those of the map cost al
 _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
 _KEPT = 64  # cached systems
+_WIDE, _SHORTER = 3.7, 0.25  # ratio of the ends of a piece, on no round number, and factor on its width after a failure
+_NARROWEST = 1e-6  # width, relative to the interval, below which a piece is not made shorter
+_LEAST = 50  # least budget of a piece
 _WORDS = (
     ("a multiplier is +1", "an eigenvalue is 0"),
+    ("a multiplier", "an eigenvalue"),
     ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
     ("clear of the circle", "clear of the imaginary axis"),
     ("are on the circle", "are on the imaginary axis"),
@@ -92,10 +98,43 @@ def locate_hopf(
     """
     low, high = checked_interval(between)
     check_arguments(family=family, budget=budget)
-    family = functools.lru_cache(_KEPT)(family)
+    family, limit = functools.lru_cache(_KEPT)(family), Deadline(seconds)
+    pieces: list[Located] = []
+    at, state, left = low, equilibrium, budget
+    while at < high and not (pieces and (left < _LEAST or limit.late)):
+        end = min(high, _WIDE * at) if at > 0.0 else high
+        try:
+            found, last = _piece(family, (at, end), state, left, limit)
+            while found.ending and found.status is SearchStatus.INCOMPLETE and end - at > _NARROWEST * (high - low):
+                left, end = left - found.evaluations, at + _SHORTER * (end - at)
+                found, last = _piece(family, (at, end), state, max(left, _LEAST), limit)
+        except SpentError:
+            if not pieces:
+                raise
+            break
+        left -= found.evaluations
+        pieces.append(found)
+        if last.value < end:  # a fold, or the search cannot go on
+            break
+        at, state = end, last.orbit
+    status = SearchStatus.COMPLETE.worst(*(each.status for each in pieces))
+    remarks = [remark for each in pieces for remark in each.remarks]
+    if last.value == at < high and not pieces[-1].ending:
+        status = SearchStatus.BUDGET
+        remarks.append(f"the budget was spent before the orbit was followed beyond {at:.9g}")
+    points, said = tuple(point for each in pieces for point in each), tuple(dict.fromkeys(map(_of_equilibria, remarks)))
+    searched, ending = (low, pieces[-1].searched[1]), _of_equilibria(pieces[-1].ending)
+    return Located(points, status, said, budget - left, searched, ending)
+
+
+def _piece(
+    family: Family, between: tuple[float, float], equilibrium: ArrayLike, budget: int, limit: Deadline
+) -> tuple[Located, Sample]:
+    """Hopf points in an interval that is not so wide that rates change by decades, and the last equilibrium."""
+    low, high = between
     system, start = equilibrium_at(family, low, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
-    samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, seconds)
+    samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, limit.remaining)
 
     def matrices(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
@@ -112,8 +151,7 @@ def locate_hopf(
             return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]
         return _described(family, (low, high), _of_map(samples, crossing, matrices, duration), duration)
 
-    found = located(samples, crossings, described, _fold_remark, _POINTS)
-    return replace(found, remarks=tuple(dict.fromkeys(_of_equilibria(remark) for remark in found.remarks)))
+    return located(samples, crossings, described, _fold_remark, _POINTS), samples.path[-1]
 
 
 def _fold_remark(fold: Fold) -> str:
@@ -134,17 +172,11 @@ def _of_map(
     values, vectors = np.linalg.eig(image.jacobian)
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
     frequency = abs(float(np.angle(crossing.multiplier))) / duration
-    return BifurcationPoint(
-        Kind.HOPF,
-        crossing.value,
-        place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value),
-        sample.orbit,
-        vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128),
-        crossing.multiplier,
-        frequency,
-        period=2.0 * np.pi / frequency,
-        multiplicity=crossing.multiplicity,
-    )
+    error = place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value)
+    mode = vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128)
+    about: dict[str, Any] = {"period": 2.0 * np.pi / frequency, "multiplicity": crossing.multiplicity}
+    value, nu = crossing.value, crossing.multiplier
+    return BifurcationPoint(Kind.HOPF, value, error, sample.orbit, mode, nu, frequency, **about)
 
 
 def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
@@ -255,21 +287,10 @@ def _hopf_point(
     wrong = form.error + bound * abs(cubics[1] - cubics[0]) / float(values[1] - values[0])
     coefficient, error = form.cubic.real / frequency, wrong / frequency
     decided = Criticality.SUPERCRITICAL if coefficient < 0.0 else Criticality.SUBCRITICAL
-    return BifurcationPoint(
-        Kind.HOPF,
-        value,
-        bound,
-        here.state,
-        form.mode,
-        1j * frequency,
-        frequency,
-        criticality=decided if abs(coefficient) > error else Criticality.UNDECIDED,
-        coefficient=coefficient,
-        coefficient_error=error,
-        period=2.0 * np.pi / frequency,
-        multiplicity=2,
-        rate=rate,
-    )
+    verdict = decided if abs(coefficient) > error else Criticality.UNDECIDED
+    about: dict[str, Any] = {"criticality": verdict, "coefficient": coefficient, "coefficient_error": error}
+    about |= {"period": 2.0 * np.pi / frequency, "multiplicity": 2, "rate": rate}
+    return BifurcationPoint(Kind.HOPF, value, bound, here.state, form.mode, 1j * frequency, frequency, **about)
 
 
 def _rate(

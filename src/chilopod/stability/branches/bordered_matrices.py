@@ -11,7 +11,7 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
-_UNCERTAIN = 1e-6  # singular value, relative to the largest, that counts as zero: the error of a difference
+_UNCERTAIN = 1e-6  # singular value that counts as zero: the error of a difference
 
 
 def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
@@ -44,12 +44,14 @@ def within_space(space: Array | None, matrix: Array) -> Array:
 def null_vector(bordered: Array) -> Array:
     """Unit null vector of all but the last row of a matrix, on the side of the last row.
 
-    At a branch point the matrix is singular within its errors, and the shortest solution is used.
+    At a branch point the matrix is singular within its errors, and the shortest solution is used. A return that
+    magnifies errs along the magnified direction only, so its largest singular value does not matter.
     """
     n = len(bordered) - 1
     if not np.isfinite(bordered).all():
         raise AnalysisError("the return map is not finite", field="flow")
-    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=_UNCERTAIN)[0]
+    least = _UNCERTAIN / max(1.0, float(np.linalg.norm(bordered, 2)))
+    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=least)[0]
     if not tangent.any():
         raise AnalysisError("the curve has no direction here", field="step")
     return tangent / np.linalg.norm(tangent)

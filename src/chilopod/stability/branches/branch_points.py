@@ -44,6 +44,8 @@ class BranchPoint(ReadOnlyArrays):
         errors of the flow and of the orbit.
     bifurcation
         Bifurcation point with bound, mode, multiplier and normal form; None at ordinary points.
+    periods
+        Number of the systems' periods in one period of the orbit.
     """
 
     value: float
@@ -55,6 +57,7 @@ class BranchPoint(ReadOnlyArrays):
     period: float | None = None
     error_bound: float = 0.0
     bifurcation: BifurcationPoint | None = None
+    periods: int = 1
 
     @property
     def stable(self) -> bool | None:

@@ -20,7 +20,14 @@ from chilopod.stability.orbits.orbit import bounded, find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import check_arguments, system_of
 from chilopod.stability.problem.budget import UserCode
-from chilopod.stability.problem.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
+from chilopod.stability.problem.capabilities import (
+    Family,
+    SystemLike,
+    given_scale,
+    is_autonomous,
+    known_orbit,
+    returns_per_period,
+)
 from chilopod.stability.problem.returns import Section, returned_states, whole_period
 from chilopod.stability.problem.scales import sizes
 
@@ -146,7 +153,11 @@ def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
 
 
 def switch(
-    family: Family, point: BifurcationPoint | BranchPoint, *, periods: int = 1, seconds: float = math.inf
+    family: Family,
+    point: BifurcationPoint | BranchPoint,
+    *,
+    periods: int | None = None,
+    seconds: float = math.inf,
 ) -> tuple[Start, ...]:
     """The starts of the branches that leave a bifurcation point.
 
@@ -157,7 +168,8 @@ def switch(
     point
         Located point, special point on a branch, or Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
-        Number of the systems' periods in one period of the old branch's orbits.
+        Number of the systems' periods in one period of the old branch's orbits; by default known from a special point
+        on a branch, or from a given period of the systems, else 1.
     seconds
         Time, s, after which the search for an orbit ends.
 
@@ -166,7 +178,8 @@ def switch(
     A pitchfork has two: along the critical mode and against it. A transcritical point and a branch point have two: the
     directions of the other branch. A period doubling has one: its two sides are the same orbits, a period apart. A Hopf
     point has one, at a small cycle on the side where cycles exist, towards larger ones. With several critical modes,
-    due to a symmetry, these numbers hold for each of ``point.modes``.
+    due to a symmetry, these numbers hold for each of ``point.modes``. A collision at -1 is a period doubling,
+    one at +1 a branch point.
 
     Raises
     ------
@@ -176,12 +189,12 @@ def switch(
     if seconds != math.inf:
         with Deadline(seconds):
             return switch(family, point, periods=periods)
-    check_arguments(family=family, periods=periods)
-    old = None
+    check_arguments(family=family, **({} if periods is None else {"periods": periods}))
+    old, known = None, None
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
             raise ParameterError("must be a special point", field="point", value=point.value)
-        old = None if point.units is None else point.tangent * point.units
+        old, known = None if point.units is None else point.tangent * point.units, point.periods
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
@@ -195,9 +208,17 @@ def switch(
     period = None
     with UserCode("family", point.value):
         system = system_of(family, point.value)
+        own = np.nan if system.period is None else point.period / system.period
+        known = known or (max(1, round(own)) if np.isfinite(own) else 1)
+        periods = known if periods is None else int(periods)
         if is_autonomous(system):
             whole = whole_period(system, periods)
             period = find_orbit(whole, point.orbit, with_error=False, shortest=periods == 1).period
+    axial = point.symmetry is not None and bool(point.symmetry.branches)
+    if kind is Kind.COLLISION:
+        modes = modes if axial else point.mode.real[None]  # two that meet have one eigenvector
+        minus = point.multiplier.real < 0.0
+        kind = kind if not minus else Kind.PERIOD_DOUBLING if returns_per_period(system) % 2 else Kind.PITCHFORK
     if kind is Kind.PERIOD_DOUBLING:
         twice = None if period is None else 2.0 * period
         return tuple(
@@ -206,7 +227,6 @@ def switch(
         )
     # With several modes each has its own branch, and the equation for a crossing of two curves holds only where a
     # symmetry separates them.
-    axial = point.symmetry is not None and bool(point.symmetry.branches)
     crossing = kind is not Kind.PITCHFORK and (len(modes) == 1 or axial)
     return tuple(
         Start(point.value, point.orbit, True, sign * mode, crossing, old, periods, period, point)
@@ -311,7 +331,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     values, bound = curve.multipliers(known)
     special = start.bifurcation.kind if start.bifurcation is not None else None
     point = BranchPoint(
-        start.value, start.orbit, values, tangent, special, units, image.period, bound, start.bifurcation
+        start.value, start.orbit, values, tangent, special, units, image.period, bound, start.bifurcation, curve.periods
     )
     leaving = start.mode is not None
     if not leaving:

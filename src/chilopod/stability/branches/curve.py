@@ -216,15 +216,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         if section is not None and is_autonomous(system):
             velocity = np.asarray(system.velocity(x))
             across -= np.outer(velocity, section.normal) / float(section.normal @ velocity)
-        image = ReturnMap(
-            x,
-            across @ found.jacobian,
-            np.nan,
-            count,
-            count * found.nodes.duration,
-            velocity,
-            None if section is None else section.normal,
-        )
+        normal = None if section is None else section.normal
+        image = ReturnMap(x, across @ found.jacobian, np.nan, count, count * found.nodes.duration, velocity, normal)
         return (np.append(x, value) - start) / units, x, value, image, across @ found.by_value * self.scale
 
     def _inside(self, value: float) -> float:
@@ -276,7 +269,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             # H - x on the new section: it maps the direction of the motion to zero.
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
-        point = BranchPoint(value, x, values, tangent, units=self.units(x.size), period=image.period, error_bound=bound)
+        point = BranchPoint(
+            value, x, values, tangent, None, self.units(x.size), image.period, bound, None, self.periods
+        )
         before = None if anchor.leaving or anchor.last.special is not None else anchor.last
         return replace(step, end=self.anchored(point, matrix, section, before, anchor.matrix))
 

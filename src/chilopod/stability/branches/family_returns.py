@@ -147,15 +147,15 @@ class FamilyReturns:
         return (value + step) - value if value + step <= self.between[1] else (value - step) - value
 
     def difference(self, x: Array, value: float, section: Section | None, mapped: Array, beside: Array | None) -> Array:
-        """dH/dp per scale, shape (n,), from H at a state, and at a neighbouring value if known."""
+        """dH/dp per scale, shape (n,), from H at a state, and at a neighbouring value if known.
+
+        The parabola through a third value is needed near branch points, where the matrix of a curve is nearly singular.
+        """
         units, steepness = self.units(x.size)[:-1], self.steepness
         for last in (*[False] * _RETRIES, True):
             step = self._parameter_step(value, steepness)
             try:
-                if beside is None:
-                    self.budget.take()
-                    with UserCode("flow", value + step):
-                        beside = returned_states(self.system(value + step), x[None], section)[0]
+                beside = self._returned(x, value + step, section) if beside is None else beside
             except AnalysisError:
                 if last:
                     raise
@@ -167,4 +167,14 @@ class FamilyReturns:
             if last or not 2.0 * max(_STEEP, steepness) < found < np.inf:
                 break
             steepness, beside = found, None
-        return difference
+        other = (value - step) - value if self.between[0] <= value - step <= self.between[1] else 2.0 * step
+        try:
+            second = (self._returned(x, value + other, section) - mapped) / (other / self.scale)
+        except AnalysisError:  # an edge of the systems' domain
+            return difference
+        return (difference * other - second * step) / (other - step)
+
+    def _returned(self, x: Array, value: float, section: Section | None) -> Array:
+        self.budget.take()
+        with UserCode("flow", value):
+            return np.asarray(returned_states(self.system(value), x[None], section)[0])

@@ -6,7 +6,9 @@ crossings of the unit circle (:mod:`~chilopod.stability.unit_circle.crossings`).
 The guarantee is that of an interpolation: crossings that the places resolve are found however close they lie; an event
 confined between two places, which are at most a sixth of a step apart, is missed.
 
-A determinant that changes its sign without a branch point shows that a step landed on another curve.
+A determinant that changes its sign without a branch point shows that a step landed on another curve. So do one that
+was to change it and does not, a multiplier that only touches +1, and orbits that are missing within a step, unless
+shorter steps confirm them.
 """
 
 from __future__ import annotations
@@ -23,11 +25,12 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, special_point
 from chilopod.stability.branches.within import Within
 from chilopod.stability.orbit_blocks import block_of, crossings_in
+from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import flows_with_error
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.tracing.step import Step
+from chilopod.stability.tracing.step import Step, predicted
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.interpolation import DEGREE, PLACES, interpolated
@@ -44,6 +47,7 @@ _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a 
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
 _SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
 _COMPLEX = 1e-5  # least imaginary part of a multiplier on the circle that belongs to a pair
+_TELLING = 1e-3  # step, in units, that is short enough to tell a branch from another one near by
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 
@@ -61,7 +65,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
 
     Raises
     ------
-    AnalysisError
+    AnalysisError, ArithmeticError
         If the step landed on another curve, or the corrector fails in between.
     """
     within = Within(curve, step)
@@ -70,11 +74,16 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     # A curve that starts at a fold does not find it again.
     turned = not leaving and abs(rising) > _CLOSE and rising * float(step.tangent[-1]) < 0.0
     flipped = not leaving and _sign(step.start.matrix) != _sign(step.matrix)
+    foreseen = leaving or _sign(predicted(step.start, step.size).matrix) == _sign(step.matrix)
+    if not foreseen and not flipped and step.size > _TELLING:
+        raise AnalysisError("the step may have landed on another curve", field="step")
     crossed, single = (_crossed_within(within), None) if closely else _crossed_between_ends(within, turned)
     if not (crossed or turned or flipped):
         return Found()
     places, remarks = _places(within, crossed, single, turned)
-    if flipped and not any(place.branching for place in places):
+    branching = any(place.branching for place in places)
+    touches = any(each.crossing.event is Event.PLUS and each.crossing.change == 0 for each in places)
+    if (flipped and not branching) or (touches and not flipped and step.size > _TELLING):
         raise AnalysisError("the step landed on another curve", field="step")
     sure = flows_with_error(curve.system(step.found.value))
     found: list[tuple[float, BranchPoint]] = []
@@ -167,10 +176,9 @@ def _places(within: Within, crossed: bool, single: Event | None, turned: bool) -
         places += [_placed(within, each, block) for each in found.crossings if each.value > _CLOSE * step.size]
     if turned and not any(place.fold or place.branching for place in places):
         fold = _fold(within, 0.0, step.size)
-        # At a branch point the tangent is uncertain, and may seem to turn.
-        places.append(
-            replace(fold, fold=False, branching=True) if _branches_meet(within.at(fold.crossing.value)) else fold
-        )
+        if _branches_meet(within.at(fold.crossing.value)):  # a branch that leaves there, or an uncertain tangent
+            fold = replace(fold, crossing=replace(fold.crossing, change=0), fold=False, branching=True)
+        places.append(fold)
     return sorted(places, key=lambda place: place.crossing.value), remarks
 
 
@@ -209,7 +217,14 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
     curve, step = within.curve, within.step
 
     def matrices(places: Array) -> tuple[Array, Array]:
-        return np.array([within.jacobian(place) for place in places.tolist()]), np.full(places.size, _ERROR)
+        try:
+            return np.array([within.jacobian(place) for place in places.tolist()]), np.full(places.size, _ERROR)
+        except SpentError:
+            raise
+        except AnalysisError as error:
+            if step.size > _TELLING:
+                raise ArithmeticError("the corrector fails within the step") from error
+            raise
 
     def parameter(place: float) -> float:
         return curve.reached(step.start.last, step.between(place).moved)[1]

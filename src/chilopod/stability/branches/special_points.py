@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
@@ -26,6 +28,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event
 Array = NDArray[np.float64]
 
 _CRITICAL = 1e-5  # distance from the circle within which a multiplier is critical at a located point
+_AROUND = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]) / 40.0  # places round a turn, relative to the step
 _BESIDE = 1e-3  # distance from a point at which rates of change are computed, relative to the step
 
 
@@ -51,6 +54,11 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
 
     course = Course(samples, low, high, high - low, _BESIDE * (high - low))
     point, regular = curve.arrived(within.at(crossing.value)).end.last, None
+    if place.branching:  # its own tangent is any combination of those of both branches
+        before, after = within.sides(crossing.value)
+        point = replace(
+            point, tangent=(before.tangent + after.tangent) / np.linalg.norm(before.tangent + after.tangent)
+        )
     if not place.fold and (block is None or block.trivial):
 
         def bounded_at(_: float, moved: Array, error: Array, image: ReturnMap) -> Orbit:
@@ -64,15 +72,13 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     else:
         orbit, along = regular.orbit, regular.error_bound
         point = replace(point, value=curve.reached(start, regular.sampled)[1])
-    found = described(
-        curve.system(point.value),
-        (point.value, _value_error(within, place, along, orbit.image)),
-        orbit,
-        crossing,
-        block,
-        lambda critical, uncertainty: _form(curve, point, orbit, critical, uncertainty),
-        kind=Kind.FOLD if place.fold else None,
-    )
+    if place.branching and crossing.change == 0:
+        value, error = _turn(within, crossing.value)
+    else:
+        value, error = point.value, _value_error(within, place, along, orbit.image)
+    point = replace(point, value=value)
+    kind, formed = Kind.FOLD if place.fold else None, partial(_form, curve, point, orbit)
+    found = described(curve.system(value), (value, error), orbit, crossing, block, formed, kind=kind)
     nu = found.multiplier
     off = abs(abs(nu) - 1.0) if crossing.event is Event.PAIR else abs(nu - TARGETS[crossing.event])
     if off > _CRITICAL and not crossing.collision:
@@ -113,6 +119,23 @@ def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -
     if not place.fold:
         return float(rate * along + bend * along**2)
     return float(0.5 * bend * along**2) + _fold_error(curve, at(place.crossing.value), image)
+
+
+def _turn(within: Within, at: float) -> tuple[float, float]:
+    """The parameter where a curve turns at a branch point, by polynomials through places round it, as the equations are
+    singular there, and a bound on its error."""
+    parts = [within.at(at + each * within.step.size) for each in _AROUND]
+    values = np.array([part.moved[-1] for part in parts])
+    turned = []
+    for used in (slice(None), slice(1, -1)):
+        through = Polynomial.fit(_AROUND[used], values[used], values[used].size - 1)
+        turns = through.deriv().roots()
+        turned.append(float(through(turns[np.abs(turns).argmin()].real)))
+    curve, section = within.curve, within.step.start.section
+    images = [curve.image(part.found.x, part.found.value, section, with_error=True) for part in parts]
+    noise = max(_fold_error(curve, part, image) for part, image in zip(parts, images, strict=True))
+    start, scale = within.step.start.last.value, curve.scale
+    return start + scale * turned[0], scale * abs(turned[0] - turned[1]) + SAFETY * noise
 
 
 def _fold_error(curve: Curve, here: Step[Anchor, OnCurve], image: ReturnMap) -> float:

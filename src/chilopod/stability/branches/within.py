@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 SAME_ORBIT = 1e-6
 """Distance between states of one orbit, relative to the sizes of the states."""
 
+_FURTHER = 0.1  # factor on the precision of orbits within a step
 _OFF = 1e-5  # error of the cubic, relative to the step, above which an orbit is corrected
 _LEAVING = 0.05  # distance from a branch point at which the search begins, relative to the step
 _SIDE = 1e-3  # distance from a crossing at which the curve's sides are compared, relative to the step
@@ -34,6 +35,14 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         super().__init__(curve, step)
         self.curve = curve
         self.low = _LEAVING * step.size if step.start.leaving else 0.0
+
+    def at(self, place: float) -> Step[Anchor, OnCurve]:
+        """The part of the step up to a place, corrected further than its ends, as places of events hang on it."""
+        precision, self.curve.precision = self.curve.precision, _FURTHER * self.curve.precision
+        try:
+            return super().at(place)
+        finally:
+            self.curve.precision = precision
 
     @functools.cached_property
     def blocks(self) -> Blocks:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,19 +81,11 @@ def described(
     branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
     symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
     kind = _kind(crossing, k, form, symmetry if breaking else None) if kind is None else kind
-    point = BifurcationPoint(
-        kind,
-        value,
-        error_bound + 4.0 * _EPSILON * abs(value),
-        orbit.state,
-        mode,
-        nu,
-        frequency,
-        criticality=Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED,
-        period=orbit.period,
-        multiplicity=critical.size,
-        symmetry=symmetry,
-    )
+    verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
+    about: dict[str, Any] = {"criticality": verdict, "multiplicity": critical.size, "symmetry": symmetry}
+    error_bound += 4.0 * _EPSILON * abs(value)
+    period = orbit.period
+    point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, period=period, **about)
     if not simple:
         return replace(point, modes=_modes(spec, critical, crossing.event, orbit, block, symmetry))
     return with_coefficients(point, form) if form is not None and with_normal_form else point

@@ -29,6 +29,7 @@ _AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both side
 _REACH, _LEAST_REACH = 0.02, 1e-5  # first and least reach, relative to the course
 _SHORTER = 0.25
 _AGREES = 1e-6  # largest difference of two interpolations, relative to the reach
+_TOGETHER = 0.1  # distance of a multiplier from +1, relative to the next one's, at which both cross together
 _AT_HOME = 0.01  # largest distance from the root finder's place, relative to the reach
 _EPSILON = float(np.finfo(float).eps)
 
@@ -172,7 +173,8 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     """Place and orbit at a multiplier +1, where H - 1 is singular and Newton's method stops anywhere along the mode.
 
     The orbit and det(H' - 1) are interpolated from regular places on both sides, or on one side at an end, ever closer
-    together until interpolations of two orders agree. None if the orbit is regular or there is no room.
+    together until interpolations of two orders agree. None if the orbit is regular, there is no room, or another
+    multiplier is as near +1.
     """
     if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
@@ -192,7 +194,12 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     orbit = bounded(place, found.orbit, found.orbit_error, found.beside.image)
     spec = spectrum(orbit.image)
     distances = np.abs(spec.values - 1.0)
-    uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(spec.error)))
+    order = distances.argsort()
+    distances, errors = distances[order], spec.error[order]
+    if distances[0] > _TOGETHER * distances[1:].min(initial=np.inf):
+        return None  # the polynomials do not separate two crossings
+    errors[0] += distances[0]  # rounding at the places, larger than at the zero where another multiplier is near
+    uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(errors)))
     return Regular(place, bound + SAFETY * uncertain * reach / found.slope, found.orbit, orbit)
 
 

@@ -100,17 +100,8 @@ def normal_form(
         return _of_full_period(fit, mapped, at, orbit_error)
     cubic = at.returns * np.conj(at.multiplier) * fit.cubic
     error = at.returns * fit.cubic_error
-    form = NormalForm(
-        fit.status,
-        0.0,
-        0.0,
-        float(cubic.real),
-        error,
-        float(cubic.imag),
-        error,
-        fit.sampled.radius,
-        resonance=resonance,
-    )
+    real, turning, radius = float(cubic.real), float(cubic.imag), fit.sampled.radius
+    form = NormalForm(fit.status, 0.0, 0.0, real, error, turning, error, radius, resonance=resonance)
     return form if resonance is None else _with_resonant_terms(form, fit, at, resonance)
 
 
@@ -168,14 +159,10 @@ def _of_full_period(fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, orbit_e
         # a -> -a + c a^3 twice: a -> a - 2 c a^3.
         times = k if k % 2 == 0 else 2 * k
         return NormalForm(fit.status, 0.0, 0.0, -times * cubic, times * cubic_error, amplitude=fit.sampled.radius)
-    return NormalForm(
-        fit.status,
-        k * quadratic.real,
-        k * quadratic_error,
-        k * cubic + k * (k - 1) * quadratic.real**2,
-        k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error,
-        amplitude=fit.sampled.radius,
-    )
+    cubic = k * cubic + k * (k - 1) * quadratic.real**2
+    cubic_error = k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error
+    quadratic_value, quadratic_error = k * quadratic.real, k * quadratic_error
+    return NormalForm(fit.status, quadratic_value, quadratic_error, cubic, cubic_error, amplitude=fit.sampled.radius)
 
 
 def _with_resonant_terms(form: NormalForm, fit: Fit, at: CriticalOrbit, resonance: int) -> NormalForm:
@@ -184,13 +171,8 @@ def _with_resonant_terms(form: NormalForm, fit: Fit, at: CriticalOrbit, resonanc
     ratio = None
     if resonance == 4 and abs(resonant) > error:
         ratio = complex(-1j * fit.cubic / abs(resonant))
-    return replace(
-        form,
-        status=NormalFormStatus.STRONG_RESONANCE,
-        resonant=complex(resonant),
-        resonant_error=float(error),
-        ratio=ratio,
-    )
+    form = replace(form, status=NormalFormStatus.STRONG_RESONANCE, ratio=ratio)
+    return replace(form, resonant=complex(resonant), resonant_error=float(error))
 
 
 _BENDS = 4  # one for every order of the manifold, and one more

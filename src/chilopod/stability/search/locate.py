@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -145,16 +146,9 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit
     # Where an orbit is lost the point may be its fold.
     lost = samples.end < samples.high and value + bound >= samples.end
-    point = described(
-        samples.family(value),
-        (value, bound),
-        orbit,
-        crossing,
-        block,
-        _formed(samples, value, orbit),
-        kind=Kind.BRANCH_POINT if (touch or (lost and trivial)) and crossing.event is Event.PLUS else None,
-        with_normal_form=with_normal_form and not touch,
-    )
+    kind = Kind.BRANCH_POINT if (touch or (lost and trivial)) and crossing.event is Event.PLUS else None
+    system, formed, asked = samples.family(value), _formed(samples, value, orbit), with_normal_form and not touch
+    point = described(system, (value, bound), orbit, crossing, block, formed, kind=kind, with_normal_form=asked)
     if not point.error_bound < samples.width:
         raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
     if touch:
@@ -167,17 +161,13 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
     """The fold that a followed orbit begins or ends in."""
     orbit = Orbit(fold.image.state, fold.image, np.zeros(fold.image.state.size))
     crossing = Crossing(fold.value, (fold.value, fold.value), Event.PLUS, 1, 1, 1.0 + 0.0j)
-    formed = _formed(samples, fold.value, orbit)
-    return described(
+    system, place, formed = (
         samples.family(fold.value),
         (fold.value, fold.error_bound),
-        orbit,
-        crossing,
-        None,
-        formed,
-        kind=Kind.FOLD,
-        with_normal_form=with_normal_form,
+        _formed(samples, fold.value, orbit),
     )
+    about: dict[str, Any] = {"kind": Kind.FOLD, "with_normal_form": with_normal_form}
+    return described(system, place, orbit, crossing, None, formed, **about)
 
 
 def _orbit(samples: Samples, value: float) -> Orbit:

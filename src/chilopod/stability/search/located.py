@@ -42,12 +42,18 @@ class Located(Result, Sequence[BifurcationPoint]):
         Remarks, a sentence each.
     evaluations
         Number of orbits computed.
+    searched
+        Interval in which the orbit was followed and searched: less than that asked for if it ended early.
+    ending
+        Reason for an early end, which is also the first remark; empty if the whole interval was searched.
     """
 
     points: tuple[BifurcationPoint, ...]
     status: SearchStatus
     remarks: tuple[str, ...]
     evaluations: int
+    searched: tuple[float, float]
+    ending: str = ""
 
     @property
     def complete(self) -> bool:
@@ -70,7 +76,9 @@ class Located(Result, Sequence[BifurcationPoint]):
     def _lines(self) -> list[str]:
         many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"
         table = rows(point.row for point in self.points)
-        return [f"Located: {many}, {self.status.label}: {self.status.sentence}", *table, *said(self.remarks)]
+        first = f"Located: {many}, {self.status.label}: {self.status.sentence}"
+        low, high = self.searched
+        return [first, f"searched: {low:.9g} to {high:.9g}, {self.evaluations} orbits", *table, *said(self.remarks)]
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the kinds of bifurcations over the parameter, on axes of matplotlib or on new ones."""
@@ -88,8 +96,10 @@ class Located(Result, Sequence[BifurcationPoint]):
         """Dataset of the points over ``point``. The multiplier is the critical one of the return map."""
         names = ("value", "error_bound", "kind", "criticality", "coefficient", "coefficient_error")
         more = ("multiplier", "multiplicity", "frequency", "period", "orbit", "mode")
-        said, status = "; ".join(self.remarks), self.status.label
-        return dataset("point", columns(self.points, *names, *more), status=status, remarks=said)
+        about = {"status": self.status.label, "remarks": "; ".join(self.remarks), "ending": self.ending}
+        low, high = self.searched
+        searched = {"low": low, "high": high, "evaluations": self.evaluations}
+        return dataset("point", columns(self.points, *names, *more), **about, **searched)
 
 
 def located(
@@ -131,4 +141,5 @@ def located(
         status = status.worst(SearchStatus.INCOMPLETE)
     points = sorted((each for each in results if isinstance(each, BifurcationPoint)), key=lambda point: point.value)
     remarks += [each for each in results if isinstance(each, str)] + samples.family.remarks
-    return Located(tuple(points), status, tuple(dict.fromkeys(remarks)), samples.count)
+    searched_part = here.start, max(here.start, here.end)
+    return Located(tuple(points), status, tuple(dict.fromkeys(remarks)), samples.count, searched_part, here.ending)

@@ -210,9 +210,10 @@ class Samples:
 
     def _keep_known(self, values: list[float]) -> None:
         """Samples of systems that depend on time and know their orbits."""
-        systems = [self.family(value) for value in values]
-        for _ in systems:
+        systems = []
+        for value in values:
             self.budget.take()
+            systems.append(self.family(value))
         with self.family.asking(values[0]) if len(values) == 1 else UserCode("family", values[0]):
             states = [known_state(system) for system in systems]
             images = return_maps(systems, states)
@@ -221,6 +222,7 @@ class Samples:
 
     def _of_itself(self, value: float) -> Sample:
         """A sample of a system, from its own state on the orbit or near it, or from the neighbouring orbit."""
+        self.budget.take(0)
         system = self.family(value)
 
         def own(settle: bool) -> Sample:
@@ -235,6 +237,7 @@ class Samples:
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
         """A sample near a state, with about the period of a neighbouring sample."""
+        self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
         with self.family.asking(value):
             section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
