@@ -66,10 +66,13 @@ def test_page_is_there_before_anything_is_computed(tmp_path):
         assert re.findall("Still to come:</b> (.*).</p>", html) == ["the first", "the second"]
 
 
-def test_the_first_line_says_where_the_page_is(monkeypatch, capsys, tmp_path):
+def test_the_first_lines_say_what_is_computed_and_where_the_page_is(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(registry, "load_sections", lambda: (ONE,))
     assert main(["reproduce", "--out", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.splitlines()[0] == f"The page is {tmp_path / 'index.html'}"
+    plan, page, *_ = capsys.readouterr().out.splitlines()
+    assert plan.startswith("The paper's own experiments, and one headline of every chapter beyond")
+    assert page == f"The page is {tmp_path / 'index.html'}"
+    assert plan in (tmp_path / "index.html").read_text(encoding="utf-8").replace("&#39;", "'")
 
 
 def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):
@@ -127,7 +130,7 @@ def test_what_fails_is_said_and_the_others_are_there(monkeypatch, capsys, tmp_pa
     assert main(["reproduce", "--out", str(tmp_path), "--json"]) == 1
     out, err = capsys.readouterr()
     assert json.loads(out)["failures"] == {"one": "ValueError: no <luck>"}
-    assert str(tmp_path / "index.html") in err.splitlines()[0]
+    assert str(tmp_path / "index.html") in err.splitlines()[1]
     assert err.splitlines()[-1] == "failed: the first: ValueError: no <luck>"
     html = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Failed:</b> the first. ValueError: no &lt;luck&gt;" in html

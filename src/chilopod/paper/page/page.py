@@ -84,6 +84,7 @@ def page(
     waiting: Collection[Section[Any]],
     robot_file: str,
     state: State = State.DONE,
+    plan: str = "",
 ) -> str:
     """The page as HTML, which reloads itself while it is running.
 
@@ -101,6 +102,7 @@ def page(
         holds=" ".join([found.context.size.name, *(section.name for section in found.values)]),
         css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
         state=state.value,
+        plan=plan,
         reload=_RELOAD,
         done=sum(section in found for section in sections),
         count=len(sections),

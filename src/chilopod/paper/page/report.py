@@ -41,8 +41,8 @@ class Report:
     each as a whole. Where films cannot be encoded, the replays are there without them.
 
     Used as a context: the page is there as soon as it is entered, and complete when it is left. What is drawn is drawn
-    in a thread beside the computation of what comes next, and ``progress`` is told how much is. The folder is created
-    where there is none.
+    in a thread beside the computation of what comes next, and ``progress`` is told how much is. The page begins with
+    ``plan``, see :func:`chilopod.paper.duration.plan`. The folder is created where there is none.
 
     Raises
     ------
@@ -56,11 +56,12 @@ class Report:
         context: Context,
         folder: str | Path,
         progress: SectionProgress = lambda what, done, words: None,
+        plan: str = "",
     ) -> None:
         self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
         """Why sections could not be computed or drawn."""
-        self._sections, self._progress = sections, progress
+        self._sections, self._progress, self._plan = sections, progress, plan
         self._found = Found(context)
         self._opening: list[Drawn] = []
         self._shown: dict[Section[Any], Shown] = {}
@@ -152,7 +153,7 @@ class Report:
         shown = [self._shown[each] for each in self._sections if each in self._shown]
         waiting = [section for section in self._sections if section not in self._found]
         waiting += [section for section, _ in self._films]
-        html = page(self._found, self._sections, self._opening, shown, self.failures, waiting, name, state)
+        html = page(self._found, self._sections, self._opening, shown, self.failures, waiting, name, state, self._plan)
         write_atomic(self.page, html)  # first: what is beside it is known by it to be ours
         write_atomic(robot_file, context.robot.to_toml())
         write_atomic(data / "robot-3d.toml", context.whole.to_toml())
@@ -199,9 +200,10 @@ def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *
                 problem = "has files that are of no report and might be replaced, which takes --force"
                 raise OutputError(problem, source=str(folder / beside))
         return
-    done, names = held
-    larger = [f"it is {done.name.lower()}"] if list(Size).index(done) < list(Size).index(size) else []
-    more = larger or sorted({*names} - {section.name for section in sections})
+    (done, names), sizes = held, list(Size)
+    kept = [section for section in sections if section.name in names]
+    larger = any(sizes.index(done.within(each)) < sizes.index(size.within(each)) for each in kept)
+    more = [f"it is {done.name.lower()}"] if larger else sorted({*names} - {section.name for section in kept})
     if more:
         problem = f"is a report that has more ({', '.join(more)}) and is only replaced with --force"
         raise OutputError(problem, source=str(page))

@@ -135,4 +135,5 @@ IDENTIFICATION: Section[Identification] = Section(
     identification_rows,
     identification.panel,
     beyond=True,
+    headline=True,
 )
