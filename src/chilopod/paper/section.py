@@ -67,7 +67,7 @@ class Context:
     folder: Path | None = None  # of the records of trials, by which a stopped computation is resumed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Movie:
     """A film of walks side by side."""
 
