@@ -20,7 +20,7 @@ SECONDS: Final = {
     "mode": (1, 1),
     "exponents": (6, 3),
     "modules": (5, 2),
-    "curved": (24, 10),
+    "curved": (24, 15),
     "branch": (2, 2),
     "undulation": (12, 12),
     "turning": (5, 3),

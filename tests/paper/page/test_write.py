@@ -195,7 +195,6 @@ def test_what_scatter_leaves_open_has_its_own_mark_and_is_counted(results, tmp_p
     text = " ".join(page.text.split())
     assert "meets 2 of 4 further statements about the robot that it was not fitted to; 1 more is left open" in text
     assert text.count("? undecided") == 3
-    assert "4 agree 3 undecided 2 differ" in text
     assert [tag for tag, attrs in page.tags if attrs.get("class") == "verdict undecided"] == ["span"] * 3
 
 

@@ -72,16 +72,16 @@ def poster(
     speed: float = 1.0,
     size: tuple[int, int] = (960, 480),
 ) -> bytes:
-    """Frame of the film of :func:`filmed` at the start of its last third, as PNG, with errors likewise."""
+    """Frame of the film of :func:`filmed` in its last third, as PNG, with errors likewise."""
     shown = scene(record, titles, frame_times(record, size, 25, speed))
     with style.house_style():
         return telling(Stage(shown, heading, size, speed))
 
 
 def telling(stage: Stage) -> bytes:
-    """PNG of the frame of a stage at the start of its last third, when it shows what came of the walks."""
+    """PNG of the frame of a stage in its last third, when it shows what came of the walks."""
     stream = io.BytesIO()
-    imsave(stream, stage.drawn(2 * (len(stage.shown.frames.time) - 1) // 3), format="png")
+    imsave(stream, stage.drawn(3 * (len(stage.shown.frames.time) - 1) // 4), format="png")
     return stream.getvalue()
 
 

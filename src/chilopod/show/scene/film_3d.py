@@ -70,7 +70,7 @@ def poster_3d(
     speed: float = 1.0,
     size: tuple[int, int] = (1440, 400),
 ) -> bytes:
-    """Frame of the film of :func:`film_3d` at the start of its last third, as PNG, with errors likewise."""
+    """Frame of the film of :func:`film_3d` in its last third, as PNG, with errors likewise."""
     walks = _Walks(record, titles, frame_times(record, size, 25, speed))
     with gl.context(*size), style.house_style():
         stage = _Stage3D(walks, heading, size, speed, False)
