@@ -51,10 +51,11 @@ _IN_FULL: Final = {
 def plan(sections: Sequence[Section[Any]], size: Size, named: bool = False) -> str:
     """Kind of a report of a size, its duration here, and what a larger one adds; ``named`` if its sections were."""
     what = f"{len(sections)} of all sections" if named else f"{size.value[0].upper()}{size.value[1:]}"
-    if named and seconds(sections, size) < _SHORT:
-        return f"{what}: {in_words(0.0)}."
+    own = seconds(sections, size)
+    if own < _SHORT:
+        return f"{what}: {in_words(own)}."
     here = pace()
-    said = f"{what}: {in_words(here * seconds(sections, size))} here, less where trials are kept."
+    said = f"{what}: {in_words(here * own)} here, less where trials are kept."
     if named or size not in _IN_FULL:
         return said
     larger = list(Size)[list(Size).index(size) - 1]

@@ -8,7 +8,7 @@ import time
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
@@ -111,7 +111,8 @@ def page(
     mode = found[MODE]
     template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
     tables = {chapter: [_row(row) for row in rows] for chapter, rows in found.planar_rows().items()}
-    robot_rows = [_row(row) for row in found.robot_rows()]
+    # Nothing is left out before all has been tried.
+    robot_rows = [_row(replace(row, absent="") if waiting else row) for row in found.robot_rows()]
     looks = Counter(row["look"] for rows in (*tables.values(), robot_rows) for row in rows)
     return template.render(
         title=_TITLE,
