@@ -31,7 +31,7 @@ def test_verdicts_are_counted_and_each_count_leads_to_its_rows():
         ("agrees", "2", "agree"),
         ("differs", "1", "differ"),
         ("undetermined", "1", "not determined"),
-        ("more", "1", "needs more trials"),
+        ("more", "1", "need more trials"),
     ]
     looks = [attrs["data-look"] for tag, attrs in found.tags if tag == "tr" and attrs.get("class") == "row"]
     assert [looks.count(look) for look, *_ in strip] == [int(count) for _, count, _ in strip]

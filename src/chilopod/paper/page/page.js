@@ -21,6 +21,7 @@
     for (const row of document.querySelectorAll("tr.row")) row.hidden = Boolean(look) && row.dataset.look !== look;
     for (const body of document.querySelectorAll("table.rows tbody"))
       body.hidden = Boolean(body.querySelector("tr.row")) && !body.querySelector("tr.row:not([hidden])");
+    for (const table of tables()) table.closest("section").hidden = !table.querySelector("tr.row:not([hidden])");
     for (const button of document.querySelectorAll(".filter button"))
       button.setAttribute("aria-pressed", String(button.dataset.look === look));
   }
@@ -41,7 +42,29 @@
       "aria-sort", index === column && direction ? (direction > 0 ? "ascending" : "descending") : "none"));
   }
 
+  // The poster of a film is seen whole: its controls come when it is played.
+  function uncover() {
+    for (const film of document.querySelectorAll("video[controls]:not([data-played])")) {
+      const stage = Object.assign(document.createElement("span"), { className: "stage" });
+      const button = Object.assign(document.createElement("button"), { type: "button", textContent: "▶ Play" });
+      button.setAttribute("aria-label", `Play: ${film.getAttribute("aria-label")}`);
+      const start = () => {
+        film.controls = true;
+        film.dataset.played = "";
+        button.remove();
+        film.focus();
+        film.play();
+      };
+      button.addEventListener("click", start);
+      film.addEventListener("click", start, { once: true });
+      film.controls = false;
+      film.replaceWith(stage);
+      stage.append(film, button);
+    }
+  }
+
   function dress() {
+    uncover();
     const strip = document.querySelector(".strip"), holder = document.getElementById("tables");
     if (!strip || !holder || !tables().length) return;
     holder.querySelector(".filter")?.remove();

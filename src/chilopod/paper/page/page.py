@@ -20,7 +20,7 @@ from markupsafe import Markup, escape
 from chilopod import units
 from chilopod.errors import in_words
 from chilopod.paper.page.story import summary
-from chilopod.paper.section import NEEDS_MORE, Found, Section
+from chilopod.paper.section import Found, Section
 from chilopod.paper.straight.sections import MODE
 from chilopod.paper.table import RobotRow, Row, Verdict
 from chilopod.robot import Robot
@@ -42,7 +42,7 @@ _COUNTED: Final = {
     "undecided": "undecided",
     "differs": "differ",
     "undetermined": "not determined",
-    "more": NEEDS_MORE,
+    "more": "need more trials",
 }
 """Words under which verdicts are counted, by class."""
 
