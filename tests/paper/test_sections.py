@@ -1,8 +1,11 @@
 """The registry of sections, and how they are computed."""
 
+import re
+
 import pytest
 
 from chilopod.errors import ParameterError
+from chilopod.paper import duration
 from chilopod.paper.registry import REGISTRY, chosen, load_sections
 from chilopod.paper.section import Context, Found, Section, Size, reproduce
 from chilopod.paper.straight.sections import MODE, UNIFORM
@@ -36,19 +39,15 @@ def test_sections_come_in_their_own_order_and_misspelt_ones_are_refused():
 def test_what_is_left_out_unless_it_is_named():
     everything = set(names(chosen()))
     assert set(names(SECTIONS)) - everything == {"robot-structures"}
-    assert everything - set(names(chosen(quick=True))) == {"robot-spread", "robot-courses"}
-    assert names(chosen(["robot-structures", "robot-spread"], quick=True)) == ["robot-spread", "robot-structures"]
+    assert names(chosen(size=Size.FULL)) == names(chosen())
+    headlines, others = {"identification", "robot-why", "courses"}, {"robot-spread", "robot-numerics", "courses-robust"}
+    others |= {"robot-courses", "courses-movie"}
+    assert everything - set(names(chosen(size=Size.MAIN))) == others
+    named = chosen(["robot-structures", "robot-spread"], Size.QUICK)
+    assert names(named) == ["robot-spread", "robot-structures"]
     paper = names(chosen(paper=True))
-    assert everything - set(paper) == {
-        "identification",
-        "robot-spread",
-        "robot-numerics",
-        "robot-why",
-        "courses",
-        "courses-robust",
-        "robot-courses",
-        "courses-movie",
-    }
+    assert names(chosen(size=Size.QUICK)) == paper
+    assert everything - set(paper) == headlines | others
     with pytest.raises(ParameterError, match="robot-why"):
         chosen(["robot-why"], paper=True)
 
@@ -63,6 +62,28 @@ def test_rows_put_the_paper_beside_what_was_computed():
     assert verdicts["critical k1"] == "agrees"
     assert verdicts["critical mode, joint 1"] == "agrees"
     assert seen[-1] == (UNIFORM.sentence, 1.0)
+
+
+def test_a_main_report_has_the_papers_experiments_in_full_and_headlines_from_fewer_trials():
+    seen = {}
+    for name, beyond in (("paper", False), ("beyond", True)):
+        section = Section(name, "chapter", name, lambda context, report: context.size, beyond=beyond, headline=beyond)
+        seen[name] = reproduce([section], Context(size=Size.MAIN))[section]
+    assert seen == {"paper": Size.FULL, "beyond": Size.QUICK}
+
+
+def test_the_plan_says_what_a_report_has_and_how_long_it_takes(monkeypatch):
+    monkeypatch.setattr(duration, "pace", lambda: 2.0)
+    for size, words, larger in (
+        (Size.QUICK, "The paper's main experiments", "Without --quick"),
+        (Size.MAIN, "one headline of every chapter beyond", "--all adds"),
+        (Size.FULL, "everything beyond", ""),
+    ):
+        said = duration.plan(chosen(size=size), size)
+        assert re.search(rf"{words}.*: about [\d.]+ (minutes|hours) here", said)
+        assert (larger in said) if larger else ("--all" not in said)
+    assert duration.plan([MODE], Size.FULL, named=True) == "1 of all sections: less than a minute."
+    assert set(duration.SECONDS) <= set(REGISTRY)
 
 
 def one(value):

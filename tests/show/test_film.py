@@ -6,10 +6,11 @@ import av
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.image import imread
 
 from chilopod.errors import OutputError, ParameterError
 from chilopod.show import style
-from chilopod.show.scene.film import filmed
+from chilopod.show.scene.film import filmed, poster
 from helpers.walks import on_course, walk
 
 
@@ -60,6 +61,14 @@ def test_module_1_moves_to_the_right_until_the_robot_stops():
 
     assert changed(25, 35) < 1e-4  # nothing but the noise of the encoder along an edge
     assert changed(15, 35) > 1e-2
+
+
+def test_the_poster_is_a_frame_of_the_last_third():
+    shown, look = walk(0.5, duration=4.0), {"titles": ["a"], "heading": "h", "size": (480, 320)}
+    picture = 255.0 * imread(io.BytesIO(poster(shown, **look)))[..., :3]
+    frames = decoded(filmed(shown, **look)).astype(float)
+    nearest = int(np.argmin(np.abs(frames - picture).mean(axis=(1, 2, 3))))
+    assert 2 / 3 <= nearest / (len(frames) - 1) < 1
 
 
 def test_robot_that_never_started():

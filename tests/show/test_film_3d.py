@@ -11,7 +11,7 @@ from matplotlib.image import imread
 from chilopod import load_robot
 from chilopod.errors import OutputError, ParameterError
 from chilopod.show import style
-from chilopod.show.scene.film_3d import film_3d, stills
+from chilopod.show.scene.film_3d import film_3d, poster_3d, stills
 from chilopod.show.scene.stage_3d import Look, Studio, framing
 from chilopod.twin import gl, initial_states, simulate
 
@@ -124,6 +124,12 @@ def test_film_of_robots_that_stop_or_never_start(drawn, record):
     stopped["status"] = ("robot", np.array(["fallen", "diverged"], dtype=object))
     film = film_3d(stopped, titles=["x" * 200, "b"], heading="y" * 200, fps=2, size=(320, 240))
     assert len(film) > 1000
+
+
+def test_the_poster_is_as_large_as_the_film(drawn, record):
+    picture = read(poster_3d(record, titles=["a", "b"], heading="h", size=(480, 240)))
+    assert picture.shape == (240, 480, 4)
+    assert near(255.0 * picture, style.BLUE).any()
 
 
 def test_stills(drawn, record):

@@ -32,7 +32,7 @@ from chilopod.paper.registry import REGISTRY, chosen
 if TYPE_CHECKING:
     from chilopod.output import Content
     from chilopod.paper.page import Report
-    from chilopod.paper.section import Found, Section
+    from chilopod.paper.section import Found, Section, Size
     from chilopod.robot import Robot
 
     Files = Iterable[tuple[Path, bytes]]
@@ -57,6 +57,8 @@ ReportOption = Annotated[
 TinyOption = Annotated[
     bool, typer.Option("--tiny", help="Hardly anything of every section: to see that all works, not what it finds.")
 ]
+AllOption = Annotated[bool, typer.Option("--all", help="Every study beyond the paper, with all trials: an hour.")]
+QuickOption = Annotated[bool, typer.Option("--quick", help="The paper's main experiments: three minutes.")]
 PaperOption = Annotated[bool, typer.Option("--paper", help="The paper's own experiments, not what goes beyond them.")]
 
 
@@ -66,7 +68,8 @@ class ReportOptions:
 
     only: OnlyOption = None
     out: ReportOption = Path("report")
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False
+    everything: AllOption = False
+    quick: QuickOption = False
     tiny: TinyOption = False
     paper: PaperOption = False
     cluster: ClusterOption = None
@@ -79,8 +82,10 @@ class ReportOptions:
 def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
     """Repeat the paper with its planar model and with its robot in 3-D, and write a report beside its own numbers.
 
-    The page is there at once and fills in. Trials are kept in the folder, so a run that was stopped goes on where it
-    was. It takes no robot and no --set: the numbers beside which it puts its own are those of the paper's robot.
+    By default it has the paper's own experiments and one headline of every chapter beyond them, which takes ten
+    minutes; the first line says how long it takes here. The page is there at once and fills in. Trials are kept in the
+    folder, so a run that was stopped goes on where it was. It takes no robot and no --set: the numbers beside which it
+    puts its own are those of the paper's robot.
     """
     if options.overrides:
         from chilopod.errors import ParameterError
@@ -88,10 +93,13 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
         problem = "must not be given, because the paper's numbers are those of its own robot"
         allowed = "no --set; stability, bifurcation, branch, walk and turn take any robot"
         raise ParameterError(problem, field="--set", value=options.overrides[0], allowed=allowed)
-    sections = chosen(options.only, options.quick or options.tiny, options.paper)  # refuses an unknown section
     from chilopod.errors import in_words
+    from chilopod.paper.section import Size
 
-    found, report, stopped = _computed(options, sections)
+    size = Size.FULL if options.everything or options.only else Size.MAIN
+    size = Size.TINY if options.tiny else Size.QUICK if options.quick else size
+    sections = chosen(options.only, size, options.paper)  # refuses an unknown section
+    found, report, stopped = _computed(options, sections, size)
     _print(options, found, report)
     for section, failure in report.failures.items():
         typer.echo(f"failed: {section.sentence}: {in_words(failure)}", err=True)
@@ -103,17 +111,21 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
         raise typer.Exit(1)
 
 
-def _computed(options: ReportOptions, sections: list[Section[Any]]) -> tuple[Found, Report, Exception | None]:
+def _computed(
+    options: ReportOptions, sections: list[Section[Any]], size: Size
+) -> tuple[Found, Report, Exception | None]:
     """Results, their report, and the error that stopped the work, if one did."""
     from chilopod.errors import OutputError
     from chilopod.paper import section as computed
+    from chilopod.paper.duration import plan
     from chilopod.paper.page import Report, check_report
-    from chilopod.paper.section import Context, Found, Size
+    from chilopod.paper.section import Context, Found
 
-    size = Size.TINY if options.tiny else Size.QUICK if options.quick else Size.FULL
     check_report(options.out, sections, size, replace=options.force)
     context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, options.out / "trials")
     found, stopped = Found(context), None
+    said = plan(sections, size, options.only is not None or options.paper)
+    typer.echo(said, err=options.as_json)
 
     def add(now: Found, section: Section[Any]) -> None:
         nonlocal found
@@ -124,7 +136,7 @@ def _computed(options: ReportOptions, sections: list[Section[Any]]) -> tuple[Fou
         with (
             walking_on(options.cluster),
             progress_bar("reproduce") as progress,
-            Report(sections, context, options.out, progress) as report,
+            Report(sections, context, options.out, progress, said) as report,
         ):
             typer.echo(f"The page is {report.page.resolve()}", err=options.as_json)
             computed.reproduce(sections, context, progress, add)

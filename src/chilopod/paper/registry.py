@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from chilopod.errors import ParameterError, nearest_name
 
 if TYPE_CHECKING:
-    from chilopod.paper.section import Section
+    from chilopod.paper.section import Section, Size
 
 REGISTRY: dict[str, str] = {
     "mode": "straight.sections.MODE",
@@ -22,9 +22,9 @@ REGISTRY: dict[str, str] = {
     "undulation": "curved.sections.UNDULATION",
     "turning": "turning.sections.TURNING",
     "movies": "turning.sections.MOVIES",
+    "robot-movies": "robot.sections.FILMS",
     "robot-walks": "robot.sections.WALKS",
     "robot-turning": "robot.sections.TASKS",
-    "robot-movies": "robot.sections.FILMS",
     "identification": "straight.sections.IDENTIFICATION",
     "robot-spread": "robot.sections.SPREAD",
     "robot-numerics": "robot.sections.NUMERICS",
@@ -44,16 +44,15 @@ def load_sections() -> tuple[Section[Any], ...]:
     return tuple(getattr(import_module(f"chilopod.paper.{module}"), name) for module, _, name in homes)
 
 
-def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool = False) -> list[Section[Any]]:
-    """The sections asked for, by default all but those that are computed on request, in the order they are computed; a
-    quick report leaves out some that are not named, and a report of the paper leaves out studies beyond its
-    experiments.
+def chosen(only: Iterable[str] | None = None, size: Size | None = None, paper: bool = False) -> list[Section[Any]]:
+    """The sections asked for, by default those that a report of a size has (all but those that are computed on request,
+    if none is given), in the order they are computed; a report of the paper leaves out studies beyond its experiments.
 
     Raises ParameterError if one of them does not exist, or goes beyond the paper in a report of the paper.
     """
     sections = {section.name: section for section in load_sections()}
     if only is None:
-        found = [each for each in sections.values() if not each.on_request and not (quick and each.full)]
+        found = [each for each in sections.values() if (size.has(each) if size else not each.on_request)]
         return [section for section in found if not (paper and section.beyond)]
     names = list(only)
     for name in names:

@@ -66,9 +66,10 @@ def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Dif
 
 def spread_difference(one: ArrayLike, other: ArrayLike) -> Difference:
     """Ratio of the scatter of trials to that of others: the difference of the mean distances from the median (the test
-    of Brown and Forsythe)."""
+    of Brown and Forsythe). Its error is not known for fewer than three trials: the distances of two are equal."""
     distances = [np.abs(each - np.nanmedian(each)) for each in (np.asarray(one), np.asarray(other))]
-    return difference(*distances)
+    found = difference(*distances)
+    return found if min(np.isfinite(each).sum() for each in distances) > 2 else Difference(found.value, float("nan"))
 
 
 def mean_and_error(values: ArrayLike) -> tuple[float, float]:

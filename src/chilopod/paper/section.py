@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -22,24 +22,39 @@ S = TypeVar("S")
 T = TypeVar("T")
 Line = Row | OfTwin | OfPlanar
 
+NEEDS_MORE = "needs more trials"
+"""Words of a quick report for what it leaves out."""
+
 SectionProgress = Callable[[str, float, str], None]
 """Called with the section, the part of it that is done (0 to 1), and a few words."""
 
 
 class Size(Enum):
-    """Size of a report: how much of everything it computes."""
+    """Size of a report: how much of everything it computes, in words."""
 
-    FULL = "as much as the paper"
-    QUICK = "coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact"
+    FULL = "the paper's own experiments and everything beyond them"
+    MAIN = "the paper's own experiments, and one headline of every chapter beyond them from fewer trials"
+    QUICK = "the paper's main experiments; some of its trials and what goes beyond are left out"
     TINY = "every section, but hardly anything of it: walks of the whole robot are cut before they have settled"
 
     def of(self, full: S, quick: S, tiny: S) -> S:
         """The one of three that is this size's."""
-        return {Size.FULL: full, Size.QUICK: quick, Size.TINY: tiny}[self]
+        return {Size.FULL: full, Size.MAIN: full, Size.QUICK: quick, Size.TINY: tiny}[self]
 
     def cut(self, usual: S, tiny: S) -> S:
         """Value for a report that is not tiny; a tiny one has less of it."""
         return self.of(usual, usual, tiny)
+
+    def has(self, section: Section[Any]) -> bool:
+        """True if a report of this size has a section without being asked for it by name."""
+        beyond = self is not Size.QUICK and (self is not Size.MAIN or section.headline)
+        return not section.on_request and (beyond or not section.beyond)
+
+    def within(self, section: Section[Any]) -> Size:
+        """Size of one section in a report of this size."""
+        if self is not Size.MAIN:
+            return self
+        return Size.QUICK if section.beyond else Size.FULL
 
 
 @dataclass(frozen=True)
@@ -52,7 +67,7 @@ class Context:
     folder: Path | None = None  # of the records of trials, by which a stopped computation is resumed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Movie:
     """A film of walks side by side."""
 
@@ -84,8 +99,8 @@ class Section(Generic[T]):
     needs: tuple[Section[Any], ...] = ()  # come before it
     beside: tuple[Section[Any], ...] = ()  # shown in its figures, which are drawn again when they are there
     beyond: bool = False  # beyond the paper's own experiments
+    headline: bool = False  # the one of its chapter beyond them that a main report has
     on_request: bool = False  # computed only if it is asked for by name
-    full: bool = False  # left out of a quick report unless it is asked for by name
 
     def figures(self, found: Found) -> list[Panel]:
         """Figures of the results."""
@@ -117,7 +132,7 @@ class Found:
     def add(self, section: Section[T], progress: Progress = silent) -> None:
         """Compute a section, and make its lines of the tables."""
         needed = self.of(section.needs)
-        value = section.compute(self.context, progress, *needed)
+        value = section.compute(replace(self.context, size=self.context.size.within(section)), progress, *needed)
         rows = section.rows(value, *needed)
         self.values[section], self.rows[section] = value, rows
 
@@ -134,7 +149,9 @@ class Found:
 
     def robot_rows(self) -> list[RobotRow]:
         """Rows of the table robot | twin | planar model."""
-        return robot_rows((row for rows in self.rows.values() for row in rows), ORDER)
+        rows = [row for each in self.rows.values() for row in each]
+        left_out = self.context.size is Size.QUICK and any(isinstance(row, OfTwin) for row in rows)
+        return robot_rows(rows, ORDER, NEEDS_MORE if left_out else "")
 
 
 def reproduce(

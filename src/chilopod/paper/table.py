@@ -133,13 +133,17 @@ class RobotRow:
     kind: str  # one of :class:`Kind`
     verdict: Verdict  # on the twin
     asked: str  # condition for a verdict of *within*
+    absent: str = ""  # words where the twin has no result
 
     def data(self) -> dict[str, Any]:
         """The line as plain data, with results in words and as numbers."""
-        words = {"twin": self.twin.words if self.twin else "", "planar": "; ".join(each.words for each in self.planar)}
+        words = {
+            "twin": self.twin.words if self.twin else self.absent,
+            "planar": "; ".join(each.words for each in self.planar),
+        }
         twin = (self.twin or Result()).data()
         planar = (self.planar[0] if len(self.planar) == 1 else Result()).data()
-        line = {name: value for name, value in vars(self).items() if name != "statement"}
+        line = {name: value for name, value in vars(self).items() if name not in ("statement", "absent")}
         return {**line, **words, **twin, "planar_value": planar["value"]}
 
 
@@ -153,8 +157,10 @@ def of_twin(statement: Statement[Band], result: Result, reading: str = "") -> Of
     return OfTwin(statement, result, within(statement.said.answer(result.value, result.error)), reading)
 
 
-def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Statement[Said]]) -> list[RobotRow]:
-    """Rows on statements, in their order; others come behind."""
+def robot_rows(
+    found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Statement[Said]], absent: str = ""
+) -> list[RobotRow]:
+    """Rows on statements, in their order, with words where the twin has no result; others come behind."""
     rows, lines = [row for row in found if not isinstance(row, Row)], []
     for each in dict.fromkeys([*order, *(row.statement for row in rows)]):
         said, kind = each.said, each.kind.value
@@ -165,5 +171,5 @@ def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Stateme
             lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.condition))
         if planar and not twins:
             none = Verdict.NOT_COMPUTED
-            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.condition))
+            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.condition, absent))
     return lines

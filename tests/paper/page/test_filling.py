@@ -5,6 +5,7 @@ import re
 import shutil
 import threading
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,13 +16,18 @@ from chilopod.cli import main
 from chilopod.errors import OutputError
 from chilopod.paper import registry
 from chilopod.paper.page import Report, write_report
-from chilopod.paper.page.page import Film
+from chilopod.paper.page.page import Film, State, page
 from chilopod.paper.section import Context, Found, Section, reproduce
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.show.panel import Panel
+from helpers.browser import CHROMIUM, Browser
 from helpers.html_page import Page as PAGE
 
-RELOAD = '<meta http-equiv="refresh"'
+RUNNING = 'data-state="running"'
+THERE = """new Promise((done) => {
+  const look = () => %s ? done(true) : setTimeout(look, 50);
+  look();
+})"""
 CONTEXT = Context()
 
 
@@ -61,15 +67,18 @@ def text(report):
 def test_page_is_there_before_anything_is_computed(tmp_path):
     with Report([ONE, TWO], CONTEXT, tmp_path) as report:
         html = text(report)
-        assert RELOAD in html
+        assert RUNNING in html
         assert "0 of 2 sections" in html
         assert re.findall("Still to come:</b> (.*).</p>", html) == ["the first", "the second"]
 
 
-def test_the_first_line_says_where_the_page_is(monkeypatch, capsys, tmp_path):
+def test_the_first_lines_say_what_is_computed_and_where_the_page_is(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(registry, "load_sections", lambda: (ONE,))
     assert main(["reproduce", "--out", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.splitlines()[0] == f"The page is {tmp_path / 'index.html'}"
+    plan, page, *_ = capsys.readouterr().out.splitlines()
+    assert plan.startswith("The paper's own experiments, and one headline of every chapter beyond")
+    assert page == f"The page is {tmp_path / 'index.html'}"
+    assert plan in PAGE((tmp_path / "index.html").read_text(encoding="utf-8")).text
 
 
 def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):
@@ -78,11 +87,11 @@ def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):
     with Report([ONE, two], CONTEXT, tmp_path) as report:
         reproduce([ONE, two], CONTEXT, callback=lambda found, section: report.add(found, [section]))
     (between,) = seen
-    assert RELOAD in between
+    assert RUNNING in between
     for expected, html in ((["one"], between), (["one", "two"], text(report))):
         assert re.findall('<section id="(one|two)"', html) == expected
         assert "quantity 1" in html
-    assert RELOAD not in text(report)
+    assert RUNNING not in text(report)
     assert "Still to come" not in text(report)
 
 
@@ -96,26 +105,68 @@ def test_what_is_shown_beside_others_is_drawn_once_more(tmp_path):
     assert seen == [None, 2, 2]
 
 
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium")
+    with Browser(tmp_path_factory.mktemp("browser")) as browser:
+        yield browser
+
+
+def test_new_sections_are_put_in_and_the_readers_place_stays(browser, tmp_path):
+    one = replace(ONE, rows=lambda value: [*rows(value), Row("other", "1", Result("2"), "here", Verdict.DIFFERS)])
+    with Report([one, TWO], CONTEXT, tmp_path) as report:
+        report.add(reproduce([TWO], CONTEXT), [TWO])
+        while 'id="two"' not in text(report):
+            pass
+        browser.open(report.page)
+        top = "document.getElementById('two').getBoundingClientRect().top"
+        browser.run("window.mark = 'the same page'; document.getElementById('two').scrollIntoView()")
+        before = browser.run(top)
+        report.add(reproduce([one, TWO], CONTEXT), [one])
+        assert browser.run(THERE % "document.getElementById('one')")
+        assert browser.run(top) == pytest.approx(before, abs=1.0)
+    assert browser.run(THERE % "document.body.dataset.state === 'done'")
+    assert "Being computed" not in browser.run("document.body.innerText")
+    assert browser.run("window.mark") == "the same page"
+    browser.run("document.querySelector('.strip a.differs').click()")
+    rows_shown = "[...document.querySelectorAll('tr.row:not([hidden]) th')].map((each) => each.textContent)"
+    assert browser.run(rows_shown) == ["other"]
+    browser.run("document.querySelector('.filter button').click(); document.querySelector('thead button').click()")
+    assert browser.run(rows_shown) == ["other", "quantity 1", "quantity 2"]
+    assert browser.named("Runtime.exceptionThrown") == []
+
+
+def test_a_page_whose_computation_was_killed_says_so(browser, tmp_path):
+    html = page(Found(CONTEXT), [ONE], [], [], {}, [ONE], "aoi2022-planar", State.RUNNING)
+    (tmp_path / "index.html").write_text(re.sub('data-written="[^"]*"', 'data-written="1e9"', html), encoding="utf-8")
+    browser.open(tmp_path / "index.html")
+    assert browser.run(THERE % "document.querySelector('#status .failed')")
+    said = browser.run("document.getElementById('status').innerText")
+    assert "The computation has ended: there is no sign of life of it since Sep" in said
+
+
 def test_films_wait_while_there_is_anything_else_to_draw(monkeypatch, tmp_path):
     seen, added = [], threading.Event()
 
     def film(movie, folder):
         seen.append(movie)
         assert re.findall("Still to come:</b> (.*).</p>", text(report)) == ["the first"]
-        return Film(movie, "A walk", 1.0, False)
+        return Film(movie.name, "A walk", 1.0, False)
 
     def panels(value, two):
         added.wait(60.0)
         return [panel("one")]
 
     monkeypatch.setattr("chilopod.paper.page.report.write_movie", film)
+    movie = SimpleNamespace(name="film", stills=())
     two = replace(TWO, panels=lambda value: seen.append("two") or ())
-    one = replace(ONE, panels=panels, films=lambda value: ["film"], beside=(two,))
+    one = replace(ONE, panels=panels, films=lambda value: [movie], beside=(two,))
     with Report([one, two], CONTEXT, tmp_path) as report:
         reproduce([one, two], CONTEXT, callback=lambda found, section: report.add(found, [section]))
         added.set()
     assert not report.failures
-    assert seen == ["two", "film"]
+    assert seen == ["two", movie]
     assert 'href="movies/film.html"' in text(report)
     assert '<section id="one"' in text(report)
 
@@ -127,12 +178,12 @@ def test_what_fails_is_said_and_the_others_are_there(monkeypatch, capsys, tmp_pa
     assert main(["reproduce", "--out", str(tmp_path), "--json"]) == 1
     out, err = capsys.readouterr()
     assert json.loads(out)["failures"] == {"one": "ValueError: no <luck>"}
-    assert str(tmp_path / "index.html") in err.splitlines()[0]
+    assert str(tmp_path / "index.html") in err.splitlines()[1]
     assert err.splitlines()[-1] == "failed: the first: ValueError: no <luck>"
     html = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Failed:</b> the first. ValueError: no &lt;luck&gt;" in html
     assert '<section id="two"' in html
-    assert RELOAD not in html
+    assert RUNNING not in html
     assert main(["--debug", "reproduce", "--out", str(tmp_path), "--json"]) == 1
     assert "Traceback" in capsys.readouterr().err
 
@@ -160,7 +211,7 @@ def test_a_reader_may_delete_everything_meanwhile(tmp_path):
 def test_one_that_is_stopped_says_so(tmp_path):
     with pytest.raises(KeyboardInterrupt), Report([ONE, TWO], CONTEXT, tmp_path) as report:
         raise KeyboardInterrupt
-    assert RELOAD not in text(report)
+    assert RUNNING not in text(report)
     assert "Stopped: 0 of 2 sections" in text(report)
     assert "Not computed:</b> the second" in text(report)
 

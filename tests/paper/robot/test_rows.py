@@ -12,8 +12,10 @@ from chilopod.paper.fit_data import walking_speed
 from chilopod.paper.robot import numerics, why
 from chilopod.paper.robot import rows as rows_of_walks
 from chilopod.paper.robot.rows import duration_rows, turning_rows, walk_rows
+from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
-from chilopod.paper.table import Kind, robot_rows
+from chilopod.paper.section import Context, Found, Size
+from chilopod.paper.table import Kind, OfPlanar, Result, robot_rows
 from chilopod.paper.turning.criteria import saturated
 from helpers.made_up_robot import AMPLITUDE, durations, series, task, turning, walks
 
@@ -66,6 +68,17 @@ def test_what_the_paper_prints_is_within_in_every_row():
 
 def base_with(**changes):
     return walks(base=series(SPRINGS, **{"onset": 34.0, **changes}))
+
+
+def test_what_a_quick_report_has_is_judged_as_in_the_whole_one_and_the_rest_needs_more_trials():
+    whole = [*walk_rows(walks()), *turning_rows(turning(), walks())]
+    few = walks(variants={}, lower_steps={}, uniform=None)
+    tasks = turning(tasks={"A": turning().tasks["A"]}, hopf=None)
+    quick = [*walk_rows(few), *turning_rows(tasks, few)]
+    assert [row for row in whole if row in quick] == quick
+    found = Found(Context(size=Size.QUICK), rows={WALKS: [*quick, OfPlanar(statements.UNIFORM, Result("6.5"))]})
+    (left_out,) = [row for row in found.robot_rows() if row.twin is None]
+    assert left_out.data()["twin"] == "needs more trials"
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,7 @@ COURSES: Section[xr.Dataset] = Section(
     compared_rows,
     figures.panels,
     beyond=True,
+    headline=True,
 )
 ROBUST: Section[Robust] = Section(
     "courses-robust",
@@ -89,7 +90,6 @@ ROBOT_COURSES: Section[Robust] = Section(
     lambda data: [*compared_rows(data.courses), *condition_rows(data.conditions)],
     lambda data: [figures.strategies(data.courses), figures.whole(data.conditions)],
     beyond=True,
-    full=True,
 )
 COURSES_FILM: Section[list[Movie]] = Section(
     "courses-movie",

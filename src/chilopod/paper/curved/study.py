@@ -18,7 +18,7 @@ from chilopod.paper import printed
 from chilopod.paper.curved.trials import EXAMPLES, SPRINGS, curved_trials, off_branch, on_branch, variant_trials
 from chilopod.paper.measures import example_walks
 from chilopod.paper.scatter import Array, Difference, means, spread_difference
-from chilopod.paper.section import Context, Size
+from chilopod.paper.section import Context
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import is_curved
@@ -56,11 +56,12 @@ class CurvedStudy:
 def curved_study(context: Context, progress: Progress = silent) -> CurvedStudy:
     """Run the trials of the paper's curved walks and compare them with the exact branches.
 
-    The springs of the trials are spread about the critical one of the paper's robot. If not full, there are three
-    trials at every spring and two of the variants, in place of the paper's 10 and 5; if tiny, at fewer springs.
+    The springs of the trials are spread about the critical one of the paper's robot. If not full, there are two trials
+    at every spring of the variants in place of the paper's 5; if tiny, three of the robot in place of 10, at fewer
+    springs.
     """
     robot, folder, size = context.robot, context.folder, context.size
-    repeats, variant_repeats = (10, 5) if size is Size.FULL else (3, 2)
+    repeats, variant_repeats = size.of((10, 5), (10, 2), (3, 2))
     springs, agreement_springs = size.cut((SPRINGS, AGREEMENT_SPRINGS), (TINY_SPRINGS, AGREEMENT_SPRINGS[:1]))
     trials = curved_trials(robot, springs, repeats, folder=folder, progress=part(progress, 0.0, 0.3))
     variants = variant_trials(robot, trials, variant_repeats, folder=folder, progress=part(progress, 0.3, 0.8))

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import platform
+import re
+import time
 from base64 import b64encode
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any, Final
 
 from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from chilopod import units
 from chilopod.errors import in_words
-from chilopod.paper.page.story import facts, summary
+from chilopod.paper.page.story import summary
 from chilopod.paper.section import Found, Section
 from chilopod.paper.straight.sections import MODE
 from chilopod.paper.table import RobotRow, Row, Verdict
@@ -28,12 +31,21 @@ _TITLE: Final = "A robot that turns by bifurcation: the paper and the computatio
 _LOOKS: Final = {
     **dict.fromkeys((Verdict.AGREES, Verdict.WITHIN), ("agrees", "✓")),
     **dict.fromkeys((Verdict.DIFFERS, Verdict.OUTSIDE), ("differs", "≠")),
-    **dict.fromkeys((Verdict.UNDECIDED, Verdict.NOT_DETERMINED), ("undecided", "?")),
+    Verdict.UNDECIDED: ("undecided", "?"),
+    Verdict.NOT_DETERMINED: ("undetermined", "∅"),
     **dict.fromkeys((Verdict.NOT_PRINTED, Verdict.NOT_COMPUTED), ("open", "–")),
 }
 """Class and mark of each verdict."""
 
-_RELOAD: Final = 10  # s
+_COUNTED: Final = {
+    "agrees": "agree",
+    "undecided": "undecided",
+    "differs": "differ",
+    "undetermined": "not determined",
+    "more": "need more trials",
+}
+"""Words under which verdicts are counted, by class."""
+
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
 
@@ -49,7 +61,7 @@ class Drawn:
 @dataclass(frozen=True)
 class Film:
     """A film beside the page: name of its files, title, seconds of the walk per second of the film, and whether there
-    is an mp4 beside the replay, and a png with moments of it."""
+    is an mp4 beside the replay with its poster, and a png with moments of it."""
 
     name: str
     title: str
@@ -84,31 +96,40 @@ def page(
     waiting: Collection[Section[Any]],
     robot_file: str,
     state: State = State.DONE,
+    plan: str = "",
+    headline: Drawn | None = None,
 ) -> str:
-    """The page as HTML, which reloads itself while it is running.
+    """The page as HTML, which takes in what is new while it is running.
 
-    Figures of the robot itself open the first chapter; figures and films drawn so far stand in their chapters, those
-    with a letter first. Sections failed, or are waiting to be computed or drawn. Commands call this robot
-    ``robot_file``: a preset, or the path of a file.
+    It begins with the figure ``headline``. Figures of the robot itself open the first chapter; figures and films drawn
+    so far stand in their chapters, those with a letter first. Sections failed, or are waiting to be computed or drawn.
+    Commands call this robot ``robot_file``: a preset, or the path of a file.
     """
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters["embedded"] = _embedded
     mode = found[MODE]
     template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
+    tables = {chapter: [_row(row) for row in rows] for chapter, rows in found.planar_rows().items()}
+    # Nothing is left out before all has been tried.
+    robot_rows = [_row(replace(row, absent="") if waiting else row) for row in found.robot_rows()]
+    looks = Counter(row["look"] for rows in (*tables.values(), robot_rows) for row in rows)
     return template.render(
         title=_TITLE,
         holds=" ".join([found.context.size.name, *(section.name for section in found.values)]),
         css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
         state=state.value,
-        reload=_RELOAD,
+        plan=Markup(re.sub(r"--\w+", r"<code>\g<0></code>", str(escape(plan)))),
+        script=Markup(folder.joinpath("page.js").read_text(encoding="utf-8")),
+        written=time.time(),
         done=sum(section in found for section in sections),
         count=len(sections),
         summary=summary(found),
-        facts=facts(found),
+        counted=[(look, word, looks[look]) for look, word in _COUNTED.items() if looks[look]],
+        headline=headline,
         first=_first([film for each in shown for film in each.films]),
-        tables={chapter: [_row(row) for row in rows] for chapter, rows in found.planar_rows().items()},
-        robot_rows=[_row(row) for row in found.robot_rows()],
+        tables=tables,
+        robot_rows=robot_rows,
         chapters=_chapters(sections, opening, shown, failures, waiting),
         robot=f'"{robot_file}"' if " " in robot_file else robot_file,
         soft=10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}"),
@@ -158,6 +179,8 @@ def _chapters(
 def _row(row: Row | RobotRow) -> dict[str, str]:
     look, mark = _LOOKS[row.verdict]
     texts = {name: typeset(text) for name, text in row.data().items() if isinstance(text, str)}
+    if isinstance(row, RobotRow) and row.absent and not row.twin:
+        return {**texts, "look": "more", "mark": "…", "verdict": row.absent}
     return {**texts, "look": look, "mark": mark}
 
 

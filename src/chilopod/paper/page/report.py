@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections import deque
+import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
 from chilopod.output import check_files, check_folder, write_atomic
+from chilopod.paper.curved.sections import CURVED
+from chilopod.paper.page.headline import pitchfork
 from chilopod.paper.page.page import Drawn, Film, Shown, State, page
+from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size
 from chilopod.paper.straight import schematic
 from chilopod.robot import Robot, load_robot, presets
@@ -22,8 +26,8 @@ from chilopod.show import style
 from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
 from chilopod.show.scene.encoder import has_encoder
-from chilopod.show.scene.film import filmed
-from chilopod.show.scene.film_3d import film_3d, stills
+from chilopod.show.scene.film import filmed, poster
+from chilopod.show.scene.film_3d import film_3d, poster_3d, stills
 from chilopod.show.scene.replay import replay
 
 T = TypeVar("T")
@@ -31,6 +35,7 @@ T = TypeVar("T")
 _HOLDS = re.compile('<meta name="chilopod-report" content="([A-Z]+)([^"]*)">')
 _FRONT = 1000  # characters of a page, in which that stands
 _BESIDE = ("data", "figures", "movies")
+_NEWS, _BETWEEN_NEWS = "news.js", 3.0  # s
 
 
 class Report:
@@ -40,9 +45,10 @@ class Report:
     ``movies/NAME.mp4`` and ``.html``, and ``data/robot.toml`` and ``robot-3d.toml``. Files of these names are replaced,
     each as a whole. Where films cannot be encoded, the replays are there without them.
 
-    Used as a context: the page is there as soon as it is entered, and complete when it is left. Figures are drawn in a
-    thread beside the computation of the next section, and ``progress`` receives the fraction drawn. The folder is
-    created where there is none.
+    Used as a context: the page is there as soon as it is entered, and complete when it is left. While it fills in,
+    ``news.js`` says that there is more. Figures are drawn in a thread beside the computation of the next section, and
+    ``progress`` receives the fraction drawn. The page begins with ``plan``, see :func:`chilopod.paper.duration.plan`.
+    The folder is created where there is none.
 
     Raises
     ------
@@ -56,15 +62,18 @@ class Report:
         context: Context,
         folder: str | Path,
         progress: SectionProgress = lambda what, done, words: None,
+        plan: str = "",
     ) -> None:
         self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
         """Why sections could not be computed or drawn."""
-        self._sections, self._progress = sections, progress
+        self._sections, self._progress, self._plan = sections, progress, plan
         self._found = Found(context)
         self._opening: list[Drawn] = []
+        self._headline: Drawn | None = None
+        self._written, self._over = 0, Event()
         self._shown: dict[Section[Any], Shown] = {}
-        self._films: deque[tuple[Section[Any], Movie]] = deque()
+        self._films: list[tuple[Section[Any], Movie]] = []
         self._added = self._drawn = 0
         self._stopped = False
         self._thread = ThreadPoolExecutor(1, "drawing")
@@ -72,18 +81,34 @@ class Report:
     def __enter__(self) -> Report:
         self._write(State.RUNNING)
         self._opened = self._thread.submit(self._open)
+        self._alive = Thread(target=self._tell, daemon=True)
+        self._alive.start()
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         self._stopped = error is not None
         self._thread.shutdown(cancel_futures=self._stopped)
-        if error is None:
-            self._progress("figures and films", 1.0, "done")
-            self._write(State.DONE)
-            self._opened.result()
-        else:
+        self._over.set()
+        self._alive.join()
+        try:
+            if error is None:
+                self._progress("figures and films", 1.0, "done")
+                self._write(State.DONE)
+                self._opened.result()
+            else:
+                with suppress(OutputError):
+                    self._write(State.STOPPED)
+        finally:
+            with suppress(OSError):
+                (self.page.parent / _NEWS).unlink()
+
+    def _tell(self) -> None:
+        """Say every few seconds in a file beside the page which page it is, and that the computation goes on."""
+        told = False
+        while not told:
             with suppress(OutputError):
-                self._write(State.STOPPED)
+                write_atomic(self.page.parent / _NEWS, f"chilopodNews({self._written}, {time.time():.0f});\n")
+            told = self._over.wait(_BETWEEN_NEWS)
 
     def add(self, found: Found, sections: Collection[Section[Any]]) -> None:
         """Show sections that were computed, or that failed; returns at once."""
@@ -94,12 +119,14 @@ class Report:
         """Draw the robot, which needs nothing computed."""
         panel = schematic.panel(self._found.context.robot)
         self._opening = [_again(partial(self._draw_panel, panel))]
+        self._draw_headline(self._found, self._sections)
         self._write_if_possible()
 
     def _add(self, found: Found, sections: Collection[Section[Any]]) -> None:
         self._found = found
         self.failures |= found.failures
         self._write_if_possible()
+        self._draw_headline(found, sections)
         for section in self._sections:
             new = section in sections
             if section in found.values and (new or any(each in sections for each in section.beside)):
@@ -107,12 +134,18 @@ class Report:
         self._drawn += 1
         self._write_if_possible()
         self._progress("figures and films", self._drawn / (len(self._sections) + 1), "")
-        # Films take long, and wait while there is anything else to draw.
+        # Films take long, and wait while there is anything else to draw; first comes that which the page begins with.
         while self._films and self._added == self._drawn and not self._stopped:
-            section, movie = self._films[0]
+            section, movie = max(reversed(self._films), key=lambda each: bool(each[1].stills))
             self._try(section, partial(self._film, section, movie))
-            self._films.popleft()
+            self._films.remove((section, movie))
             self._write_if_possible()
+
+    def _draw_headline(self, found: Found, sections: Collection[Section[Any]]) -> None:
+        """Draw the figure that the page begins with, if some sections have to do with it."""
+        if CURVED in sections or WALKS in sections:
+            panel = pitchfork(found.context.robot, found[CURVED], found[WALKS])
+            self._headline = _again(partial(self._draw_panel, panel))
 
     def _try(self, section: Section[Any], draw: Callable[[], Shown]) -> None:
         try:
@@ -152,7 +185,9 @@ class Report:
         shown = [self._shown[each] for each in self._sections if each in self._shown]
         waiting = [section for section in self._sections if section not in self._found]
         waiting += [section for section, _ in self._films]
-        html = page(self._found, self._sections, self._opening, shown, self.failures, waiting, name, state)
+        told = (self.failures, waiting, name, state, self._plan, self._headline)
+        html = page(self._found, self._sections, self._opening, shown, *told)
+        self._written += 1
         write_atomic(self.page, html)  # first: what is beside it is known by it to be ours
         write_atomic(robot_file, context.robot.to_toml())
         write_atomic(data / "robot-3d.toml", context.whole.to_toml())
@@ -199,9 +234,10 @@ def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *
                 problem = "has files that are of no report and might be replaced, which takes --force"
                 raise OutputError(problem, source=str(folder / beside))
         return
-    done, names = held
-    larger = [f"it is {done.name.lower()}"] if list(Size).index(done) < list(Size).index(size) else []
-    more = larger or sorted({*names} - {section.name for section in sections})
+    (done, names), sizes = held, list(Size)
+    kept = [section for section in sections if section.name in names]
+    larger = any(sizes.index(done.within(each)) < sizes.index(size.within(each)) for each in kept)
+    more = [f"it is {done.name.lower()}"] if larger else sorted({*names} - {section.name for section in kept})
     if more:
         problem = f"is a report that has more ({', '.join(more)}) and is only replaced with --force"
         raise OutputError(problem, source=str(page))
@@ -222,8 +258,10 @@ def write_movie(shown: Movie, folder: Path) -> Film:
     solid = "pose" in shown.record
     replay(shown.record, titles=shown.titles, heading=shown.heading).write(folder / f"{shown.name}.html", replace=True)
     look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
-    file, encoded = folder / f"{shown.name}.mp4", has_encoder()
-    if encoded and not (solid and _rendered(file, lambda: film_3d(shown.record, **look))):
+    file, first, encoded = folder / f"{shown.name}.mp4", folder / f"{shown.name}-poster.png", has_encoder()
+    rendered = encoded and solid and _rendered(first, lambda: poster_3d(shown.record, **look))
+    if encoded and not (rendered and _rendered(file, lambda: film_3d(shown.record, **look))):
+        write_atomic(first, poster(shown.record, **look, size=shown.size))
         write_atomic(file, filmed(shown.record, **look, size=shown.size))
     picture = folder / f"{shown.name}.png"
     pictured = bool(shown.stills) and _rendered(

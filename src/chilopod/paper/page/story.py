@@ -1,51 +1,13 @@
-"""Head of a page: the findings in a few sentences, and the numbers that matter."""
+"""Head of a page: the findings in five sentences."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final
-
-from chilopod.paper import printed, statements
 from chilopod.paper.section import Found
 from chilopod.paper.straight.sections import MODE, UNIFORM
 from chilopod.paper.table import Kind, Verdict
 from chilopod.paper.turning.sections import TURNING
 from chilopod.paper.turning.trials import outcome_words, span
-from chilopod.show.words import SPRING_UNIT, listing, spring, typeset
-
-_MOST_LISTED: Final = 4
-_TOLD: Final = {
-    statements.ONSET: "front spring at which the robot begins to curve, in three dimensions",
-    statements.RADII[21.0]: "radius of its walk with a front spring of 21 N*mm/deg",
-    statements.ARRIVAL: "earliest arrival at the target of task A",
-}
-"""Statements on the twin that stand at the top of the page."""
-
-
-@dataclass(frozen=True)
-class Fact:
-    """A number that matters: value that is computed here, its description, and the paper's value, empty if there is
-    none."""
-
-    value: str
-    about: str
-    paper: str = ""
-
-
-def facts(found: Found) -> list[Fact]:
-    """The most important numbers of the results."""
-    facts, mode = [], found[MODE]
-    if mode is not None:
-        about = "front spring at which the straight walk gives way, in the planar model"
-        facts.append(Fact(spring(mode.attrs["value"], 5), about, typeset(str(printed.CRITICAL_K1))))
-    twins = {row.statement: row.twin for row in found.robot_rows() if row.twin}
-    for statement, about in _TOLD.items():
-        if twin := twins.get(statement):
-            facts.append(Fact(typeset(twin.words), typeset(about), typeset(statement.said.words)))
-    if predicted := _predictions(found):
-        about = "statements about the robot met by its twin that it was not fitted to"
-        facts.append(Fact(f"{predicted.count(Verdict.WITHIN)} of {len(predicted)}", about))
-    return facts
+from chilopod.show.words import SPRING_UNIT, spring
 
 
 def _predictions(found: Found) -> list[Verdict]:
@@ -54,12 +16,12 @@ def _predictions(found: Found) -> list[Verdict]:
 
 
 def summary(results: Found) -> str:
-    """Findings, in a few plain sentences."""
+    """Findings, in five plain sentences at most."""
     parts, mode, uniform, turning = [], results[MODE], results[UNIFORM], results[TURNING]
     modules = results.context.robot.body.modules
     parts.append(
         f"A {modules}-module robot walks straight as long as the springs between its modules are "
-        "stiff enough. Below a critical stiffness the straight walk cannot hold, and the body bends by itself."
+        "stiff enough; below a critical stiffness the straight walk cannot hold, and the body bends by itself."
     )
     if mode is not None:
         found = mode.attrs
@@ -88,15 +50,4 @@ def summary(results: Found) -> str:
             f"their speed alone, meets {predicted.count(Verdict.WITHIN)} of {len(predicted)} further statements about "
             f"the robot that it was not fitted to{left}."
         )
-    rows = [row for part in results.planar_rows().values() for row in part]
-    judged = [row.verdict for row in rows if row.verdict is not Verdict.NOT_PRINTED]
-    if judged:
-        differing = [typeset(row.quantity) for row in rows if row.verdict is Verdict.DIFFERS]
-        said = [f"{judged.count(Verdict.AGREES)} agree"]
-        if open_ := judged.count(Verdict.UNDECIDED):
-            said.append(f"{open_} are left open by the scatter of the trials")
-        if differing:
-            listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
-            said.append(f"{len(differing)} differ{listed}. The reasons are given below")
-        parts.append(f"Of {len(judged)} statements of the paper about its planar model, {listing(said)}.")
     return " ".join(parts)

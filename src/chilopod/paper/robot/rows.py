@@ -29,7 +29,7 @@ PAPER_SPRING = printed.TASKS["A"].k_hat.value
 
 def walk_rows(found: RobotWalks) -> list[OfTwin]:
     """Onset, radius and speed of curved walks, and their dependence on the duration."""
-    base, uniform = found.base, found.uniform.attrs
+    base = found.base
     speed, error = mean_and_error(base.speed.sel(spring=PAPER_SPRING).values)
     rows = [
         _straight(base),
@@ -39,8 +39,10 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
         of_twin(statements.SPEED, Result("", speed, error, "m/s", 4)),
         _rising(base),
         _fluctuation(base),
-        _spring(statements.UNIFORM, (uniform["critical_k"], uniform["critical_k_error"])),
     ]
+    if found.uniform is not None:
+        uniform = found.uniform.attrs
+        rows.append(_spring(statements.UNIFORM, (uniform["critical_k"], uniform["critical_k_error"])))
     for name, data in found.variants.items():
         lower = found.lower_steps.get(name)
         rows += variant_rows(base, data, name, "" if lower is None else "steps as high")
@@ -184,14 +186,18 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
     task = found.tasks["A"]
     time = task.time if (task.criteria.outcome == Outcome.ARRIVED.label).any() else np.nan
     arrival = f"{time:.1f} s, the earliest, which has no error" if np.isfinite(time) else "none arrives"
-    own = walks.uniform.attrs["critical_k"] if walks else np.nan
-    words, below = softest_minima(found.hopf, own if np.isfinite(own) else printed.UNIFORM.value)
-    compared = Result(f"{in_words(task, found.hopf)} ({saturation(task, found.hopf)})")
     alone = by_leg_yaw(found.without)
-    return [
-        *rows,
+    rows += [
         of_twin(statements.ARRIVAL, Result(arrival, time, 0.0, "s")),
         *(OfTwin(statements.WITHOUT, Result(str(each)), within(_needs_leg_yaw(each))) for each in alone),
+    ]
+    if found.hopf is None:
+        return rows
+    own = walks.uniform.attrs["critical_k"] if walks and walks.uniform is not None else np.nan
+    words, below = softest_minima(found.hopf, own if np.isfinite(own) else printed.UNIFORM.value)
+    compared = Result(f"{in_words(task, found.hopf)} ({saturation(task, found.hopf)})")
+    return [
+        *rows,
         OfTwin(statements.HOPF, compared, within(all_lower(task, found.hopf))),
         OfTwin(statements.HOPF_SPRINGS, Result(words), within(below)),
     ]

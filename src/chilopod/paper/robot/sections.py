@@ -39,7 +39,6 @@ SPREAD: Section[xr.Dataset] = Section(
     twin_spread,
     panels=trust.spread,
     beyond=True,
-    full=True,
 )
 NUMERICS: Section[xr.Dataset] = Section(
     "robot-numerics", CHAPTER, "the whole robot in 3-D: finer steps", numerics.twin_numerics, numerics.rows, beyond=True
@@ -61,4 +60,5 @@ WHY: Section[xr.Dataset] = Section(
     why.rows,
     trust.why,
     beyond=True,
+    headline=True,
 )

@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 
 from chilopod.paper import printed
-from chilopod.paper.section import Context
+from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.trials import DURATION, TurningTask, turning_task, without_leg_yaw
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -30,30 +30,28 @@ as long again lets a robot that is as fast arrive, or pass the target."""
 
 @dataclass(frozen=True)
 class RobotTurning:
-    """Results of the paper's two tasks, by letter, of task A with uniform springs, and of task A with and without leg
-    yaw at the paper's spring."""
+    """Results of the paper's tasks, by letter, of task A with uniform springs (None if that is left out), and of task A
+    with and without leg yaw at the paper's spring."""
 
     robot: Robot
     tasks: Mapping[str, TurningTask]
-    hopf: TurningTask
+    hopf: TurningTask | None
     without: xr.Dataset
 
 
 def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning:
-    """All turning tasks of the paper by the whole robot; if not full, two repeats instead of five and fewer springs."""
+    """All turning tasks of the paper by the whole robot; if quick, all of task A with the first spring alone."""
     robot, size = context.whole, context.size
-    repeats, springs, duration = size.of(
-        (printed.REPEATS, SPRINGS, TASK_DURATION), (2, SPRINGS[1::2], TASK_DURATION), (2, SHOWN, 6.0)
-    )
-    springs = tuple(sorted({*springs, *SHOWN}))
+    repeats, springs, duration = size.cut((printed.REPEATS, SPRINGS, TASK_DURATION), (2, SHOWN, 6.0))
+    quick = size is Size.QUICK
     same: dict[str, Any] = {"duration": duration, "engine": "twin", "folder": context.folder}
     tasks = {}
-    for index, (letter, task) in enumerate(printed.TASKS.items()):
+    for index, (letter, task) in enumerate(list(printed.TASKS.items())[: 1 if quick else None]):
         share = part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}")
         tasks[letter] = turning_task(robot, task.target, springs, repeats, shown=SHOWN, progress=share, **same)
     first, share = tasks["A"], part(progress, 0.7, 0.9, "uniform springs")
     how = {"strategy": "hopf", "time": first.time, **same}
-    hopf = turning_task(robot, first.target, HOPF_SPRINGS, repeats, progress=share, **how)
+    hopf = None if quick else turning_task(robot, first.target, HOPF_SPRINGS, repeats, progress=share, **how)
     one, share = {"paper's spring": printed.TASKS["A"].k_hat.value}, part(progress, 0.9, 1.0, "without leg yaw")
     without = without_leg_yaw(robot, first.target, one, progress=share, **same)
     return RobotTurning(robot, tasks, hopf, without)

@@ -17,7 +17,7 @@ import xarray as xr
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT
 from chilopod.analysis.square_root import SquareRootFit
 from chilopod.paper import measures, printed
-from chilopod.paper.section import Context
+from chilopod.paper.section import Context, Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import DURATION, end_of_walk
@@ -59,7 +59,7 @@ class RobotWalks:
     variants: Mapping[str, xr.Dataset]  # as ``base``, of the paper's three, by name
     lower_steps: Mapping[str, xr.Dataset]  # of those that change the stride, see :func:`lower_steps`
     examples: xr.Dataset  # see :func:`chilopod.paper.measures.example_walks`
-    uniform: xr.Dataset  # see :func:`undulations`
+    uniform: xr.Dataset | None  # see :func:`undulations`
 
     @property
     def fit(self) -> SquareRootFit | None:
@@ -68,16 +68,18 @@ class RobotWalks:
 
 
 def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
-    """All walks of the paper by the whole robot; if not full, two repeats of the base series, one of the variants and
-    of uniform springs, with fewer springs."""
+    """All walks of the paper by the whole robot; if quick, those of the base series, all of them."""
     robot, folder, size = context.whole, context.folder, context.size
-    repeats, fewer, fewest = size.of((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (2, 1, 1), (1, 1, 1))
-    springs = size.of(VARIANT_SPRINGS, VARIANT_SPRINGS[1::2], VARIANT_SPRINGS[1::4])
-    uniform_springs = size.of(UNIFORM_SPRINGS, UNIFORM_SPRINGS[:4], UNIFORM_SPRINGS[:4:2])
+    quick = size is Size.QUICK
+    repeats, fewer, fewest = size.cut((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (1, 1, 1))
+    springs, uniform_springs = size.cut((VARIANT_SPRINGS, UNIFORM_SPRINGS), (VARIANT_SPRINGS[1::4], (8.7, 13.0)))
     duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (12.0, 8.0))
-    share = part(progress, 0.0, 0.31, "as built")
+    share = part(progress, 0.0, 1.0 if quick else 0.31, "as built")
     records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=share)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
+    examples = measures.example_walks(robot, _EXAMPLES, duration, measures.spring_seeds(_EXAMPLES), "twin", folder)
+    if quick:
+        return RobotWalks(robot, base, durations, {}, {}, examples, None)
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}
     strides = [name for name, each in robots.items() if each.gait.stride != robot.gait.stride]
     asked = [*robots.items(), *((name, lower_steps(robot, robots[name])) for name in strides)]
@@ -91,7 +93,6 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(strides, found[len(robots) :], strict=True))
     share = part(progress, 0.91, 1.0, "uniform springs")
     uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=share)
-    examples = measures.example_walks(robot, _EXAMPLES, duration, measures.spring_seeds(_EXAMPLES), "twin", folder)
     return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
 
 

@@ -163,7 +163,7 @@ def onset(robot: Robot, folder: Folder = None, size: Size = Size.FULL) -> float:
     Infinite if walks curve at the stiffest spring tried, NaN if at fewer than two, or if their bends point beyond it.
     If not full, without the second fit.
     """
-    springs = size.of(SPRINGS, SPRINGS[::2], SPRINGS[::3])
+    springs = size.cut(SPRINGS, SPRINGS[::3])
     duration = size.cut(_WALK, 2.5)
     bends = _bends(robot, springs, duration, folder)
     if bends[-1] > 0.0:
@@ -220,7 +220,7 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The point with factors switched on and off.
 
     The planar limit takes feet and friction from the robot of the planar model. If not full, only the path from the
-    planar limit to the twin, by fewer springs.
+    planar limit to the twin, without the second fit.
 
     Returns
     -------

@@ -138,4 +138,5 @@ IDENTIFICATION: Section[Identification] = Section(
     identification_rows,
     lambda found: replace(identification.panel(found), letter="G", title="The constants the paper does not print"),
     beyond=True,
+    headline=True,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
@@ -60,6 +62,27 @@ def filmed(
     """
     times = frame_times(record, size, fps, speed)
     return encoded(_frames(scene(record, titles, times), heading, size, speed), fps, size)
+
+
+def poster(
+    record: xr.Dataset,
+    *,
+    titles: Mapping[Any, str] | Sequence[str],
+    heading: str,
+    speed: float = 1.0,
+    size: tuple[int, int] = (960, 480),
+) -> bytes:
+    """Frame of the film of :func:`filmed` in its last third, as PNG, with errors likewise."""
+    shown = scene(record, titles, frame_times(record, size, 25, speed))
+    with style.house_style():
+        return telling(Stage(shown, heading, size, speed))
+
+
+def telling(stage: Stage) -> bytes:
+    """PNG of the frame of a stage in its last third, when it shows what came of the walks."""
+    stream = io.BytesIO()
+    imsave(stream, stage.drawn(3 * (len(stage.shown.frames.time) - 1) // 4), format="png")
+    return stream.getvalue()
 
 
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:

@@ -21,7 +21,7 @@ from chilopod.errors import ParameterError
 from chilopod.show import style
 from chilopod.show.scene.aims import places_of
 from chilopod.show.scene.encoder import encoded
-from chilopod.show.scene.film import APART, GAP, LARGEST, PIXEL, FilmPanel, Stage, frame_times
+from chilopod.show.scene.film import APART, GAP, LARGEST, PIXEL, FilmPanel, Stage, frame_times, telling
 from chilopod.show.scene.frames import Scene, scene
 from chilopod.show.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
@@ -58,6 +58,24 @@ def film_3d(
         stage = _Stage3D(walks, heading, size, speed, follow)
         try:
             return encoded((stage.drawn(index) for index in range(len(times))), fps, size)
+        finally:
+            stage.studio.close()
+
+
+def poster_3d(
+    record: xr.Dataset,
+    *,
+    titles: Mapping[Any, str] | Sequence[str],
+    heading: str,
+    speed: float = 1.0,
+    size: tuple[int, int] = (1440, 400),
+) -> bytes:
+    """Frame of the film of :func:`film_3d` in its last third, as PNG, with errors likewise."""
+    walks = _Walks(record, titles, frame_times(record, size, 25, speed))
+    with gl.context(*size), style.house_style():
+        stage = _Stage3D(walks, heading, size, speed, False)
+        try:
+            return telling(stage)
         finally:
             stage.studio.close()
 

@@ -14,7 +14,7 @@ from chilopod.paper.scatter import SURE
 from chilopod.paper.statements import listed
 from chilopod.paper.turning import figures as planar
 from chilopod.paper.turning.criteria import in_words, saturation
-from chilopod.paper.turning.trials import arrivals, by_leg_yaw, outcome_words
+from chilopod.paper.turning.trials import TurningTask, arrivals, by_leg_yaw, outcome_words
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
 
@@ -28,7 +28,8 @@ def panels(found: RobotTurning, walks: RobotWalks | None) -> Iterator[Panel]:
     for letter in found.tasks:
         yield criteria(found, letter, walks)
     yield without(found)
-    yield comparison(found)
+    if found.hopf is not None:
+        yield comparison(found, found.hopf)
 
 
 def turning(found: RobotTurning) -> Panel:
@@ -91,19 +92,19 @@ def without(found: RobotTurning) -> Panel:
     )
 
 
-def comparison(found: RobotTurning) -> Panel:
+def comparison(found: RobotTurning, hopf: TurningTask) -> Panel:
     """Comparison of the two strategies (the paper's Fig. "comparison")."""
     task = found.tasks["A"]
     return Panel(
         name="robot-hopf",
         title="The robot in three dimensions: pitchfork against Hopf",
-        draw=lambda narrow: planar.draw_comparison(task, found.hopf, narrow, _TOP_HOPF),
+        draw=lambda narrow: planar.draw_comparison(task, hopf, narrow, _TOP_HOPF),
         alt="The three criteria over the spring for the two strategies.",
         text=(
             "Task A with all springs alike, the paper's five values, at the same time and with the same disturbances. "
-            f"At best, pitchfork against Hopf: {typeset(in_words(task, found.hopf))}. In the paper all three are "
+            f"At best, pitchfork against Hopf: {typeset(in_words(task, hopf))}. In the paper all three are "
             f"lower for the pitchfork. {SURE:g} standard errors of the difference, seed by seed, decide here. The "
-            f"third says little where it is nearly saturated: {typeset(saturation(task, found.hopf))}.",
+            f"third says little where it is nearly saturated: {typeset(saturation(task, hopf))}.",
         ),
-        data=planar.both_strategies(task, found.hopf),
+        data=planar.both_strategies(task, hopf),
     )

@@ -35,7 +35,8 @@ def panels(found: RobotWalks) -> Iterator[Panel]:
     """All figures, in the paper's order."""
     yield walks(found)
     yield joints(found)
-    yield different(found)
+    if found.uniform is not None:
+        yield different(found, found.uniform)
     yield durations(found.durations)
 
 
@@ -90,7 +91,7 @@ def joints(found: RobotWalks) -> Panel:
     )
 
 
-def different(found: RobotWalks) -> Panel:
+def different(found: RobotWalks, uniform: xr.Dataset) -> Panel:
     """The paper's Fig. "different"."""
     said = []
     for title, (name, data) in _variants(found).items():
@@ -99,7 +100,7 @@ def different(found: RobotWalks) -> Panel:
     return Panel(
         name="robot-different",
         title="The robot in three dimensions: other springs, strides and phases",
-        draw=lambda narrow: _draw_different(found, narrow),
+        draw=lambda narrow: _draw_different(found, uniform, narrow),
         alt=f"A: radius over 1/{k(1)} of the robot as built and of three variants. B: the same over the distance from "
         "each one's own onset. C: where curved walks set in, twin beside robot.",
         text=(
@@ -188,7 +189,7 @@ def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
     return figure
 
 
-def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
+def _draw_different(found: RobotWalks, uniform: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_THREE, narrow)
     for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=False):
         inverse = 1.0 / data.spring.values
@@ -204,15 +205,15 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
     axes["B"].set_xlim(left=0.0)
     axes["B"].set(xlabel=f"1/{k(1)} − 1/{k(1)}* ({shapes.INVERSE_UNIT})", title="B  Radius, like with like")
     shapes.legend_below(figure, axes["A"], 2 if narrow else 5)
-    _draw_onsets(axes["C"], found)
+    _draw_onsets(axes["C"], found, uniform)
     return figure
 
 
-def _draw_onsets(axes: Axes, found: RobotWalks) -> None:
+def _draw_onsets(axes: Axes, found: RobotWalks, uniform: xr.Dataset) -> None:
     found_at = [
         ("base series (fitted)", printed.ONSET, onset_with_error(found.base)[0]),
         *((title, printed.onset(name), onset_with_error(data)[0]) for title, (name, data) in _variants(found).items()),
-        ("all springs alike", printed.UNIFORM, found.uniform.attrs["critical_k"]),
+        ("all springs alike", printed.UNIFORM, uniform.attrs["critical_k"]),
     ]
     shapes.draw_bands(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
     twin = [at for *_, at in found_at]
