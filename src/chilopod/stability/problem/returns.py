@@ -1,10 +1,9 @@
 """The return map of a system, whose fixed points are the periodic orbits.
 
 For a known period T it is H = S flow(T/k), with S the symmetry of order k, if any. If the system does not depend on
-time, H carries a state to the next crossing of its motion, turned by S, with a section, a hyperplane, in the direction
-of its normal: a one-sided Poincare map in the coordinates of the states (Parker & Chua, *Practical Numerical Algorithms
-for Chaotic Systems*, 1989, ch. 2). Its derivative then maps the direction of the motion to zero, exactly, in place of
-the trivial multiplier 1.
+time, H carries a state to the next crossing of its motion, turned by S, with a section, a hyperplane, along its normal:
+a one-sided Poincare map in the states' coordinates (Parker & Chua, *Practical Numerical Algorithms for Chaotic
+Systems*, 1989, ch. 2). Its derivative maps the direction of motion to exactly 0, in place of the trivial multiplier 1.
 """
 
 from __future__ import annotations
