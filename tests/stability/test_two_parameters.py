@@ -140,7 +140,7 @@ def test_progress_is_told():
         ({"between": (-2.0, 2.0)}, "between"),
         ({"between": ((-2.0, 2.0), (0.0, np.inf))}, "between"),
         ({"between": ((-2.0, 0.5), (-2.0, 2.0))}, "between"),
-        ({"second": np.nan}, "between"),
+        ({"second": np.nan}, "second"),
         ({"points": 0}, "points"),
         ({"step": 0.0}, "step"),
         ({"budget": -1}, "budget"),

@@ -15,6 +15,7 @@ from chilopod.stability.search.samples import FIRST_STEPS, NEAR_FOLD, Samples
 
 _BEFORE = 1e-6  # distance from a fold at which the search for crossings ends, relative to the interval
 _TRIES = 2  # starts of curves round a fold
+_SYSTEMS = 2  # made on each, for every orbit of the budget
 _CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
 _COMES, _FARTHER = 1e-5, 100.0  # distance from a fold, relative to the interval, and factor of a second one
 _MERGING = 1e-4  # distance from a meeting of orbits, relative to the interval, at which multipliers are uncertain
@@ -80,7 +81,8 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
     off = np.array([each.off_plus_one for each in [sample, *others]])
     clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
     for each in [[sample, *others][i] for i in clear[:_TRIES]]:
-        fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising)
+        systems = _SYSTEMS * samples.orbits
+        fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising, systems=systems)
         # Close to it a step may land on another curve with another fold.
         if (
             fold is not None

@@ -124,7 +124,7 @@ class Samples:
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
         self._bends: dict[float, float] = {}
-        self._orbits = budget
+        self.orbits = budget
         self._allowed = _RETURNS * budget
         self.budget = Budget(self._allowed, seconds)
         with self.budget, UserCode("family", low):
@@ -297,7 +297,7 @@ class Samples:
                 self._keep(sample)
             path += reached
             if path[-1].value != value:
-                self.spent = self.budget.spent or self.count >= self._orbits
+                self.spent = self.budget.spent or self.count >= self.orbits
                 break
         return path
 
@@ -344,7 +344,7 @@ class Samples:
         path, target = list(behind), value
         smallest = _SHORTEST * abs(value - path[-1].value)
         while path[-1].value != value:
-            if attempts == 0 or (attempts is None and self.count + len(path) - len(behind) >= self._orbits):
+            if attempts == 0 or (attempts is None and self.count + len(path) - len(behind) >= self.orbits):
                 break
             attempts = None if attempts is None else attempts - 1
             last, guess = path[-1], self._foreseen(path[: -_BEHIND - 1 : -1], target)
