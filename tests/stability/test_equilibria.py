@@ -22,17 +22,10 @@ from chilopod.stability import (
     locate_hopf,
     switch,
 )
+from helpers.systems import lorenz, lorenz_rhs
 
 LORENZ_HOPF = 470.0 / 19.0
 SUPER, SUB, UNDECIDED = Criticality.SUPERCRITICAL, Criticality.SUBCRITICAL, Criticality.UNDECIDED
-
-
-def lorenz_rhs(t, x, r):
-    return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
-
-
-def lorenz(r):
-    return from_rhs(lorenz_rhs, 3, None, args=(r,), guess_period=0.65)
 
 
 def lorenz_state(r):

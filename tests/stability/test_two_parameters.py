@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, PeriodicSystem, follow2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, follow2
 from chilopod.stability.codimension_two import detection
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
+from helpers.systems import doubling, of_map
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -20,18 +21,7 @@ def circle(hole=None):
         size = -(p * p + q * q)
         if hole is not None and hole(p, q):
             size = np.nan
-
-        def image(x):
-            return size * x, np.array([[size]])
-
-        return PeriodicSystem(
-            1,
-            1.0,
-            lambda x, t0, t1: image(x),
-            orbit=np.zeros(1),
-            flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
-            flow_states=lambda states, t0, t1: size * states,
-        )
+        return of_map(lambda x: (size * x, np.array([[size]])), orbit=np.zeros(1), many=True)
 
     return family2
 
@@ -163,7 +153,7 @@ def test_what_two_parameters_would_unfold_is_refused():
     """x -> (1 + p) x - x^3 of an orbit that is neither known nor symmetric as far as anybody says."""
 
     def family2(p, q):
-        return PeriodicSystem(1, 1.0, lambda x, t0, t1: ((1.0 + p) * x - x**3, np.array([[1.0 + p - 3.0 * x[0] ** 2]])))
+        return of_map(lambda x: ((1.0 + p) * x - x**3, np.array([[1.0 + p - 3.0 * x[0] ** 2]])))
 
     start = BifurcationPoint(Kind.PITCHFORK, 0.0, 0.0, np.zeros(1), np.ones(1, complex), 1.0 + 0j, 0.0)
     with pytest.raises(ParameterError, match="unfold"):
@@ -176,22 +166,7 @@ def test_a_krein_collision_is_named():
         follow2(circle(), point, BOX, second=second)
 
 
-def turning(p, q):
-    """x -> -(1 + p) x + (q - 0.1) x^3, whose period doubling turns at q = 0.1."""
-
-    def image(x):
-        return -(1.0 + p) * x + (q - 0.1) * x**3, np.array([[-(1.0 + p) + 3.0 * (q - 0.1) * x[0] ** 2]])
-
-    return PeriodicSystem(
-        1,
-        1.0,
-        lambda x, t0, t1: image(x),
-        orbit=np.zeros(1),
-        flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
-        flow_states=lambda states, t0, t1: -(1.0 + p) * states + (q - 0.1) * states**3,
-    )
-
-
+turning = doubling(many=True)
 TURNS = BifurcationPoint(Kind.PERIOD_DOUBLING, 0.0, 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
 
 

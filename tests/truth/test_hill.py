@@ -15,13 +15,10 @@ ORIGIN = [0.0, 0.0]
 
 
 def mathieu(q, damping=0.0):
-    return lambda a: from_rhs(
-        lambda t, y, a: [y[1], -(a - 2.0 * q * np.cos(2.0 * t)) * y[0] - 2.0 * damping * y[1]],
-        2,
-        pi,
-        args=(a,),
-        orbit=ORIGIN,
-    )
+    def rhs(t, y, a):
+        return [y[1], -(a - 2.0 * q * np.cos(2.0 * t)) * y[0] - 2.0 * damping * y[1]]
+
+    return lambda a: from_rhs(rhs, 2, pi, args=(a,), orbit=ORIGIN)
 
 
 def check(found, expected, closest=1e-12):
