@@ -64,6 +64,11 @@ def duffing(force=2.5, symmetry=None):
     return from_rhs(rhs, 2, 2.0 * np.pi, args=(force,), symmetry=symmetry)
 
 
+def van_der_pol(t, x, mu, a=1.0, b=1.0):
+    u, v = x[0] / a, x[1] / b
+    return [v * a, (mu * (1.0 - u * u) * v - u) * b]
+
+
 def lorenz_rhs(t, x, r):
     return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
 

@@ -12,7 +12,6 @@ from chilopod.planar import initial_states, simulate
 from chilopod.show.play import motion, play
 from chilopod.show.play.page import theory
 from chilopod.steering import SpringLaw
-from helpers.browser import CHROMIUM, Browser
 from helpers.command_line import run
 
 BENT = (0.03, -0.01, 0.02, 0.0, 0.01)  # rad
@@ -48,12 +47,9 @@ def page(robot, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def browser(page, tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("there is no Chromium")
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        browser.open(page)
-        yield browser
+def browser(page, browser):
+    browser.open(page)
+    return browser
 
 
 def walked(robot, law):

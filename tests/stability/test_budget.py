@@ -226,16 +226,12 @@ def test_a_flow_ends_with_the_time_of_the_search_that_asked_for_it(rhs, options)
     assert np.array_equal(system.flow(start, 0.0, 1.0)[0], after)  # and no longer than that
 
 
-def test_many_states_at_once_end_with_the_time_too():
+def test_many_states_at_once_and_inner_searches_without_a_limit_end_with_the_time_too():
     system = from_rhs(lambda t, x: [x[1], -x[0]], 2, 2.0 * math.pi, method="taylor")
     states = np.ones((64, 2))
     system.flow_states(states, 0.0, 1.0)
     with Budget(10, seconds=0.02), pytest.raises(SpentError):
         system.flow_states(states, 0.0, 1e5)
-
-
-def test_an_inner_search_without_a_limit_keeps_that_of_the_outer_one():
-    system = from_rhs(lambda t, x: [x[1], -x[0]], 2, 2.0 * math.pi, method="taylor")
     with Budget(10, seconds=0.02), Budget(10), pytest.raises(SpentError):
         system.flow(np.array([1.0, 0.0]), 0.0, 1e5)
 

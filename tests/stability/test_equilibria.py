@@ -102,6 +102,17 @@ def langford(b):
     return from_rhs(rhs, 3, None, guess_period=1.8)
 
 
+def folding(mu):
+    def rhs(t, x):
+        return [x[1], -x[0] + (mu + 0.5) * x[1] - x[0] ** 2 * x[1], 0.8 - mu - x[2] ** 2]
+
+    return from_rhs(rhs, 3, None, guess_period=6.0)
+
+
+def resting(m):
+    return from_rhs(lambda t, x: [x[1], m * x[1]], 2, None, guess_period=1.0)
+
+
 class TestEquilibrium:
     @pytest.mark.parametrize("r", [2.0, 20.0, 28.0])
     def test_lorenz_is_at_the_closed_form_with_the_eigenvalues_of_the_plain_matrix(self, r):
@@ -338,28 +349,18 @@ class TestHopf:
         assert not point.criticality.known
         assert any("2 pairs" in remark for remark in found.remarks)
 
-    def test_a_fold_ends_the_search_in_words(self):
-        def folding(mu):
-            return from_rhs(
-                lambda t, x: [x[1], -x[0] + (mu + 0.5) * x[1] - x[0] ** 2 * x[1], 0.8 - mu - x[2] ** 2], 3, None,
-                guess_period=6.0,
-            )  # fmt: skip
-
-        found = locate_hopf(folding, (-1.0, 1.5), [0.1, 0.0, 1.0])
-        assert [point.value for point in found] == pytest.approx([-0.5], abs=1e-12)
-        assert any("fold" in remark and "0.8" in remark for remark in found.remarks)
-
-    def test_where_another_equilibrium_meets_this_one_is_said(self):
-        found = locate_hopf(lorenz, (0.5, 3.0), np.zeros(3))
-        assert len(found) == 0
-        assert any("an eigenvalue is zero at 1:" in remark for remark in found.remarks)
-
-    def test_an_eigenvalue_that_is_zero_throughout_is_said(self):
-        found = locate_hopf(
-            lambda m: from_rhs(lambda t, x: [x[1], m * x[1]], 2, None, guess_period=1.0), (-2.0, -1.0), [0.1, 0.2]
-        )
-        assert len(found) == 0
-        assert any("an eigenvalue is 0 throughout" in remark for remark in found.remarks)
+    @pytest.mark.parametrize(
+        ("family", "between", "guess", "values", "said"),
+        [
+            (folding, (-1.0, 1.5), [0.1, 0.0, 1.0], [-0.5], ["fold", "0.8"]),
+            (lorenz, (0.5, 3.0), np.zeros(3), [], ["an eigenvalue is zero at 1:"]),
+            (resting, (-2.0, -1.0), [0.1, 0.2], [], ["an eigenvalue is 0 throughout"]),
+        ],
+    )
+    def test_where_equilibria_end_or_meet_or_are_not_alone_is_said(self, family, between, guess, values, said):
+        found = locate_hopf(family, between, guess)
+        assert [point.value for point in found] == pytest.approx(values, abs=1e-12)
+        assert any(all(words in remark for words in said) for remark in found.remarks)
 
     def test_without_a_trace(self):
         def family(r):

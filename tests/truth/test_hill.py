@@ -129,17 +129,12 @@ def test_tongues_of_meissner(switches):
     ]
     assert len(expected) == 6
 
-    def meissner(a):
-        return from_rhs(
-            lambda t, y, a: [y[1], -(a + 0.2 * np.sign(np.cos(t))) * y[0]],
-            2,
-            2 * pi,
-            args=(a,),
-            orbit=ORIGIN,
-            switch_times=switches,
-        )
+    def meissner(t, y, a):
+        return [y[1], -(a + 0.2 * np.sign(np.cos(t))) * y[0]]
 
-    check(locate(meissner, (0.1, 3.0)), sorted(expected))
+    known = {"orbit": ORIGIN, "switch_times": switches}
+    found = locate(lambda a: from_rhs(meissner, 2, 2 * pi, args=(a,), **known), (0.1, 3.0))
+    check(found, sorted(expected))
 
 
 M = 0.5

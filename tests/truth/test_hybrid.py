@@ -212,22 +212,24 @@ def hopper_period(speed, gravity, stiffness):
     return 2.0 * speed / gravity + 2.0 * (math.pi - math.atan(speed * w / gravity)) / w
 
 
+def hopper(touches, stiffness, metre=1.0):
+    """A mass on a leg; a third state says whether the foot is down, and ``touches`` what touch-down makes of all."""
+    touch = Event(lambda t, x: x[0], touches, -1)
+    leave = Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], 0.0], 1)
+
+    def rhs(t, x):
+        return [x[1], -GRAVITY * metre - stiffness * x[2] / metre * x[0], 0.0]
+
+    return from_rhs(rhs, 3, None, events=[touch, leave], guess_period=0.5)
+
+
 @pytest.mark.parametrize("as_event", [True, False])
 @pytest.mark.parametrize("metre", [1.0, 1e-6])
 def test_a_hopper_keeps_its_energy(metre, as_event):
     """Every height has its hop: a family of orbits, whose multiplier is 1."""
     gravity, stiffness, speed = GRAVITY * metre, 400.0, 1.7 * metre
-    if as_event:  # a third state says whether the foot is down
-        system = from_rhs(
-            lambda t, x: [x[1], -gravity - stiffness * x[2] / metre * x[0], 0.0],
-            3,
-            None,
-            events=[
-                Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], metre], -1),
-                Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], 0.0], 1),
-            ],
-            guess_period=0.5,
-        )
+    if as_event:
+        system = hopper(lambda t, x: [x[0], x[1], metre], stiffness, metre)
         guess, known = [0.1 * metre, math.sqrt(speed**2 - 0.2 * metre * gravity), 0.0], [1.0, 0.0]
     else:
         system = from_rhs(lambda t, x: [x[1], -gravity - stiffness * np.minimum(x[0], 0.0)], 2, None, guess_period=0.5)
@@ -242,19 +244,10 @@ def test_a_hopper_keeps_its_energy(metre, as_event):
 def test_a_hopper_that_loses_and_gains():
     """At touch-down its speed v becomes r v + c, so c / (1 - r) comes back, and the multiplier is r."""
     stiffness, gain = 400.0, 0.9
-
-    def hopper(keeps):
-        touch = Event(lambda t, x: x[0], lambda t, x: [x[0], keeps * x[1] - gain, 1.0], -1)
-        leave = Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], 0.0], 1)
-
-        def rhs(t, x):
-            return [x[1], -GRAVITY - stiffness * x[2] * x[0], 0.0]
-
-        return from_rhs(rhs, 3, None, events=[touch, leave], guess_period=0.5)
-
     for keeps in (0.5, -0.3):
         speed = gain / (1.0 - keeps)
-        found = multipliers(hopper(keeps), [0.5 * speed**2 / GRAVITY - 0.01, 0.4, 0.0])
+        system = hopper(lambda t, x, keeps=keeps: [x[0], keeps * x[1] - gain, 1.0], stiffness)
+        found = multipliers(system, [0.5 * speed**2 / GRAVITY - 0.01, 0.4, 0.0])
         assert_multipliers(found, [keeps, 0.0])
         assert found.period == pytest.approx(hopper_period(speed, GRAVITY, stiffness), rel=1e-13)
 
