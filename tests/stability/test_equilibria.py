@@ -22,7 +22,7 @@ from chilopod.stability import (
     locate_hopf,
     switch,
 )
-from helpers.systems import lorenz, lorenz_rhs
+from helpers.systems import in_units, lorenz, lorenz_rhs
 
 LORENZ_HOPF = 470.0 / 19.0
 SUPER, SUB, UNDECIDED = Criticality.SUPERCRITICAL, Criticality.SUBCRITICAL, Criticality.UNDECIDED
@@ -34,13 +34,11 @@ def lorenz_state(r):
 
 
 def brusselator(b, states=(1.0, 1.0), time=1.0):
-    u, v = states
-
     def rhs(t, x):
-        p, q = x[0] / u, x[1] / v
-        return [u / time * (1.0 + p * p * q - (b + 1.0) * p), v / time * (b * p - p * p * q)]
+        square = x[0] * x[0] * x[1]
+        return [1.0 + square - (b + 1.0) * x[0], b * x[0] - square]
 
-    return from_rhs(rhs, 2, None, guess_period=6.0 * time)
+    return from_rhs(in_units(rhs, states, time), 2, None, guess_period=6.0 * time)
 
 
 def oscillator(mu, cubic=-1.0, linear=0.0):

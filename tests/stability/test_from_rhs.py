@@ -15,6 +15,10 @@ def oscillator(t, x):
     return [x[1], -x[0]]
 
 
+def falling(t, x):
+    return [x[1], -(x[0] ** 2)]
+
+
 def hill(coefficient):
     return lambda t, x: [x[1], -coefficient(t) * x[0]]
 
@@ -294,13 +298,7 @@ REFUSED = {
     "symmetry of no finite order": (oscillator, 2, 1.0, {"symmetry": [[0, 1], [-1, 1.1]]}, "symmetry"),
     "spatial symmetry stretched": (oscillator, 2, 1.0, {"spatial_symmetry": 2 * np.eye(2)}, "spatial_symmetry"),
     "no symmetry of it": (hill(cos), 2, 2 * pi, {"symmetry": -np.eye(2)}, "symmetry"),
-    "no mirror of it": (
-        lambda t, x: [x[1], -(x[0] ** 2)],
-        2,
-        1.0,
-        {"spatial_symmetry": -np.eye(2)},
-        "spatial_symmetry",
-    ),
+    "no mirror of it": (falling, 2, 1.0, {"spatial_symmetry": -np.eye(2)}, "spatial_symmetry"),
 }
 
 

@@ -163,12 +163,7 @@ def test_how_many_has_to_be_a_number(count):
 def test_a_large_system_without_directions():
     """It goes the way of the matrix."""
     factors = np.linspace(0.5, 0.1, 100)
-    system = PeriodicSystem(
-        100,
-        1.0,
-        lambda x, t0, t1: (factors ** (t1 - t0) * x, np.diag(factors ** (t1 - t0))),
-        orbit=np.zeros(100),
-    )
+    system = systems.linear(lambda t0, t1: np.diag(factors ** (t1 - t0)), 100)
     found = multipliers(system, leading=2)
     assert np.abs(found.values - factors[:2]).max() <= found.error_bound < 1e-12
     assert len(found.remarks) == 1
