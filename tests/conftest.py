@@ -60,6 +60,16 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
     return SimpleNamespace(folder=folder, found=found, failures=report.failures, painted=painted)
 
 
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    from helpers.browser import CHROMIUM, Browser
+
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium")
+    with Browser(tmp_path_factory.mktemp("browser")) as opened:
+        yield opened
+
+
 BEGUN = {"truth": 1, "trials": 2}
 """Folders whose tests come before others."""
 

@@ -7,15 +7,10 @@ import pytest
 import xarray as xr
 
 from chilopod.cli import main
+from helpers.command_line import run
 
 ROBOT = ("branch", "aoi2022-planar")
 SHORT = ("--between", "9 N*mm/deg", "20 N*mm/deg", "--points", "3")
-
-
-def call(capsys, *arguments):
-    code = main([str(argument) for argument in arguments])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 @pytest.fixture(scope="module")
@@ -30,40 +25,40 @@ def saved(original, tmp_path):
     return shutil.copytree(original, tmp_path, dirs_exist_ok=True)
 
 
-def test_text_shows_verdict_and_direction(capsys):
-    code, out, _ = call(capsys, *ROBOT, *SHORT)
+def test_text_shows_verdict_and_direction():
+    code, out, _ = run(*ROBOT, *SHORT)
     assert code == 0
     assert "the normal form says supercritical; the direction in which the branch leaves confirms it" in out
     assert "pitchfork" in out
 
 
-def test_a_saved_branch_grows_in_its_place(capsys, saved, tmp_path):
-    code, out, _ = call(capsys, *ROBOT, "--resume", saved, "--points", "2", "--json")
+def test_a_saved_branch_grows_in_its_place(saved, tmp_path):
+    code, out, _ = run(*ROBOT, "--resume", saved, "--points", "2", "--json")
     assert code == 0
     result = json.loads(out)
     assert len(result["points"]) == 6
     with xr.open_dataset(saved / "branch.nc", engine="h5netcdf") as data:
         assert data.sizes["point"] == 6
-    whole = json.loads(call(capsys, *ROBOT, *SHORT[:3], "--points", "5", "--json")[1])
+    whole = json.loads(run(*ROBOT, *SHORT[:3], "--points", "5", "--json")[1])
     assert whole == result
 
 
-def test_or_elsewhere(capsys, saved):
+def test_or_elsewhere(saved):
     before = (saved / "branch.nc").read_bytes()
-    code, _, _ = call(capsys, *ROBOT, "--resume", saved, "--points", "1", "--out", saved / "new")
+    code, _, _ = run(*ROBOT, "--resume", saved, "--points", "1", "--out", saved / "new")
     assert code == 0
     assert (saved / "branch.nc").read_bytes() == before
     assert (saved / "new" / "branch.nc").exists()
 
 
-def test_nothing_is_overwritten_unless_forced(capsys, saved):
+def test_nothing_is_overwritten_unless_forced(saved):
     before = (saved / "branch.nc").read_bytes()
-    code, out, err = call(capsys, *ROBOT, *SHORT, "--left", "--out", saved)
+    code, out, err = run(*ROBOT, *SHORT, "--left", "--out", saved)
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert "--force" in err
     assert (saved / "branch.nc").read_bytes() == before
-    assert call(capsys, *ROBOT, *SHORT, "--left", "--out", saved, "--force")[0] == 0
+    assert run(*ROBOT, *SHORT, "--left", "--out", saved, "--force")[0] == 0
     assert (saved / "branch.nc").read_bytes() != before
 
 
@@ -76,17 +71,17 @@ def test_nothing_is_overwritten_unless_forced(capsys, saved):
         (("--between", "15 N*mm/deg", "20 N*mm/deg"), "last point"),
     ],
 )
-def test_another_branch_is_refused_in_one_line(capsys, saved, extra, expected):
+def test_another_branch_is_refused_in_one_line(saved, extra, expected):
     before = (saved / "branch.nc").read_bytes()
-    code, out, err = call(capsys, *ROBOT, "--resume", saved, *extra)
+    code, out, err = run(*ROBOT, "--resume", saved, *extra)
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert expected in err
     assert (saved / "branch.nc").read_bytes() == before
 
 
-def test_no_branch_to_resume(capsys, tmp_path):
-    code, _, err = call(capsys, *ROBOT, "--resume", tmp_path / "none")
+def test_no_branch_to_resume(tmp_path):
+    code, _, err = run(*ROBOT, "--resume", tmp_path / "none")
     assert code == 2
     assert "branch.nc" in err
     assert not (tmp_path / "none").exists()

@@ -1,12 +1,11 @@
 """``chilopod course`` as it is typed."""
 
-import json
-
 import pytest
 import xarray as xr
 
 from chilopod.cli import main
 from chilopod.steering import COURSES, ON_COURSES
+from helpers.command_line import printed
 
 ROBOT = "aoi2022-planar"
 # A robot that has no radius law, which takes longest.
@@ -15,8 +14,7 @@ AHEAD = ["--targets", "0 deg, 0.25 m; 0 deg, 99 m; 5 deg, 0.25 m"]
 
 
 def test_text_json_and_files_tell_the_same(capsys, tmp_path):
-    assert main(["course", *WIDE, *AHEAD, "--patience", "9 s", "--json", "--out", str(tmp_path / "new")]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = printed("course", *WIDE, *AHEAD, "--patience", "9 s", "--json", "--out", tmp_path / "new")
     assert (found["robot"], found["strategy"], found["patience_s"]) == (ROBOT, "leg-yaw", 9.0)
     (walk,) = found["walks"]
     assert (walk["seed"], walk["status"], walk["arrived"]) == (None, "halted", 2)

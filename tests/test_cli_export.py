@@ -2,22 +2,13 @@
 
 import json
 import os
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
 
 import mujoco
 import pytest
 
 from chilopod import load_robot
-from chilopod.cli import main
 from chilopod.twin import TwinModel
-
-
-def run(*arguments: str) -> tuple[int, str, str]:
-    """Run the command line in this process: exit code, stdout, stderr."""
-    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
-        code = main(arguments)
-    return code, out.getvalue(), err.getvalue()
+from helpers.command_line import run
 
 
 @pytest.fixture(autouse=True)

@@ -1,9 +1,8 @@
 """What ``chilopod reproduce`` says of what it takes; what it computes is tested where that is computed."""
 
-import json
-
 from chilopod.cli import main
 from chilopod.paper.registry import load_sections
+from helpers.command_line import printed
 
 
 def test_the_help_lists_the_sections(capsys):
@@ -24,9 +23,8 @@ def test_another_robot_is_refused_in_one_line(capsys):
     assert "takes no robot and no --set" in " ".join(capsys.readouterr().out.split())
 
 
-def test_the_json_names_the_robots(capsys, tmp_path):
-    assert main(["reproduce", "--only", "mode", "--out", str(tmp_path), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_the_json_names_the_robots(tmp_path):
+    found = printed("reproduce", "--only", "mode", "--out", tmp_path, "--json")
     assert (found["robot"], found["whole_robot"]) == ("aoi2022-planar", "aoi2022")
     assert found["rows"]
 

@@ -7,25 +7,16 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import chilopod
-from chilopod.cli import main
 from chilopod.robot import load_robot, presets
+from helpers.command_line import run
 
 PRESET = "aoi2022-planar"
-
-
-def run(*arguments: str) -> tuple[int, str, str]:
-    """Run the command line in this process: exit code, stdout, stderr."""
-    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
-        code = main(arguments)
-    return code, out.getvalue(), err.getvalue()
 
 
 def refused(*arguments: str) -> str:

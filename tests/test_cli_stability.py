@@ -7,24 +7,19 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from chilopod.cli import main
+from helpers.command_line import printed, run
 
 PRESET = "aoi2022-planar"
 K1 = "springs.stiffness[0]"
 WIDE = ("2 N*mm/deg", "75 N*mm/deg")
 
 
-def call(capsys, *arguments):
-    code = main([str(argument) for argument in arguments])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+def bifurcation(*extra, parameter=K1, between=WIDE):
+    return run("bifurcation", PRESET, "--parameter", parameter, "--between", *between, *extra)
 
 
-def bifurcation(capsys, *extra, parameter=K1, between=WIDE):
-    return call(capsys, "bifurcation", PRESET, "--parameter", parameter, "--between", *between, *extra)
-
-
-def test_stability_json_has_all_reduced_exponents_by_falling_real_part(capsys):
-    code, out, err = call(capsys, "stability", PRESET, "--json")
+def test_stability_json_has_all_reduced_exponents_by_falling_real_part():
+    code, out, err = run("stability", PRESET, "--json")
     result = json.loads(out)
     assert (code, err) == (0, "")
     assert set(result) == {
@@ -49,22 +44,22 @@ def test_stability_json_has_all_reduced_exponents_by_falling_real_part(capsys):
         assert len(mode["joint_components"]) == 5
 
 
-def test_stability_changes_where_the_paper_says(capsys):
+def test_stability_changes_where_the_paper_says():
     verdicts = {}
     for k1 in ("11 N*mm/deg", "13 N*mm/deg"):
-        _, out, _ = call(capsys, "stability", PRESET, "--json", "--set", f"{K1}={k1}")
+        _, out, _ = run("stability", PRESET, "--json", "--set", f"{K1}={k1}")
         verdicts[k1] = json.loads(out)["stable"]
     assert verdicts == {"11 N*mm/deg": False, "13 N*mm/deg": True}
 
 
-def test_without_the_symmetry_there_are_no_half_period_multipliers(capsys):
-    code, out, _ = call(capsys, "stability", PRESET, "--json", "--set", "gait.side_phase=150 deg")
+def test_without_the_symmetry_there_are_no_half_period_multipliers():
+    code, out, _ = run("stability", PRESET, "--json", "--set", "gait.side_phase=150 deg")
     assert code == 0
     assert json.loads(out)["half_period_multipliers"] is None
 
 
-def test_bifurcation_json_names_the_pitchfork(capsys):
-    code, out, err = bifurcation(capsys, "--json")
+def test_bifurcation_json_names_the_pitchfork():
+    code, out, err = bifurcation("--json")
     (point,) = json.loads(out)["points"]
     assert (code, err) == (0, "")
     assert point["kind"] == "pitchfork"
@@ -80,8 +75,8 @@ def test_bifurcation_json_names_the_pitchfork(capsys):
     assert point["frequency_rad_s"] == 0
 
 
-def test_uniform_springs_give_the_neimark_sacker_point(capsys):
-    _, out, _ = bifurcation(capsys, "--json", parameter="springs.stiffness", between=("6 N*mm/deg", "7 N*mm/deg"))
+def test_uniform_springs_give_the_neimark_sacker_point():
+    _, out, _ = bifurcation("--json", parameter="springs.stiffness", between=("6 N*mm/deg", "7 N*mm/deg"))
     (point,) = json.loads(out)["points"]
     assert point["kind"] == "Neimark-Sacker"
     assert point["value"] == pytest.approx(6.5359, abs=1e-4)
@@ -89,24 +84,24 @@ def test_uniform_springs_give_the_neimark_sacker_point(capsys):
     assert all(len(component) == 2 for component in point["joint_components"])
 
 
-def test_no_crossing_is_an_empty_list_and_it_says_so(capsys):
+def test_no_crossing_is_an_empty_list_and_it_says_so():
     stiff = ("20 N*mm/deg", "75 N*mm/deg")
-    code, out, _ = bifurcation(capsys, "--json", between=stiff)
+    code, out, _ = bifurcation("--json", between=stiff)
     assert code == 0
     assert json.loads(out) == {"robot": PRESET, "points": [], "complete": True}
-    code, out, _ = bifurcation(capsys, between=stiff)
+    code, out, _ = bifurcation(between=stiff)
     assert code == 0
     assert "no bifurcation" in out
 
 
-def test_the_symmetry_of_the_gait_itself_may_vary(capsys):
-    code, out, _ = bifurcation(capsys, "--json", parameter="gait.side_phase", between=("170 deg", "190 deg"))
+def test_the_symmetry_of_the_gait_itself_may_vary():
+    code, out, _ = bifurcation("--json", parameter="gait.side_phase", between=("170 deg", "190 deg"))
     assert code == 0
     assert json.loads(out) == {"robot": PRESET, "points": [], "complete": True}
 
 
-def test_out_holds_what_json_prints(capsys, tmp_path):
-    _, out, err = bifurcation(capsys, "--json", "--out", tmp_path / "new")
+def test_out_holds_what_json_prints(tmp_path):
+    _, out, err = bifurcation("--json", "--out", tmp_path / "new")
     assert json.loads((tmp_path / "new" / "bifurcation.json").read_text()) == json.loads(out)
     assert "bifurcation.json" in err
 
@@ -126,23 +121,23 @@ def test_out_holds_what_json_prints(capsys, tmp_path):
         (K1, ("", "75 N*mm/deg"), "''"),
     ],
 )
-def test_bad_input_is_one_line_that_names_it(capsys, parameter, between, expected):
-    code, out, err = bifurcation(capsys, parameter=parameter, between=between)
+def test_bad_input_is_one_line_that_names_it(parameter, between, expected):
+    code, out, err = bifurcation(parameter=parameter, between=between)
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert expected in err
     assert "Traceback" not in err
 
 
-def test_an_unwritable_folder_is_refused_before_any_work(capsys, tmp_path):
+def test_an_unwritable_folder_is_refused_before_any_work(tmp_path):
     (tmp_path / "file").write_text("")
-    code, out, err = bifurcation(capsys, "--out", tmp_path / "file" / "below")
+    code, out, err = bifurcation("--out", tmp_path / "file" / "below")
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
 
 
-def test_a_search_without_time_says_so(capsys):
-    code, out, err = bifurcation(capsys, "--seconds", "0")
+def test_a_search_without_time_says_so():
+    code, out, err = bifurcation("--seconds", "0")
     assert code == 0
     assert "the budget was spent" in err
     assert "no bifurcation" in out
@@ -166,9 +161,9 @@ _PATHS = st.one_of(
 @example(parameter="body.length", low="1e9 m", high="1e10 m")
 @example(parameter=K1, low="1e-12", high="1e9")
 @example(parameter="gait.stride", low="1 um", high="1 km")
-def test_random_arguments_never_end_in_a_traceback(capsys, parameter, low, high):
+def test_random_arguments_never_end_in_a_traceback(parameter, low, high):
     search = ("bifurcation", PRESET, f"--parameter={parameter}", "--seconds", "0.1", "--between", low, high)
-    code, out, err = call(capsys, *search)
+    code, out, err = run(*search)
     assert code in (0, 2)
     assert "Traceback" not in err
     if code == 2:
@@ -177,8 +172,8 @@ def test_random_arguments_never_end_in_a_traceback(capsys, parameter, low, high)
 
 
 @pytest.mark.parametrize("command", ["bifurcation", "branch"])
-def test_numbers_without_a_unit_are_said_to_be_si(capsys, command):
-    code, out, err = call(capsys, command, PRESET, "--parameter", K1, "--between", "2", "75")
+def test_numbers_without_a_unit_are_said_to_be_si(command):
+    code, out, err = run(command, PRESET, "--parameter", K1, "--between", "2", "75")
     note = "note: a number without a unit is SI: --between is 2 N*m/rad to 75 N*m/rad, that is 34.91 N*mm/deg to 1309"
     assert err.startswith(note)
     if command == "bifurcation":
@@ -188,7 +183,7 @@ def test_numbers_without_a_unit_are_said_to_be_si(capsys, command):
         assert code == 2
         assert "'34.91 N*mm/deg to 1309 N*mm/deg': the straight walk has no pitchfork in this interval" in err
     for between in (("0.2", "75 N*mm/deg"), ("11 N*mm/deg", "13 N*mm/deg")):
-        _, _, err = bifurcation(capsys, between=between)
+        _, _, err = bifurcation(between=between)
         assert ("note: a number without a unit is SI" in err) is (between[0] == "0.2")
 
 
@@ -199,9 +194,7 @@ def test_what_the_errors_leave_undecided_is_said_so(capsys):
     out = capsys.readouterr().out
     assert "the straight walk is undecided" in out
     assert "the largest is nearer to 1 than that" in out
-    assert main([*arguments, "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
+    result = printed(*arguments, "--json")
     assert (result["stable"], result["verdict"]) == (None, "undecided")
-    assert main(["stability", "aoi2022-planar", "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
+    result = printed("stability", "aoi2022-planar", "--json")
     assert (result["stable"], result["verdict"]) == (True, "stable")

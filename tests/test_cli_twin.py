@@ -1,7 +1,6 @@
 """The whole robot on the command line: ``walk`` and ``turn`` with ``--engine twin``, ``identify twin``."""
 
 import importlib
-import json
 
 import pytest
 import xarray as xr
@@ -10,20 +9,16 @@ from chilopod import load_robot
 from chilopod.cli import main
 from chilopod.tasks.identify import twin
 from chilopod.tasks.identify.twin_series import Series
+from helpers.command_line import printed
 
 ROBOT = "aoi2022"
 SOFT = ["--set", "springs.stiffness[0]=15 N*mm/deg"]
 
 
-def printed(capsys, *arguments):
-    assert main(arguments) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def test_a_walk_in_three_dimensions(capsys, tmp_path):
     file = tmp_path / "walk.nc"
     arguments = ["walk", ROBOT, *SOFT, "--engine", "twin", "--duration", "6 s", "--seed", "3", "--repeats", "2"]
-    found = printed(capsys, *arguments, "--forces", "--out", str(file), "--json")
+    found = printed(*arguments, "--forces", "--out", str(file), "--json")
     assert found["engine"] == "twin"
     assert found["foot_creep_N_s_m"] > 100.0
     assert [walk["status"] for walk in found["walks"]] == ["walked", "walked"]
@@ -36,10 +31,10 @@ def test_a_walk_in_three_dimensions(capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_turn_in_three_dimensions_comes_with_a_replay(capsys, tmp_path):
+def test_a_turn_in_three_dimensions_comes_with_a_replay(tmp_path):
     out = tmp_path / "turn"
     arguments = ["turn", ROBOT, "--engine", "twin", "--target", "45 deg, 1.3 m", "--k1", "21 N*mm/deg"]
-    found = printed(capsys, *arguments, "--seed", "1", "--out", str(out), "--json")
+    found = printed(*arguments, "--seed", "1", "--out", str(out), "--json")
     assert found["engine"] == "twin"
     assert found["walks"][0]["outcome"] == "arrived"
     page = (out / "turn.html").read_text(encoding="utf-8")
@@ -70,22 +65,21 @@ def test_what_cannot_walk_is_refused_in_one_line(capsys, arguments, complaint, t
     assert complaint in message
 
 
-def test_a_turn_does_not_walk_its_law_anew(capsys, tmp_path, monkeypatch):
+def test_a_turn_does_not_walk_its_law_anew(tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.import_module("chilopod.tasks.radius_law"), "DURATION", 25.0)
     arguments = ["turn", ROBOT, "--engine", "twin", "--target", "45 deg, 1.3 m", "--k1", "law", "--duration", "2 s"]
-    first = printed(capsys, *arguments, "--trials", str(tmp_path), "--json")
+    first = printed(*arguments, "--trials", str(tmp_path), "--json")
     kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
     assert len(kept) == 9 + 1
     other = [*arguments[:5], "40 deg, 1.5 m", *arguments[6:]]
-    assert printed(capsys, *other, "--trials", str(tmp_path), "--json")["spring_by_law_N_m_rad"] > 0.0
+    assert printed(*other, "--trials", str(tmp_path), "--json")["spring_by_law_N_m_rad"] > 0.0
     assert {name: (tmp_path / name).stat().st_mtime_ns for name in kept} == kept
     assert len(list(tmp_path.iterdir())) == 9 + 2
-    assert printed(capsys, *arguments, "--trials", str(tmp_path), "--json") == first
+    assert printed(*arguments, "--trials", str(tmp_path), "--json") == first
 
 
-def test_a_robot_that_blows_up_says_so(capsys):
-    found = printed(
-        capsys, "walk", ROBOT, "--engine", "twin", "--duration", "2 s", "--json",
+def test_a_robot_that_blows_up_says_so():
+    found = printed("walk", ROBOT, "--engine", "twin", "--duration", "2 s", "--json",
         "--set", "twin.servo_stiffness=9000 N*m/rad", "--set", "twin.servo_damping=1e-6 N*m*s/rad",
     )  # fmt: skip
     assert found["walks"][0]["status"] == "diverged"
@@ -102,13 +96,13 @@ def test_identify_twin_keeps_what_it_has_tried(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(twin, "base_series", series)
     monkeypatch.setattr(twin, "confirmed", lambda robot, springs: True)
     arguments = ["identify", "twin", "--out", str(tmp_path), "--starts", "1", "--generations", "1", "--json"]
-    found = printed(capsys, *arguments)
+    found = printed(*arguments)
     count = 10 + len(twin.known())
     assert found["robot"] == ROBOT
     assert found["evaluations"] == len(asked) == count
     assert main(arguments) == 2
     assert "--force" in capsys.readouterr().err
-    assert found == printed(capsys, *arguments, "--force")
+    assert found == printed(*arguments, "--force")
     assert len(asked) == count
     assert load_robot(tmp_path / "identified.toml").get("legs.half_width") == pytest.approx(
         found["constants"]["legs.half_width"]["value_si"]

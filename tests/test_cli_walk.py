@@ -14,30 +14,26 @@ from chilopod.cli.options import EngineOption, StrategyOption
 from chilopod.engine import ENGINES
 from chilopod.record import RATE
 from chilopod.steering import ARRIVAL_RADIUS, STRATEGIES
+from helpers.command_line import printed, run
 
 ROBOT = "aoi2022-planar"
 SOFT = ["--set", "springs.stiffness[0]=9 N*mm/deg"]
 TURN = ["turn", "--target", "45 deg, 1.3 m"]
+THERE = ["turn", ROBOT, "--target", "45 deg, 1 m"]
 
 
-def printed(capsys, *arguments):
-    assert main(arguments) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def refused(capsys, *arguments):
-    assert main(arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    message = captured.err.splitlines()[-1]
+def refused(*arguments):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    message = err.splitlines()[-1]
     assert message.startswith("error: ")
     return message
 
 
-def test_walk_writes_its_record_and_never_over_another(capsys, tmp_path):
+def test_walk_writes_its_record_and_never_over_another(tmp_path):
     file = tmp_path / "walks" / "a.nc"
     arguments = ["walk", ROBOT, *SOFT, "--duration", "6 s", "--rate", "10", "--out", str(file)]
-    found = printed(capsys, *arguments, "--seed", "5", "--repeats", "3", "--forces", "--json")
+    found = printed(*arguments, "--seed", "5", "--repeats", "3", "--forces", "--json")
     assert [walk["seed"] for walk in found["walks"]] == [5, 6, 7]
     assert {walk["status"] for walk in found["walks"]} == {"walked"}
     with xr.open_dataset(file, engine="h5netcdf") as record:
@@ -48,17 +44,17 @@ def test_walk_writes_its_record_and_never_over_another(capsys, tmp_path):
         listed = [walk["mean_joint_angles_rad"] for walk in found["walks"]]
         np.testing.assert_allclose(angles, listed, rtol=0, atol=1e-12)
     kept = file.read_bytes()
-    assert "--force" in refused(capsys, *arguments)
+    assert "--force" in refused(*arguments)
     assert file.read_bytes() == kept
     assert main([*arguments, "--force"]) == 0
     assert file.read_bytes() != kept
 
 
-def test_the_same_seed_walks_the_same_way_and_no_seed_undisturbed(capsys):
+def test_the_same_seed_walks_the_same_way_and_no_seed_undisturbed():
     arguments = ["walk", ROBOT, *SOFT, "--duration", "3 s", "--json"]
-    assert printed(capsys, *arguments, "--seed", "1") == printed(capsys, *arguments, "--seed", "1")
-    assert printed(capsys, *arguments, "--seed", "1") != printed(capsys, *arguments, "--seed", "2")
-    straight = printed(capsys, *arguments)["walks"][0]
+    assert printed(*arguments, "--seed", "1") == printed(*arguments, "--seed", "1")
+    assert printed(*arguments, "--seed", "1") != printed(*arguments, "--seed", "2")
+    straight = printed(*arguments)["walks"][0]
     assert straight["axis_radius_m"] is None
     assert straight["y_m"] == 0.0
     assert straight["x_m"] == pytest.approx(3.0 * 0.03 / 0.31)
@@ -77,28 +73,8 @@ def test_a_walk_that_leaves_the_range_says_so(capsys):
     arguments = ["walk", ROBOT, "--set", "springs.stiffness[0]=2 N*mm/deg", "--initial-joints", "10,0,0,0,0 deg"]
     assert main(arguments) == 0
     assert "more than a right angle" in capsys.readouterr().out
-    (walk,) = printed(capsys, *arguments, "--json")["walks"]
+    (walk,) = printed(*arguments, "--json")["walks"]
     assert (walk["status"], walk["x_m"]) == ("out of range", None)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--duration", "0 s"], ["duration", "more than 0"]),
-        (["--duration", "-3 s"], ["duration"]),
-        (["--duration", "3 kg"], ["kg"]),
-        (["--rate", "0"], ["rate"]),
-        (["--repeats", "0"], ["--repeats"]),
-        (["--repeats", "3"], ["repeats", "seed"]),
-        (["--trials", "/dev/null/trials"], ["/dev/null/trials", "cannot be written"]),
-        (["--initial-joints", "1,2 deg"], ["not 2", "5"]),
-        (["--initial-joints", "1,x,0,0,0 deg"], ["x"]),
-        (["--set", "springs.stiffness=0 N*mm/deg"], ["springs.stiffness", "positive"]),
-    ],
-)
-def test_walk_refuses(capsys, arguments, words):
-    message = refused(capsys, "walk", ROBOT, *arguments)
-    assert all(word in message for word in words), message
 
 
 @pytest.mark.parametrize(
@@ -124,14 +100,14 @@ def test_walk_refuses(capsys, arguments, words):
         (["identify", "twin", ROBOT], "twin: must be given in the robot file"),
     ],
 )
-def test_options_are_named_as_they_are_typed(capsys, monkeypatch, tmp_path, arguments, start):
+def test_options_are_named_as_they_are_typed(monkeypatch, tmp_path, arguments, start):
     monkeypatch.chdir(tmp_path)
-    assert refused(capsys, *arguments).startswith(f"error: {start}")
+    assert refused(*arguments).startswith(f"error: {start}")
 
 
-def test_turn_finds_a_spring_that_arrives(capsys, tmp_path):
+def test_turn_finds_a_spring_that_arrives(tmp_path):
     folder = tmp_path / "there"
-    found = printed(capsys, "turn", ROBOT, "--target", "45 deg, 1.3 m", "--json", "--out", str(folder))
+    found = printed("turn", ROBOT, "--target", "45 deg, 1.3 m", "--json", "--out", str(folder))
     assert found["circle_radius_m"] == pytest.approx(1.3 / np.sqrt(2.0))
     per_unit = np.deg2rad(1.0) * 1000.0  # N*m/rad to N*mm/deg
     assert found["spring_by_law_N_m_rad"] * per_unit == pytest.approx(11.782, abs=0.001)
@@ -142,14 +118,14 @@ def test_turn_finds_a_spring_that_arrives(capsys, tmp_path):
     assert walk["arrival_s"] == found["evaluation_time_s"]
     assert {file.name for file in folder.iterdir()} == {"turn.png", "turn.svg", "turn.nc", "turn.html"}
     again = ["turn", ROBOT, "--target", "45 deg, 1.3 m", "--k1", "10 N*mm/deg", "--out", str(folder)]
-    assert "--force" in refused(capsys, *again)
+    assert "--force" in refused(*again)
     assert main([*again, "--force"]) == 0
 
 
-def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
+def test_turn_with_a_given_spring_and_the_other_strategies():
     target = ["--target", "-45 deg, 1.3 m", "--json"]
     outcomes = {
-        (strategy, spring): printed(capsys, "turn", ROBOT, *target, "--strategy", strategy, "--k1", spring)["walks"][0]
+        (strategy, spring): printed("turn", ROBOT, *target, "--strategy", strategy, "--k1", spring)["walks"][0]
         for strategy, spring in (
             ("pitchfork", "7 N*mm/deg"),
             ("pitchfork", "9.8 N*mm/deg"),
@@ -173,25 +149,39 @@ def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--target", "0 deg, 0 m"], ["distance"]),
-        (["--target", "20 deg, 0.1 m"], ["distance", "0.15"]),
-        (["--target", "20 deg, -1 m"], ["distance"]),
-        (["--target", "45"], ["45 deg, 1.3 m"]),
-        (["--target", "45 m, 1.3 m"], ["target"]),
-        (["--target", "80 deg, 0.4 m"], ["must be at least the tightest radius"]),
-        (["--target", "45 deg, 1 m", "--strategy", "pitchfrok"], ["did you mean 'pitchfork'"]),
-        (["--target", "45 deg, 1 m", "--k1", "0 N*mm/deg"], ["must be positive"]),
-        (["--target", "45 deg, 1 m", "--k1", "atuo"], ["atuo"]),
-        (["--target", "45 deg, 1 m", "--strategy", "hopf", "--k1", "law"], ["radius law"]),
-        (["--target", "45 deg, 1 m", "--strategy", "leg-yaw", "--k1", "9 N*mm/deg"], ["--k1", "leg-yaw", "auto"]),
-        (["--target", "45 deg, 1 m", "--strategy", "leg-yaw", "--k1", "law"], ["--k1", "leg-yaw", "auto"]),
-        (["--target", "45 deg, 1 m", "--repeats", "2"], ["seed"]),
-        (["--target", "45 deg, 1 m", "--duration", "0 s"], ["duration"]),
-        (["--target", "45 deg, 1 m", "--set", "legs.half_width=0.3 m"], ["no pitchfork"]),
+        (["walk", ROBOT, "--duration", "0 s"], ["duration", "more than 0"]),
+        (["walk", ROBOT, "--duration", "-3 s"], ["duration"]),
+        (["walk", ROBOT, "--duration", "3 kg"], ["kg"]),
+        (["walk", ROBOT, "--rate", "0"], ["rate"]),
+        (["walk", ROBOT, "--repeats", "0"], ["--repeats"]),
+        (["walk", ROBOT, "--repeats", "3"], ["repeats", "seed"]),
+        (["walk", ROBOT, "--trials", "/dev/null/trials"], ["/dev/null/trials", "cannot be written"]),
+        (["walk", ROBOT, "--initial-joints", "1,2 deg"], ["not 2", "5"]),
+        (["walk", ROBOT, "--initial-joints", "1,x,0,0,0 deg"], ["x"]),
+        (["walk", ROBOT, "--set", "springs.stiffness=0 N*mm/deg"], ["springs.stiffness", "positive"]),
+        (["walk", ROBOT, "--controller", "nosuch.module:Class"], ["cannot be imported", "nosuch"]),
+        (["walk", ROBOT, "--controller", "Class"], ["must name an object", "package.module:Class"]),
+        (["walk", ROBOT, "--controller", ""], ["must name an object"]),
+        (["walk", ROBOT, "--controller", "os; rm:Class"], ["must name an object"]),
+        (["turn", ROBOT, "--target", "0 deg, 0 m"], ["distance"]),
+        (["turn", ROBOT, "--target", "20 deg, 0.1 m"], ["distance", "0.15"]),
+        (["turn", ROBOT, "--target", "20 deg, -1 m"], ["distance"]),
+        (["turn", ROBOT, "--target", "45"], ["45 deg, 1.3 m"]),
+        (["turn", ROBOT, "--target", "45 m, 1.3 m"], ["target"]),
+        (["turn", ROBOT, "--target", "80 deg, 0.4 m"], ["must be at least the tightest radius"]),
+        ([*THERE, "--strategy", "pitchfrok"], ["did you mean 'pitchfork'"]),
+        ([*THERE, "--k1", "0 N*mm/deg"], ["must be positive"]),
+        ([*THERE, "--k1", "atuo"], ["atuo"]),
+        ([*THERE, "--strategy", "hopf", "--k1", "law"], ["radius law"]),
+        ([*THERE, "--strategy", "leg-yaw", "--k1", "9 N*mm/deg"], ["--k1", "leg-yaw", "auto"]),
+        ([*THERE, "--strategy", "leg-yaw", "--k1", "law"], ["--k1", "leg-yaw", "auto"]),
+        ([*THERE, "--repeats", "2"], ["seed"]),
+        ([*THERE, "--duration", "0 s"], ["duration"]),
+        ([*THERE, "--set", "legs.half_width=0.3 m"], ["no pitchfork"]),
     ],
 )
-def test_turn_refuses(capsys, arguments, words):
-    message = refused(capsys, "turn", ROBOT, *arguments)
+def test_what_cannot_be_walked_is_refused(arguments, words):
+    message = refused(*arguments)
     assert all(word in message for word in words), message
 
 
@@ -265,11 +255,11 @@ def own(tmp_path, monkeypatch):
     sys.modules.pop(name, None)
 
 
-def test_a_controller_of_ones_own_steers_a_walk(capsys, own):
+def test_a_controller_of_ones_own_steers_a_walk(own):
     arguments = ["walk", ROBOT, *SOFT, "--duration", "20 s", "--json"]
     ends = {}
     for name in ("Left", "Right"):
-        found = printed(capsys, *arguments, "--controller", f"{own}:{name}")
+        found = printed(*arguments, "--controller", f"{own}:{name}")
         assert found["controller"] == f"{own}:{name}"
         ends[name] = found["walks"][0]["y_m"]
     assert ends["Left"] > 0.05
@@ -277,15 +267,15 @@ def test_a_controller_of_ones_own_steers_a_walk(capsys, own):
     assert os.getcwd() not in sys.path
 
 
-def test_a_controller_of_ones_own_turns_in_place_of_the_strategys(capsys, own, tmp_path):
+def test_a_controller_of_ones_own_turns_in_place_of_the_strategys(own, tmp_path):
     arguments = ["turn", ROBOT, "--target", "45 deg, 1.3 m", "--json", "--duration", "15 s"]
     left, right = (
-        printed(capsys, *arguments, "--k1", "9 N*mm/deg", "--controller", f"{own}:{name}") for name in ("Left", "Right")
+        printed(*arguments, "--k1", "9 N*mm/deg", "--controller", f"{own}:{name}") for name in ("Left", "Right")
     )
     assert left["controller"] == f"{own}:Left"
     assert left["walks"][0]["nearest_m"] < right["walks"][0]["nearest_m"]
     # Also where the strategy has none, and in the search for the spring.
-    found = printed(capsys, *arguments, "--strategy", "open-loop", "--controller", f"{own}:Left", "--trials", "kept")
+    found = printed(*arguments, "--strategy", "open-loop", "--controller", f"{own}:Left", "--trials", "kept")
     assert found["walks"][0]["nearest_m"] <= left["walks"][0]["nearest_m"]
     assert found["spring_N_m_rad"] != found["spring_by_law_N_m_rad"]
     assert len(list((tmp_path / "kept").iterdir())) > 48
@@ -303,22 +293,8 @@ def test_a_controller_of_ones_own_turns_in_place_of_the_strategys(capsys, own, t
     ],
 )
 @pytest.mark.parametrize("command", [["walk"], [*TURN, "--k1", "10 N*mm/deg"], ["course", "--targets", "0 deg, 1 m"]])
-def test_controllers_that_are_none_are_refused_in_one_line(capsys, own, command, name, words):
-    message = refused(capsys, command[0], ROBOT, *command[1:], "--controller", f"{own}:{name}")
-    assert all(word in message for word in words), message
-
-
-@pytest.mark.parametrize(
-    ("path", "words"),
-    [
-        ("nosuch.module:Class", ["cannot be imported", "nosuch"]),
-        ("Class", ["must name an object", "package.module:Class"]),
-        ("", ["must name an object"]),
-        ("os; rm:Class", ["must name an object"]),
-    ],
-)
-def test_paths_that_do_not_import_are_refused_in_one_line(capsys, path, words):
-    message = refused(capsys, "walk", ROBOT, "--controller", path)
+def test_controllers_that_are_none_are_refused_in_one_line(own, command, name, words):
+    message = refused(command[0], ROBOT, *command[1:], "--controller", f"{own}:{name}")
     assert all(word in message for word in words), message
 
 
@@ -331,30 +307,28 @@ def test_a_controller_that_takes_most_of_the_time_is_named(capsys, own):
     assert "the controller took" not in capsys.readouterr().err
 
 
-def test_an_engine_of_ones_own_walks(capsys, own):
+def test_an_engine_of_ones_own_walks(own):
     arguments = ["walk", ROBOT, *SOFT, "--duration", "2 s", "--seed", "1", "--json"]
-    found, planar = printed(capsys, *arguments, "--engine", f"{own}:toy"), printed(capsys, *arguments)
+    found, planar = printed(*arguments, "--engine", f"{own}:toy"), printed(*arguments)
     assert found["engine"] == f"{own}:toy"
     assert found["walks"] == planar["walks"]
-    assert "must be an object, not a class; allowed: an instance" in refused(
-        capsys, "walk", ROBOT, "--engine", f"{own}:Left"
-    )
+    assert "must be an object, not a class; allowed: an instance" in refused("walk", ROBOT, "--engine", f"{own}:Left")
 
 
-def test_walks_are_kept_and_not_walked_again(capsys, tmp_path):
+def test_walks_are_kept_and_not_walked_again(tmp_path):
     folder = tmp_path / "kept"
     arguments = ["walk", ROBOT, *SOFT, "--duration", "3 s", "--seed", "1", "--json", "--trials", str(folder)]
-    first = printed(capsys, *arguments, "--repeats", "2")
+    first = printed(*arguments, "--repeats", "2")
     kept = {file.name: file.stat().st_mtime_ns for file in folder.iterdir()}
     assert len(kept) == 2
-    third = printed(capsys, *arguments, "--repeats", "3")
+    third = printed(*arguments, "--repeats", "3")
     assert third["walks"][:2] == first["walks"]
     assert {name: (folder / name).stat().st_mtime_ns for name in kept} == kept
     assert len(list(folder.iterdir())) == 3
     # Another's record in the place of one's own does not count.
     one, other = list(kept)
     (folder / one).write_bytes((folder / other).read_bytes())
-    assert printed(capsys, *arguments, "--repeats", "2") == first
+    assert printed(*arguments, "--repeats", "2") == first
     assert (folder / f"{one}.aside").exists()
 
 

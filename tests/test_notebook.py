@@ -1,5 +1,6 @@
 """What shows itself in a notebook is well-formed, holds its numbers, and takes no text for markup."""
 
+from functools import partial
 from xml.etree import ElementTree
 
 import matplotlib.pyplot as plt
@@ -11,11 +12,12 @@ from matplotlib.figure import Figure
 from chilopod import load_robot
 from chilopod.analysis import pitchfork, straight_walk
 from chilopod.notebook import block, folded, picture, table, words
-from chilopod.stability import PeriodicSystem, begin, follow, follow2, from_rhs, locate
+from chilopod.stability import begin, follow, follow2, locate
 from chilopod.steering import Target, course_named, strategy_named
 from chilopod.tasks import Driver, drive, ends, turn, walk
 from chilopod.tasks.runs import draw_paths
 from chilopod.trials import Trial
+from helpers import systems
 
 ROBOT = load_robot("aoi2022-planar")
 SVG = "{http://www.w3.org/2000/svg}"
@@ -105,17 +107,8 @@ def test_point():
     assert [float(angle) for angle in cells(html)[1][1:]] == pytest.approx(point.joint_components.real, abs=1e-3)
 
 
-def duffing(force):
-    return from_rhs(
-        lambda t, x, force: [x[1], force * np.cos(t) - 0.2 * x[1] - x[0] ** 3],
-        2,
-        2.0 * np.pi,
-        args=(force,),
-        symmetry=-np.eye(2),
-    )
-
-
 def test_any_systems_points_and_branch():
+    duffing = partial(systems.duffing, symmetry=-np.eye(2))
     found = locate(duffing, (2.3, 2.5), orbit=[1.9, 0.6])
     branch = follow(duffing, begin(duffing, 2.35, [1.9, 0.6], symmetric=True), (2.35, 2.45), symmetric=True)
     for result, drawn in ((found, True), (found[0], False), (branch, True)):
@@ -126,16 +119,9 @@ def test_any_systems_points_and_branch():
         assert (read(html).find(f"{SVG}svg") is not None) is drawn
 
 
-def henon(a, b):
-    def image(x):
-        return np.array([1 - a * x[0] ** 2 + x[1], b * x[0]]), np.array([[-2 * a * x[0], 1], [b, 0]])
-
-    return PeriodicSystem(2, 1.0, lambda x, t0, t1: image(x), flow_with_error=lambda x, t0, t1: (*image(x), 1e-15))
-
-
 def test_any_systems_curve():
-    (doubling,) = locate(lambda a: henon(a, 0.3), (0.1, 0.8), orbit=[0.8, 0.24])
-    html = follow2(henon, doubling, ((0.05, 5.0), (-1.4, 0.7)), second=0.3)._repr_html_()
+    (doubling,) = locate(lambda a: systems.henon(a, 0.3), (0.1, 0.8), orbit=[0.8, 0.24])
+    html = follow2(systems.henon, doubling, ((0.05, 5.0), (-1.4, 0.7)), second=0.3)._repr_html_()
     assert "1:2 resonance" in said(html)
     assert "Curve2: period doubling" in said(html)
 

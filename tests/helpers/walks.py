@@ -89,3 +89,11 @@ def on_course(record, places, turns, verdicts):
         goal_end=(("robot", "goal"), turns[..., 1], {"units": "s"}),
         goal_verdict=(("robot", "goal"), np.array(verdicts, dtype=object)),
     )
+
+
+def reduced(record):
+    """States of the only robot of a record, shape (time, 2N+1)."""
+    c, s = np.cos(record.heading.values[:, 0]), np.sin(record.heading.values[:, 0])
+    vx, vy = record.velocity.values[:, 0].T
+    front = np.stack([c * vx + s * vy, c * vy - s * vx, record.heading_rate.values[:, 0]], -1)
+    return np.concatenate([front, record.joint_angle.values[:, 0], record.joint_rate.values[:, 0]], axis=1)

@@ -16,6 +16,7 @@ from chilopod.planar.stretch import _slope
 from chilopod.record import Recording, spring_work
 from helpers.free_bodies import FreeBodies
 from helpers.planar_strategies import energy_rate, mid_interval, robots, state_of
+from helpers.walks import reduced
 
 N_MM_PER_DEG = 1e-3 * 180 / np.pi
 PRESET = load_robot("aoi2022-planar").override("springs.adjustable", True)
@@ -68,14 +69,6 @@ def walked(robot, within, torque=None, seconds=4.0, tolerance=1e-12, rate=100.0,
         walk.command(Command(joint_torque=torque))
     walk.advance(seconds)
     return walk.to_dataset()
-
-
-def reduced(record):
-    """States of the only robot of a record, shape (time, 2N+1)."""
-    c, s = np.cos(record.heading.values[:, 0]), np.sin(record.heading.values[:, 0])
-    vx, vy = record.velocity.values[:, 0].T
-    front = np.stack([c * vx + s * vy, c * vy - s * vx, record.heading_rate.values[:, 0]], -1)
-    return np.concatenate([front, record.joint_angle.values[:, 0], record.joint_rate.values[:, 0]], axis=1)
 
 
 @pytest.mark.parametrize(

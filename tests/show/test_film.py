@@ -2,7 +2,6 @@
 
 import io
 
-import av
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
@@ -11,15 +10,8 @@ from matplotlib.image import imread
 from chilopod.errors import OutputError, ParameterError
 from chilopod.show import style
 from chilopod.show.scene.film import filmed, poster
+from helpers.films import decoded
 from helpers.walks import on_course, walk
-
-
-def decoded(film) -> np.ndarray:
-    """All frames, (T, height, width, 3)."""
-    with av.open(io.BytesIO(film)) as container:
-        (stream,) = container.streams.video
-        assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
-        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(stream)])
 
 
 def right_end_of(frame, color) -> float:
@@ -34,9 +26,7 @@ def test_length_and_size(fps, speed, count):
     shown = walk(0.0, 0.5, duration=2.0)
     film = filmed(shown, titles=["a", "b"], heading="h", fps=fps, speed=speed, size=(480, 320))
     assert film.index(b"moov") < film.index(b"mdat")  # the index stands in front
-    assert decoded(film).shape == (count, 320, 480, 3)
-    with av.open(io.BytesIO(film)) as container:
-        assert container.streams.video[0].average_rate == fps
+    assert decoded(film, rate=fps).shape == (count, 320, 480, 3)
 
 
 def test_targets_of_a_course_appear_when_their_turn_comes():

@@ -2,7 +2,6 @@
 
 import io
 
-import av
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
@@ -14,6 +13,7 @@ from chilopod.show import style
 from chilopod.show.scene.film_3d import film_3d, poster_3d, stills
 from chilopod.show.scene.stage_3d import Look, Studio, framing
 from chilopod.twin import gl, initial_states, simulate
+from helpers.films import decoded
 
 ROBOT = load_robot("aoi2022")
 N = ROBOT.body.modules
@@ -106,10 +106,7 @@ def test_floor_target_path_and_robots_that_stopped(studio):
 @pytest.mark.parametrize("follow", [False, True])
 def test_film(drawn, record, follow):
     film = film_3d(record, titles=["a", "b"], heading="h", fps=5, size=(480, 240), follow=follow)
-    with av.open(io.BytesIO(film)) as container:
-        (stream,) = container.streams.video
-        assert stream.average_rate == 5
-        frames = np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(stream)])
+    frames = decoded(film, rate=5)
     assert frames.shape == (6, 240, 480, 3)
     blue = near(frames[0][30:-40], style.BLUE)
     assert blue[:, :240].any()  # a robot in each panel

@@ -2,20 +2,17 @@
 
 import json
 import re
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
-from io import StringIO
 
 import numpy as np
 import pytest
 
 from chilopod import load_robot
-from chilopod.cli import main
 from chilopod.planar import initial_states, simulate
 from chilopod.show.play import motion, play
 from chilopod.show.play.page import theory
 from chilopod.steering import SpringLaw
-from helpers.browser import CHROMIUM, Browser
+from helpers.command_line import run
 
 BENT = (0.03, -0.01, 0.02, 0.0, 0.01)  # rad
 BEHIND = (-0.9, 0.9)  # m: out of the scanner's view at first
@@ -50,12 +47,9 @@ def page(robot, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def browser(page, tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("there is no Chromium")
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        browser.open(page)
-        yield browser
+def browser(page, browser):
+    browser.open(page)
+    return browser
 
 
 def walked(robot, law):
@@ -122,11 +116,6 @@ def test_the_numbers_of_the_motion_are_those_of_the_robot(robot):
 
 def test_the_command_writes_one_file_and_replaces_none(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
-            return main(arguments), out.getvalue(), err.getvalue()
-
     assert run("play", "--json")[0] == 0
     assert (tmp_path / "play.html").read_text(encoding="utf-8").startswith("<!doctype html>")
     code, _, err = run("play")

@@ -19,6 +19,7 @@ from chilopod.stability import (
     multipliers,
     switch,
 )
+from helpers.systems import lorenz, roessler
 
 STEP = 1e-30
 
@@ -143,21 +144,14 @@ def test_what_is_no_orbit_is_one_line():
     assert "\n" not in str(error.value)
 
 
-def rossler(c):
-    def rhs(t, x, c):
-        return [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - c)]
-
-    return from_rhs(rhs, 3, None, args=(c,), guess_period=5.8)
-
-
 @pytest.mark.parametrize("step", [0.005, 0.01, 0.02])
 def test_a_doubled_branch_has_no_points_that_are_not_there(step):
     """Beside the period doubling of Rössler's system the doubled orbit's multiplier falls from 1 at a constant rate; a
     small residual, which is far from an orbit there, made folds and pitchforks of it."""
 
-    (doubling,) = locate(rossler, (2.0, 3.0), orbit=[3.0, 0.0, 0.1])
-    (start,) = switch(rossler, doubling)
-    branch = follow(rossler, start, (2.0, 3.0), points=4, step=step)
+    (doubling,) = locate(roessler, (2.0, 3.0), orbit=[3.0, 0.0, 0.1])
+    (start,) = switch(roessler, doubling)
+    branch = follow(roessler, start, (2.0, 3.0), points=4, step=step)
     assert [point.value for point in branch.special_points] == [doubling.value]
     # The first value is known to some 1e-9, which is a hundredth of its distance from the doubling.
     last = branch.points[-1]
@@ -165,13 +159,6 @@ def test_a_doubled_branch_has_no_points_that_are_not_there(step):
     for point in branch.points[1:]:
         assert point.value > doubling.value
         assert (1.0 - point.multipliers[0].real) / (point.value - doubling.value) == pytest.approx(rate, rel=0.05)
-
-
-def lorenz(r):
-    def rhs(t, x, r):
-        return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
-
-    return from_rhs(rhs, 3, None, args=(r,), guess_period=0.67)
 
 
 def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
@@ -194,7 +181,7 @@ def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
 @pytest.mark.parametrize("state", [[3.0, 0.0, 0.1], [0.0, 3.0, 0.1], [-3.0, 0.0, 0.05]])
 def test_coefficients_do_not_hang_on_where_an_orbit_is_met(state):
     """Rössler's period doubling, on three sections."""
-    (point,) = locate(rossler, (2.0, 3.3), orbit=state)
+    (point,) = locate(roessler, (2.0, 3.3), orbit=state)
     assert abs(point.coefficient + 0.3705827166) <= point.coefficient_error + 1e-10 < 1e-7
 
 

@@ -4,6 +4,7 @@ they touch and no more."""
 import math
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from chilopod.stability import (
 )
 from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.unit_circle.crossings import SearchStatus
+from helpers.systems import duffing, linear, lorenz
 
 BUDGET = 150
 FLOWS_PER_RETURN = 12  # of a system without a period: to the section, and Newton's method for when it is there
@@ -132,13 +134,12 @@ def test_exceptions_at_the_first_value():
 
 def test_exceptions_inside_a_flow():
     def family(p):
-        def flow(x, t0, t1):
+        def moves(t0, t1):
             if 0.35 < p < 0.45:
                 raise LookupError("no table")
-            derivative = np.diag(np.exp(np.array([p - 0.6, -1.0]) * (t1 - t0)))
-            return derivative @ x, derivative
+            return np.diag(np.exp(np.array([p - 0.6, -1.0]) * (t1 - t0)))
 
-        return PeriodicSystem(2, 1.0, flow, orbit=[0.0, 0.0])
+        return linear(moves, 2)
 
     found = locate(family, (-1.0, 1.0))
     assert [point.value for point in found] == [pytest.approx(0.6, abs=1e-12)]
@@ -225,26 +226,18 @@ def test_a_flow_ends_with_the_time_of_the_search_that_asked_for_it(rhs, options)
     assert np.array_equal(system.flow(start, 0.0, 1.0)[0], after)  # and no longer than that
 
 
-def test_many_states_at_once_end_with_the_time_too():
+def test_many_states_at_once_and_inner_searches_without_a_limit_end_with_the_time_too():
     system = from_rhs(lambda t, x: [x[1], -x[0]], 2, 2.0 * math.pi, method="taylor")
     states = np.ones((64, 2))
     system.flow_states(states, 0.0, 1.0)
     with Budget(10, seconds=0.02), pytest.raises(SpentError):
         system.flow_states(states, 0.0, 1e5)
-
-
-def test_an_inner_search_without_a_limit_keeps_that_of_the_outer_one():
-    system = from_rhs(lambda t, x: [x[1], -x[0]], 2, 2.0 * math.pi, method="taylor")
     with Budget(10, seconds=0.02), Budget(10), pytest.raises(SpentError):
         system.flow(np.array([1.0, 0.0]), 0.0, 1e5)
 
 
 def test_the_first_orbit_is_within_the_time():
-    def family(force):
-        return from_rhs(
-            lambda t, x: [x[1], -0.2 * x[1] - x[0] ** 3 + force * math.cos(t)], 2, 2.0 * math.pi, symmetry=-np.eye(2)
-        )
-
+    family = partial(duffing, symmetry=-np.eye(2))
     for search in (
         lambda: locate(family, (2.3, 2.5), orbit=[1.88, 0.64], seconds=0.0),
         lambda: follow(family, [1.88, 0.64], (2.3, 2.5), seconds=0.0),
@@ -255,11 +248,8 @@ def test_the_first_orbit_is_within_the_time():
 
 @pytest.mark.parametrize("guess", [[1e8, 1e8, 1e8], [1e8, 0.0, 0.0]])
 def test_a_hopeless_guess_is_refused_after_one_flow(guess):
-    def lorenz(t, x):
-        return [10.0 * (x[1] - x[0]), 24.0 * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
-
     with pytest.raises(AnalysisError, match=r"^orbit: the motion from the guess takes too many steps"):
-        multipliers(from_rhs(lorenz, 3, None, guess_period=0.6), guess)
+        multipliers(lorenz(24.0, 0.6), guess)
 
 
 def test_time_limits_reach_flows_of_the_user_and_settling():

@@ -22,17 +22,10 @@ from chilopod.stability import (
     locate_hopf,
     switch,
 )
+from helpers.systems import in_units, lorenz, lorenz_rhs
 
 LORENZ_HOPF = 470.0 / 19.0
 SUPER, SUB, UNDECIDED = Criticality.SUPERCRITICAL, Criticality.SUBCRITICAL, Criticality.UNDECIDED
-
-
-def lorenz_rhs(t, x, r):
-    return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
-
-
-def lorenz(r):
-    return from_rhs(lorenz_rhs, 3, None, args=(r,), guess_period=0.65)
 
 
 def lorenz_state(r):
@@ -41,13 +34,11 @@ def lorenz_state(r):
 
 
 def brusselator(b, states=(1.0, 1.0), time=1.0):
-    u, v = states
-
     def rhs(t, x):
-        p, q = x[0] / u, x[1] / v
-        return [u / time * (1.0 + p * p * q - (b + 1.0) * p), v / time * (b * p - p * p * q)]
+        square = x[0] * x[0] * x[1]
+        return [1.0 + square - (b + 1.0) * x[0], b * x[0] - square]
 
-    return from_rhs(rhs, 2, None, guess_period=6.0 * time)
+    return from_rhs(in_units(rhs, states, time), 2, None, guess_period=6.0 * time)
 
 
 def oscillator(mu, cubic=-1.0, linear=0.0):
@@ -107,6 +98,17 @@ def langford(b):
         ]
 
     return from_rhs(rhs, 3, None, guess_period=1.8)
+
+
+def folding(mu):
+    def rhs(t, x):
+        return [x[1], -x[0] + (mu + 0.5) * x[1] - x[0] ** 2 * x[1], 0.8 - mu - x[2] ** 2]
+
+    return from_rhs(rhs, 3, None, guess_period=6.0)
+
+
+def resting(m):
+    return from_rhs(lambda t, x: [x[1], m * x[1]], 2, None, guess_period=1.0)
 
 
 class TestEquilibrium:
@@ -345,28 +347,18 @@ class TestHopf:
         assert not point.criticality.known
         assert any("2 pairs" in remark for remark in found.remarks)
 
-    def test_a_fold_ends_the_search_in_words(self):
-        def folding(mu):
-            return from_rhs(
-                lambda t, x: [x[1], -x[0] + (mu + 0.5) * x[1] - x[0] ** 2 * x[1], 0.8 - mu - x[2] ** 2], 3, None,
-                guess_period=6.0,
-            )  # fmt: skip
-
-        found = locate_hopf(folding, (-1.0, 1.5), [0.1, 0.0, 1.0])
-        assert [point.value for point in found] == pytest.approx([-0.5], abs=1e-12)
-        assert any("fold" in remark and "0.8" in remark for remark in found.remarks)
-
-    def test_where_another_equilibrium_meets_this_one_is_said(self):
-        found = locate_hopf(lorenz, (0.5, 3.0), np.zeros(3))
-        assert len(found) == 0
-        assert any("an eigenvalue is zero at 1:" in remark for remark in found.remarks)
-
-    def test_an_eigenvalue_that_is_zero_throughout_is_said(self):
-        found = locate_hopf(
-            lambda m: from_rhs(lambda t, x: [x[1], m * x[1]], 2, None, guess_period=1.0), (-2.0, -1.0), [0.1, 0.2]
-        )
-        assert len(found) == 0
-        assert any("an eigenvalue is 0 throughout" in remark for remark in found.remarks)
+    @pytest.mark.parametrize(
+        ("family", "between", "guess", "values", "said"),
+        [
+            (folding, (-1.0, 1.5), [0.1, 0.0, 1.0], [-0.5], ["fold", "0.8"]),
+            (lorenz, (0.5, 3.0), np.zeros(3), [], ["an eigenvalue is zero at 1:"]),
+            (resting, (-2.0, -1.0), [0.1, 0.2], [], ["an eigenvalue is 0 throughout"]),
+        ],
+    )
+    def test_where_equilibria_end_or_meet_or_are_not_alone_is_said(self, family, between, guess, values, said):
+        found = locate_hopf(family, between, guess)
+        assert [point.value for point in found] == pytest.approx(values, abs=1e-12)
+        assert any(all(words in remark for words in said) for remark in found.remarks)
 
     def test_without_a_trace(self):
         def family(r):

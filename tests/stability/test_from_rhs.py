@@ -15,6 +15,10 @@ def oscillator(t, x):
     return [x[1], -x[0]]
 
 
+def falling(t, x):
+    return [x[1], -(x[0] ** 2)]
+
+
 def hill(coefficient):
     return lambda t, x: [x[1], -coefficient(t) * x[0]]
 
@@ -278,7 +282,6 @@ REFUSED = {
     "period infinite": (oscillator, 2, np.inf, {}, "period"),
     "period text": (oscillator, 2, "one", {}, "period"),
     "tolerance zero": (oscillator, 2, 1.0, {"tolerance": 0.0}, "tolerance"),
-    "tolerance negative": (oscillator, 2, 1.0, {"tolerance": -1e-9}, "tolerance"),
     "tolerance nan": (oscillator, 2, 1.0, {"tolerance": np.nan}, "tolerance"),
     "tolerance one": (oscillator, 2, 1.0, {"tolerance": 1.0}, "tolerance"),
     "switch outside": (oscillator, 2, 1.0, {"switch_times": [1.0]}, "switch_times"),
@@ -292,19 +295,10 @@ REFUSED = {
     "orbit text": (oscillator, 2, 1.0, {"orbit": "zero"}, "orbit"),
     "jacobian shape": (oscillator, 2, 1.0, {"jacobian": lambda t, x: [[1.0]]}, "jacobian"),
     "symmetry shape": (oscillator, 2, 1.0, {"symmetry": [[1.0]]}, "symmetry"),
-    "symmetry vector": (oscillator, 2, 1.0, {"symmetry": [1.0, -1.0]}, "symmetry"),
     "symmetry of no finite order": (oscillator, 2, 1.0, {"symmetry": [[0, 1], [-1, 1.1]]}, "symmetry"),
-    "symmetry nan": (oscillator, 2, 1.0, {"symmetry": [[np.nan, 0], [0, 1]]}, "symmetry"),
-    "spatial symmetry shape": (oscillator, 2, 1.0, {"spatial_symmetry": np.eye(3)}, "spatial_symmetry"),
     "spatial symmetry stretched": (oscillator, 2, 1.0, {"spatial_symmetry": 2 * np.eye(2)}, "spatial_symmetry"),
     "no symmetry of it": (hill(cos), 2, 2 * pi, {"symmetry": -np.eye(2)}, "symmetry"),
-    "no mirror of it": (
-        lambda t, x: [x[1], -(x[0] ** 2)],
-        2,
-        1.0,
-        {"spatial_symmetry": -np.eye(2)},
-        "spatial_symmetry",
-    ),
+    "no mirror of it": (falling, 2, 1.0, {"spatial_symmetry": -np.eye(2)}, "spatial_symmetry"),
 }
 
 

@@ -11,6 +11,7 @@ from chilopod.stability.symmetry.equivariants import SymmetricKind, symmetric_cr
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import isotypic
 from chilopod.stability.unit_circle.spectra import Event
+from helpers.spectra import farthest
 
 
 def permutation(*images):
@@ -79,17 +80,6 @@ def commuting(elements, random):
     """A random matrix that commutes with some elements: P M P^-1 averaged over them."""
     n = elements.shape[1]
     return np.mean(elements @ random.standard_normal((n, n)) @ np.linalg.inv(elements), axis=0)
-
-
-def farthest(found, known):
-    """Largest distance between two lists of numbers, each of one paired with the nearest that is left of the other."""
-    left = list(known)
-    assert len(found) == len(left)
-    worst = 0.0
-    for value in found:
-        nearest = int(np.argmin(np.abs(np.array(left) - value)))
-        worst = max(worst, abs(left.pop(nearest) - value))
-    return worst
 
 
 def spectrum_of(blocks, matrix):

@@ -7,21 +7,20 @@ from scipy.linalg import expm
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Event, PeriodicSystem, from_rhs, multipliers
 from chilopod.stability.krylov import closed_orbit, krylov_subspaces, leading_multipliers, tangent_map, tangent_sizes
+from helpers import systems
 
 
 def linear(generator, state=None):
     """x' = L x over the time 1; its flows are matrix exponentials, with the digits of scipy."""
 
-    def flow(x, t0, t1):
-        matrix = expm((t1 - t0) * generator)
-        return matrix @ x, matrix
+    def moves(t0, t1):
+        return expm((t1 - t0) * generator)
 
     def flow_tangents(x, directions, t0, t1):
-        state, matrix = flow(x, t0, t1)
-        return state, matrix @ directions
+        return moves(t0, t1) @ x, moves(t0, t1) @ directions
 
-    n = len(generator)
-    return PeriodicSystem(n, 1.0, flow, flow_tangents=flow_tangents, orbit=np.zeros(n) if state is None else state)
+    known = {} if state is None else {"orbit": state}
+    return systems.linear(moves, len(generator), flow_tangents=flow_tangents, **known)
 
 
 def leading(generator, count):
@@ -164,12 +163,7 @@ def test_how_many_has_to_be_a_number(count):
 def test_a_large_system_without_directions():
     """It goes the way of the matrix."""
     factors = np.linspace(0.5, 0.1, 100)
-    system = PeriodicSystem(
-        100,
-        1.0,
-        lambda x, t0, t1: (factors ** (t1 - t0) * x, np.diag(factors ** (t1 - t0))),
-        orbit=np.zeros(100),
-    )
+    system = systems.linear(lambda t0, t1: np.diag(factors ** (t1 - t0)), 100)
     found = multipliers(system, leading=2)
     assert np.abs(found.values - factors[:2]).max() <= found.error_bound < 1e-12
     assert len(found.remarks) == 1

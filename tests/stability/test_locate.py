@@ -12,6 +12,7 @@ from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Kind, PeriodicSystem, SearchStatus, find_orbit, from_map, from_rhs, locate
+from helpers.systems import linear, lorenz
 
 PERIOD = 1.3
 
@@ -21,12 +22,7 @@ def diagonal(*rates):
 
     def system(mu):
         values = np.array([rate(mu) for rate in rates])
-
-        def flow(x, t0, t1):
-            matrix = np.diag(np.exp(values * (t1 - t0)))
-            return matrix @ x, matrix
-
-        return PeriodicSystem(len(values), PERIOD, flow, orbit=np.zeros(len(values)))
+        return linear(lambda t0, t1: np.diag(np.exp(values * (t1 - t0))), len(values), PERIOD)
 
     return system
 
@@ -104,11 +100,8 @@ def test_bound_holds_in_a_slanted_basis_far_from_zero():
     root = 41234.5678
 
     def system(mu):
-        def flow(x, t0, t1):
-            matrix = basis @ np.diag(np.exp(np.array([1e-4 * (mu - root), -0.5, -2.0]) * (t1 - t0))) @ inverse
-            return matrix @ x, matrix
-
-        return PeriodicSystem(3, PERIOD, flow, orbit=np.zeros(3))
+        rates = np.array([1e-4 * (mu - root), -0.5, -2.0])
+        return linear(lambda t0, t1: basis @ np.diag(np.exp(rates * (t1 - t0))) @ inverse, 3, PERIOD)
 
     (point,) = locate(system, (20000.0, 75000.0))
     assert abs(point.value - root) <= point.error_bound < 1e-3
@@ -119,7 +112,7 @@ def test_kinds_side_by_side():
     """A real multiplier through +1, a pair through the circle and, with half a turn a period, one through -1."""
 
     def system(mu):
-        def flow(x, t0, t1):
+        def moves(t0, t1):
             t = t1 - t0
             matrix = np.zeros((5, 5))
             matrix[0, 0] = np.exp((mu - 0.2) * t)
@@ -130,9 +123,9 @@ def test_kinds_side_by_side():
             before = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
             after = np.array([[np.cos(b), -np.sin(b)], [np.sin(b), np.cos(b)]])
             matrix[3:, 3:] = after @ np.diag(np.exp([(mu - 0.8) * t, -t])) @ before.T
-            return matrix @ x, matrix
+            return matrix
 
-        return PeriodicSystem(5, PERIOD, flow, orbit=np.zeros(5))
+        return linear(moves, 5, PERIOD)
 
     points = locate(system, (0.0, 1.0), normal_form=False)
     assert_found(points, (0.2, 0.5, 0.8))
@@ -145,12 +138,8 @@ def test_a_pair_that_meets_on_the_real_axis_is_no_bifurcation():
     """Complex inside, complex no more, then one real multiplier leaves: one point only."""
 
     def system(mu):
-        def flow(x, t0, t1):
-            # Eigenvalues -0.3 +- sqrt(mu - 0.4): complex below 0.4, real above, zero at 0.49.
-            matrix = expm(np.array([[-0.3, 1.0], [mu - 0.4, -0.3]]) * (t1 - t0))
-            return matrix @ x, matrix
-
-        return PeriodicSystem(2, PERIOD, flow, orbit=np.zeros(2))
+        # Eigenvalues -0.3 +- sqrt(mu - 0.4): complex below 0.4, real above, zero at 0.49.
+        return linear(lambda t0, t1: expm(np.array([[-0.3, 1.0], [mu - 0.4, -0.3]]) * (t1 - t0)), 2, PERIOD)
 
     assert_found(locate(system, (0.0, 1.0)), (0.49,))
 
@@ -196,13 +185,6 @@ def test_an_orbit_at_rest_is_followed_from_a_guess_beside_it(unit):
     assert not point.orbit.any()
 
 
-def lorenz(r, **more):
-    def rhs(t, x, r):
-        return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
-
-    return from_rhs(rhs, 3, None, args=(r,), guess_period=0.41, **more)
-
-
 SYMMETRIC = {310.0: [-37.42354634, -94.33277851, 305.61384361], 311.0: [-37.38058567, -94.55590981, 306.15255370]}
 """States on symmetric orbits."""
 
@@ -211,9 +193,9 @@ SYMMETRIC = {310.0: [-37.42354634, -94.33277851, 305.61384361], 311.0: [-37.3805
 def test_a_pitchfork_of_a_symmetry_that_is_not_declared(between):
     """Lorenz (1963): the symmetric orbit gives way as r falls. With the symmetry in time the return map is another one,
     with the multiplier -1."""
-    orbit = find_orbit(lorenz(between[0]), SYMMETRIC[between[0]]).state
-    found = locate(lorenz, between, orbit=orbit)
-    half = locate(lambda r: lorenz(r, symmetry=np.diag([-1.0, -1.0, 1.0])), between, orbit=orbit)
+    orbit = find_orbit(lorenz(between[0], 0.41), SYMMETRIC[between[0]]).state
+    found = locate(lambda r: lorenz(r, 0.41), between, orbit=orbit)
+    half = locate(lambda r: lorenz(r, 0.41, symmetry=np.diag([-1.0, -1.0, 1.0])), between, orbit=orbit)
     (point,), (known,) = found, half
     assert found.complete
     assert half.complete
@@ -223,7 +205,7 @@ def test_a_pitchfork_of_a_symmetry_that_is_not_declared(between):
 
 def test_an_orbit_that_meets_another_one_and_ends_is_not_all():
     """The asymmetric orbit ends in the pitchfork; beyond it Newton's method finds the symmetric one."""
-    found = locate(lorenz, (305.0, 325.0), orbit=[-13.484487, 37.180551, 286.471177])
+    found = locate(lambda r: lorenz(r, 0.41), (305.0, 325.0), orbit=[-13.484487, 37.180551, 286.471177])
     assert not found.complete
     assert any("meets another one near 312.973" in remark for remark in found.remarks)
 

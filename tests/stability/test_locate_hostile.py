@@ -7,6 +7,7 @@ import pytest
 
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.stability import PeriodicSystem, locate
+from helpers.systems import linear
 
 BUDGET = 120
 PERIOD = 2.0
@@ -64,24 +65,18 @@ INTERVALS = [(-1.0, 1.0), (0.0, 1.0), (1e-300, 3e-300), (1e300, 1.5e300), (-1e30
 
 def lines(rate):
     """x' = rate x, y' = -y over a period of 1."""
-
-    def flow(x, t0, t1):
-        derivative = np.diag(np.exp(np.array([rate, -1.0]) * (t1 - t0) / PERIOD))
-        return derivative @ x, derivative
-
-    return PeriodicSystem(2, PERIOD, flow, orbit=np.zeros(2))
+    return linear(lambda t0, t1: np.diag(np.exp(np.array([rate, -1.0]) * (t1 - t0) / PERIOD)), 2, PERIOD)
 
 
 def spiral(rate):
     """z' = (rate + i) z."""
 
-    def flow(x, t0, t1):
+    def moves(t0, t1):
         part = (t1 - t0) / PERIOD
         c, s = math.cos(part), math.sin(part)
-        derivative = np.exp(rate * part) * np.array([[c, -s], [s, c]])
-        return derivative @ x, derivative
+        return np.exp(rate * part) * np.array([[c, -s], [s, c]])
 
-    return PeriodicSystem(2, PERIOD, flow, orbit=np.zeros(2))
+    return linear(moves, 2, PERIOD)
 
 
 def bent(rate):

@@ -19,7 +19,6 @@ from chilopod.stability import (
     Criticality,
     Ending,
     Kind,
-    PeriodicSystem,
     SymmetricKind,
     begin,
     exponents,
@@ -33,35 +32,17 @@ from chilopod.stability import (
 )
 from chilopod.stability.branches import inspection
 from chilopod.stability.unit_circle.crossings import find_crossings
+from helpers.systems import henon, of_map
 
 
 def logistic(p):
     """x -> p x (1 - x)."""
-
-    def flow(x, t0, t1):
-        derivative = np.eye(1)
-        for _ in range(round(t1 - t0)):
-            derivative = p * (1.0 - 2.0 * x[0]) * derivative
-            x = p * x * (1.0 - x)
-        return x, derivative
-
-    return PeriodicSystem(1, 1.0, flow, flow_with_error=lambda x, t0, t1: (*flow(x, t0, t1), 1e-15))
-
-
-def henon(a, b):
-    def image(x):
-        return np.array([1.0 - a * x[0] ** 2 + x[1], b * x[0]]), np.array([[-2.0 * a * x[0], 1.0], [b, 0.0]])
-
-    return PeriodicSystem(2, 1.0, lambda x, t0, t1: image(x), flow_with_error=lambda x, t0, t1: (*image(x), 1e-15))
+    return of_map(lambda x: (p * x * (1.0 - x), np.diag(p * (1.0 - 2.0 * x))))
 
 
 def folding(p):
     """x -> x + 0.2 (p + x - x^3), with folds at p = -+2 / 27^0.5."""
-
-    def image(x):
-        return x + 0.2 * (p + x - x**3), np.eye(1) * (1.2 - 0.6 * x[0] ** 2)
-
-    return PeriodicSystem(1, 1.0, lambda x, t0, t1: image(x), flow_with_error=lambda x, t0, t1: (*image(x), 1e-15))
+    return of_map(lambda x: (x + 0.2 * (p + x - x**3), np.eye(1) * (1.2 - 0.6 * x[0] ** 2)))
 
 
 FOLD = 2.0 / 27.0**0.5
@@ -344,10 +325,7 @@ def test_remarks_of_a_branch_are_in_units_of_the_parameter(monkeypatch):
         return find_crossings(matrices, low, high, **how)
 
     def family(p):
-        def flow(x, t0, t1):
-            return -p * x, -p * np.eye(2)
-
-        return PeriodicSystem(2, 1.0, flow, flow_with_error=lambda x, t0, t1: (*flow(x, t0, t1), 1e-15))
+        return of_map(lambda x: (-p * x, -p * np.eye(2)), 2)
 
     monkeypatch.setattr(inspection, "find_crossings", search)
     branch = follow(family, begin(family, 0.9, [0.0, 0.0]), (0.9, 1.2))

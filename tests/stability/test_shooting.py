@@ -7,6 +7,7 @@ import xarray as xr
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Ending, begin, find_orbit, follow, from_rhs, locate, multipliers
 from chilopod.stability.orbits.shooting import Nodes, shot
+from helpers.systems import duffing, lorenz
 
 RATE, FREQUENCY = np.sqrt(1.0 + 2.0 * np.sqrt(7.0)), np.sqrt(2.0 * np.sqrt(7.0) - 1.0)
 PERIOD = 2.0 * np.pi / FREQUENCY
@@ -45,13 +46,6 @@ def test_a_small_orbit_is_that_of_the_linear_motion():
     assert found.values[0].real == pytest.approx(np.exp(RATE * PERIOD), rel=1e-5)
 
 
-def duffing(force=2.5, symmetry=None):
-    def rhs(t, x, force):
-        return [x[1], -0.2 * x[1] - x[0] ** 3 + force * np.cos(t)]
-
-    return from_rhs(rhs, 2, 2.0 * np.pi, args=(force,), symmetry=symmetry)
-
-
 @pytest.mark.parametrize("symmetry", [None, -np.eye(2)])
 @pytest.mark.parametrize("form", ["rows", "times", "record"])
 def test_guesses_that_are_orbits(form, symmetry):
@@ -69,13 +63,6 @@ def test_guesses_that_are_orbits(form, symmetry):
     assert np.abs(found.state - known.state).max() <= (found.error + known.error).max() + 1e-14
     (point,) = locate(lambda force: duffing(force, -np.eye(2)), (2.2, 2.6), orbit=guess)
     assert point.value == pytest.approx(2.403377116057, abs=1e-11)
-
-
-def lorenz(r):
-    def rhs(t, x, r):
-        return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
-
-    return from_rhs(rhs, 3, None, args=(r,), guess_period=0.67)
 
 
 def test_a_cycle_is_followed_to_where_it_becomes_homoclinic():

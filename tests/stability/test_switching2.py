@@ -4,45 +4,22 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import BifurcationPoint, CodimensionTwo, Kind, PeriodicSystem, SpecialPoint2, follow2, switch2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Kind, SpecialPoint2, follow2, switch2
+from helpers.systems import doubling
 
 BOX = ((-1.0, 1.0), (-1.0, 1.0))
 
 
-def family2(fifth):
-    """x -> -(1 + p) x + (q - 0.1) x^3 + fifth x^5, which turns at q = 0.1."""
-
-    def systems(p, q):
-        def image(x):
-            return -(1.0 + p) * x + (q - 0.1) * x**3 + fifth * x**5
-
-        def slope(x):
-            return np.array([-(1.0 + p) + 3.0 * (q - 0.1) * x**2 + 5.0 * fifth * x**4])
-
-        def flow(x, t0, t1):
-            derivative = np.eye(1)
-            for _ in range(round(t1 - t0)):
-                x, derivative = image(x), slope(x) @ derivative
-            return x, derivative
-
-        def flow_with_error(x, t0, t1):
-            return (*flow(x, t0, t1), 4e-15)
-
-        return PeriodicSystem(1, 1.0, flow, orbit=np.zeros(1), flow_with_error=flow_with_error)
-
-    return systems
-
-
 def turning(fifth):
     start = BifurcationPoint(Kind.PERIOD_DOUBLING, 0.0, 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
-    (point,) = follow2(family2(fifth), start, BOX, second=-0.3, longest=0.3).special
+    (point,) = follow2(doubling(fifth), start, BOX, second=-0.3, longest=0.3).special
     return point
 
 
 def test_a_curve_leaves_for_the_side_where_folds_are():
     """Twice the map has e = -2 fifth, c = -2 (q - 0.1): folds are where the two have opposite signs."""
     for fifth in (-0.5, 0.5):
-        (start,) = switch2(family2(fifth), turning(fifth), BOX)
+        (start,) = switch2(doubling(fifth), turning(fifth), BOX)
         assert (start.second - 0.1) * fifth < 0.0
         assert start.point.kind is Kind.FOLD
 
@@ -51,7 +28,7 @@ def test_a_coefficient_of_fifth_order_that_vanishes_too():
     point = turning(0.0)
     assert abs(point.next_coefficient) <= point.next_coefficient_error
     with pytest.raises(AnalysisError, match="zero within its error"):
-        switch2(family2(0.0), point, BOX)
+        switch2(doubling(0.0), point, BOX)
 
 
 @pytest.mark.parametrize(
@@ -66,17 +43,17 @@ def test_what_no_curve_is_switched_to_from(kind, why):
     one = np.ones(1, complex)
     point = SpecialPoint2(np.zeros(2), np.zeros(2), np.zeros(1), one, -1.0 + 0j, one, np.pi, kind=kind)
     with pytest.raises(ParameterError, match=why):
-        switch2(family2(0.5), point, BOX)
+        switch2(doubling(0.5), point, BOX)
 
 
 def test_arguments_and_budgets():
     point = turning(0.5)
     with pytest.raises(ParameterError, match="two intervals"):
-        switch2(family2(0.5), point, (0.0, 1.0))
+        switch2(doubling(0.5), point, (0.0, 1.0))
     with pytest.raises(AnalysisError, match="the budget of flows is spent"):
-        switch2(family2(0.5), point, BOX, budget=3)
-    (start,) = switch2(family2(0.5), point, BOX)
+        switch2(doubling(0.5), point, BOX, budget=3)
+    (start,) = switch2(doubling(0.5), point, BOX)
     with pytest.raises(ParameterError, match="second"):
-        follow2(family2(0.5), start.point, BOX)
+        follow2(doubling(0.5), start.point, BOX)
     with pytest.raises(AnalysisError, match="no curve of folds was found"):  # none is in the box
-        switch2(family2(0.5), point, ((-1.0, 1.0), (0.1, 1.0)))
+        switch2(doubling(0.5), point, ((-1.0, 1.0), (0.1, 1.0)))

@@ -24,6 +24,7 @@ from chilopod.stability import (
 )
 from chilopod.stability.problem.capabilities import spatial_symmetries
 from chilopod.stability.problem.returns import whole_period
+from helpers.systems import duffing, linear
 
 
 class Own:
@@ -56,6 +57,7 @@ def test_own_class_is_a_system():
     assert isinstance(Own(), SystemLike)
     found = multipliers(Own(), [0.0, 0.0])
     np.testing.assert_allclose(found.orbit, [1.0, 1.0], atol=1e-14)
+    assert multipliers(Own(), [1.0, 1.0]).error_bound < 1e-12  # of an exact flow it is round-off
     np.testing.assert_allclose(np.sort_complex(found.values), np.sort_complex(known(-0.4, 0.7)), rtol=1e-12)
     assert found.stable
     assert exponents(Own(), [0.0, 0.0]).values[0] == pytest.approx(-0.4 + 0.3j, rel=1e-12)
@@ -123,17 +125,11 @@ def test_error_of_a_flow_that_gives_none_is_estimated_by_splitting(noise):
     assert found.error_bound < 1e3 * noise
 
 
-def test_error_bound_of_an_exact_flow_is_round_off():
-    assert multipliers(Own(), [1.0, 1.0]).error_bound < 1e-12
-
-
 def test_half_period_squares_to_the_full_period():
-    def flow(x, t0, t1):
-        matrix = np.diag(np.exp(np.array([0.05, -0.3]) * (t1 - t0)))
-        return matrix @ x, matrix
+    def moves(t0, t1):
+        return np.diag(np.exp(np.array([0.05, -0.3]) * (t1 - t0)))
 
-    mirrored = PeriodicSystem(2, 2.0, flow, symmetry=[[-1.0, 0.0], [0.0, 1.0]], orbit=np.zeros(2))
-    plain = PeriodicSystem(2, 2.0, flow, orbit=np.zeros(2))
+    mirrored, plain = linear(moves, 2, 2.0, symmetry=[[-1.0, 0.0], [0.0, 1.0]]), linear(moves, 2, 2.0)
     half, full = multipliers(mirrored), multipliers(plain)
     np.testing.assert_allclose(half.half_period, [-exp(0.05), exp(-0.3)], rtol=1e-14)
     np.testing.assert_allclose(half.values, full.values, rtol=1e-13)
@@ -194,12 +190,6 @@ def test_no_orbit_to_be_found():
         multipliers(system)
 
 
-@pytest.mark.parametrize("guess", [[0.0], [0.0, 0.0, 0.0], 0.0])
-def test_a_guess_of_the_wrong_shape(guess):
-    with pytest.raises(ParameterError, match="wrong shape"):
-        multipliers(Own(), guess)
-
-
 def test_a_defective_matrix_has_a_useless_but_honest_bound():
     """A Jordan block: a perturbation e moves its eigenvalues by sqrt(e)."""
     system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (x, np.array([[1.0, t1 - t0], [0.0, 1.0]])), orbit=np.zeros(2))
@@ -215,7 +205,7 @@ def test_results_are_immutable():
         found.error_bound = 0.0
 
 
-@pytest.mark.parametrize("guess", ["text", [1.0, 2.0], [np.nan], None])
+@pytest.mark.parametrize("guess", ["text", [1.0, 2.0], [[0.0]], 0.0, [np.nan], None])
 def test_a_guess_that_is_no_state_is_one_line(guess):
     system = PeriodicSystem(1, 1.0, lambda x, t0, t1: (x, np.eye(1)))
     with pytest.raises(ChilopodError) as error:
@@ -225,16 +215,10 @@ def test_a_guess_that_is_no_state_is_one_line(guess):
 
 
 def test_a_sweep_in_threads_is_that_of_one_after_the_other():
-    def damped(delta):
-        return from_rhs(
-            lambda t, x, d: [x[1], -(d + 0.3 * np.cos(t)) * x[0] - 0.1 * x[1]],
-            2,
-            2 * pi,
-            args=(delta,),
-            orbit=[0.0, 0.0],
-        )
+    def rhs(t, x, d):
+        return [x[1], -(d + 0.3 * np.cos(t)) * x[0] - 0.1 * x[1]]
 
-    systems = [damped(delta) for delta in np.linspace(0.1, 2.0, 12)]
+    systems = [from_rhs(rhs, 2, 2 * pi, args=(delta,), orbit=[0.0, 0.0]) for delta in np.linspace(0.1, 2.0, 12)]
     assert [m.values.tolist() for m in sweep(systems)] == [multipliers(s).values.tolist() for s in systems]
 
 
@@ -259,14 +243,12 @@ def test_a_verdict_within_the_errors_is_undecided(values, bounds, stable):
 @pytest.mark.parametrize("guess", list(itertools.product((-3.0, -1.5, 0.5, 1.0, 3.0), (-3.0, 0.0, 0.6, 3.0))))
 def test_corrections_stay_where_the_motion_is(guess):
     """Far outside a flow takes any number of steps: some guesses took a minute."""
-    duffing = from_rhs(
-        lambda t, x: [x[1], -0.2 * x[1] - x[0] ** 3 + 2.5 * np.cos(t)], 2, 2.0 * np.pi, symmetry=-np.eye(2)
-    )
+    system = duffing(2.5, -np.eye(2))
     asked = []
 
     def flow(x, t0, t1):
         asked.append(np.abs(x).max())
-        return duffing.flow(x, t0, t1)
+        return system.flow(x, t0, t1)
 
     orbit = find_orbit(PeriodicSystem(2, 2.0 * np.pi, flow, symmetry=-np.eye(2)), guess)
     np.testing.assert_allclose(orbit.state, [1.901458, 0.634591], atol=1e-6)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, PeriodicSystem, follow2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, follow2
 from chilopod.stability.codimension_two import detection
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
+from helpers.systems import doubling, of_map
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -20,18 +21,7 @@ def circle(hole=None):
         size = -(p * p + q * q)
         if hole is not None and hole(p, q):
             size = np.nan
-
-        def image(x):
-            return size * x, np.array([[size]])
-
-        return PeriodicSystem(
-            1,
-            1.0,
-            lambda x, t0, t1: image(x),
-            orbit=np.zeros(1),
-            flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
-            flow_states=lambda states, t0, t1: size * states,
-        )
+        return of_map(lambda x: (size * x, np.array([[size]])), orbit=np.zeros(1), many=True)
 
     return family2
 
@@ -41,10 +31,12 @@ def start_at(angle, kind=Kind.PERIOD_DOUBLING):
     return point, np.sin(angle)
 
 
+POINT, SECOND = start_at(0.4)
+
+
 @pytest.mark.parametrize("rising", [None, True, False])
 def test_closed_curve_ends_where_it_began(rising):
-    point, second = start_at(0.4)
-    curve = follow2(circle(), point, BOX, second=second, rising=rising, points=500)
+    curve = follow2(circle(), POINT, BOX, second=SECOND, rising=rising, points=500)
     assert Ending.CLOSED in curve.endings
     assert not curve.special
     angles = np.unwrap(np.arctan2(curve.values[:, 1], curve.values[:, 0]))
@@ -54,8 +46,7 @@ def test_closed_curve_ends_where_it_began(rising):
 
 
 def test_edges_of_the_box_are_met_exactly():
-    point, second = start_at(0.4)
-    curve = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second)
+    curve = follow2(circle(), POINT, ((0.3, 2.0), (-0.7, 2.0)), second=SECOND)
     assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
     (one, other) = (curve.values[0], curve.values[-1])
     assert one[1] == -0.7
@@ -74,25 +65,22 @@ def test_no_values_outside_the_box_are_asked_for(off):
         asked.append(q)
         return circle()(p, q)
 
-    point, second = start_at(0.4)
-    point = replace(point, value=point.value + off)
-    curve = follow2(family2, point, ((-2.0, 2.0), (second, 2.0)), second=second, coefficients=False)
+    point = replace(POINT, value=POINT.value + off)
+    curve = follow2(family2, point, ((-2.0, 2.0), (SECOND, 2.0)), second=SECOND, coefficients=False)
     assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
-    assert curve.values[0][1] == curve.values[-1][1] == min(asked) == second
+    assert curve.values[0][1] == curve.values[-1][1] == min(asked) == SECOND
 
 
 def test_a_direction_is_kept():
-    point, second = start_at(0.4)
-    up = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second, rising=True)
-    down = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second, rising=False)
+    up = follow2(circle(), POINT, ((0.3, 2.0), (-0.7, 2.0)), second=SECOND, rising=True)
+    down = follow2(circle(), POINT, ((0.3, 2.0), (-0.7, 2.0)), second=SECOND, rising=False)
     assert up.endings == (Ending.START, Ending.LEFT_INTERVAL)
     assert (np.diff(up.values[:, 1]) > 0.0).all()
     assert (np.diff(down.values[:, 1]) < 0.0).all()
 
 
 def test_where_the_map_does_not_exist_the_curve_is_lost_with_a_reason():
-    point, second = start_at(0.4)
-    curve = follow2(circle(hole=lambda p, q: q > 0.8), point, BOX, second=second, rising=True)
+    curve = follow2(circle(hole=lambda p, q: q > 0.8), POINT, BOX, second=SECOND, rising=True)
     assert curve.endings[1] is Ending.LOST
     assert "not finite" in curve.reasons[1]
     assert 0.8 - 1e-5 < curve.values[-1][1] <= 0.8
@@ -104,32 +92,29 @@ def test_a_family_that_refuses_values_ends_the_curve():
             raise ParameterError("must be at most 0.8", field="q", value=q)
         return circle()(p, q)
 
-    point, second = start_at(0.4)
-    curve = follow2(family2, point, BOX, second=second, rising=True)
+    curve = follow2(family2, POINT, BOX, second=SECOND, rising=True)
     assert curve.endings[1] is Ending.LOST
     assert "at most 0.8" in curve.reasons[1]
 
 
 def test_budgets_are_kept():
-    point, second = start_at(0.4)
     calls = []
 
     def family2(p, q):
         calls.append((p, q))
         return circle()(p, q)
 
-    curve = follow2(family2, point, BOX, second=second, rising=True, budget=200, coefficients=False)
+    curve = follow2(family2, POINT, BOX, second=SECOND, rising=True, budget=200, coefficients=False)
     assert curve.endings[1] is Ending.BUDGET
     assert len(calls) < 1000
-    short = follow2(circle(), point, BOX, second=second, points=7)
+    short = follow2(circle(), POINT, BOX, second=SECOND, points=7)
     assert short.endings == (Ending.ENOUGH_POINTS, Ending.ENOUGH_POINTS)
     assert len(short.points) == 15
 
 
 def test_progress_is_told():
-    point, second = start_at(0.4)
     told = []
-    follow2(circle(), point, BOX, second=second, points=3, progress=lambda count, at: told.append((count, at.values)))
+    follow2(circle(), POINT, BOX, second=SECOND, points=3, progress=lambda count, at: told.append((count, at.values)))
     assert [count for count, _ in told] == [1, 2, 3, 1, 2, 3]
 
 
@@ -146,14 +131,13 @@ def test_progress_is_told():
         ({"budget": -1}, "budget"),
         ({"start": "here"}, "start"),
         (
-            {"start": start_at(0.4)[0].__class__(Kind.FOLD, 0.9, 0.0, np.zeros(2), np.ones(2, complex), 1 + 0j, 0.0)},
+            {"start": BifurcationPoint(Kind.FOLD, 0.9, 0.0, np.zeros(2), np.ones(2, complex), 1 + 0j, 0.0)},
             "start",
         ),
     ],
 )
 def test_what_is_refused(given, field):
-    point, second = start_at(0.4)
-    arguments = {"family2": circle(), "start": point, "between": BOX, "second": second} | given
+    arguments = {"family2": circle(), "start": POINT, "between": BOX, "second": SECOND} | given
     with pytest.raises(ParameterError) as refused:
         follow2(**arguments)
     assert refused.value.field == field
@@ -163,7 +147,7 @@ def test_what_two_parameters_would_unfold_is_refused():
     """x -> (1 + p) x - x^3 of an orbit that is neither known nor symmetric as far as anybody says."""
 
     def family2(p, q):
-        return PeriodicSystem(1, 1.0, lambda x, t0, t1: ((1.0 + p) * x - x**3, np.array([[1.0 + p - 3.0 * x[0] ** 2]])))
+        return of_map(lambda x: ((1.0 + p) * x - x**3, np.array([[1.0 + p - 3.0 * x[0] ** 2]])))
 
     start = BifurcationPoint(Kind.PITCHFORK, 0.0, 0.0, np.zeros(1), np.ones(1, complex), 1.0 + 0j, 0.0)
     with pytest.raises(ParameterError, match="unfold"):
@@ -171,27 +155,12 @@ def test_what_two_parameters_would_unfold_is_refused():
 
 
 def test_a_krein_collision_is_named():
-    point, second = start_at(0.4, Kind.KREIN_COLLISION)
+    point, _ = start_at(0.4, Kind.KREIN_COLLISION)
     with pytest.raises(ParameterError, match="Krein collision, which is not followed"):
-        follow2(circle(), point, BOX, second=second)
+        follow2(circle(), point, BOX, second=SECOND)
 
 
-def turning(p, q):
-    """x -> -(1 + p) x + (q - 0.1) x^3, whose period doubling turns at q = 0.1."""
-
-    def image(x):
-        return -(1.0 + p) * x + (q - 0.1) * x**3, np.array([[-(1.0 + p) + 3.0 * (q - 0.1) * x[0] ** 2]])
-
-    return PeriodicSystem(
-        1,
-        1.0,
-        lambda x, t0, t1: image(x),
-        orbit=np.zeros(1),
-        flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
-        flow_states=lambda states, t0, t1: -(1.0 + p) * states + (q - 0.1) * states**3,
-    )
-
-
+turning = doubling(many=True)
 TURNS = BifurcationPoint(Kind.PERIOD_DOUBLING, 0.0, 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
 
 

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chilopod.stability import exponents, from_rhs, locate, multipliers
+from helpers.systems import in_units, roessler_rhs
 
 decades = st.integers(-9, 9).map(lambda n: 10.0**n)
 times = st.integers(-6, 6).map(lambda n: 10.0**n)
@@ -14,16 +15,6 @@ few = settings(max_examples=8, deadline=None, derandomize=True)
 # First period doubling in c and its period, by a Taylor integration in extended precision; a of b_1 and a_1 at q = 0.3.
 ROESSLER = 2.832445027862538915, 5.7698200165065631905
 MATHIEU = 0.6891659356138624, 1.2883236383268328
-
-
-def in_units(rhs, states, time):
-    """x' = rhs(t, x, p) with every state and the time in other units."""
-
-    def scaled(t, x, *args):
-        slopes = rhs(t / time, [each / unit for each, unit in zip(x, states, strict=True)], *args)
-        return [slope * unit / time for slope, unit in zip(slopes, states, strict=True)]
-
-    return scaled
 
 
 def duffing(t, x, force):
@@ -50,15 +41,10 @@ def test_forced(states, time):
     np.testing.assert_allclose(np.exp(found.values * found.multipliers.period), PLAIN.values, rtol=1e-11)
 
 
-def roessler(t, s, c):
-    x, y, z = s
-    return [-y - z, x + 0.2 * y, 0.2 + z * (x - c)]
-
-
 @few
 @given(st.tuples(decades, decades, decades), times, decades)
 def test_autonomous(states, time, parameter):
-    rhs = in_units(roessler, states, time)
+    rhs = in_units(roessler_rhs, states, time)
     (point,) = locate(
         lambda c: from_rhs(rhs, 3, None, args=(c / parameter,), guess_period=5.8 * time),
         (2.5 * parameter, 3.2 * parameter),

@@ -19,23 +19,16 @@ from chilopod.stability import (
     locate,
     switch,
 )
+from helpers import systems
 
 
 def of_map(function, derivative, dimension=1, **more):
     """A system with a period of 1 whose return map is a function, known to round-off."""
 
-    def flow(x, t0, t1):
-        product = np.eye(dimension)
-        for _ in range(round(t1 - t0)):
-            product = np.atleast_2d(derivative(x)) @ product
-            x = np.atleast_1d(function(x)).astype(float)
-        return x, product
+    def image(x):
+        return np.atleast_1d(function(x)).astype(float), np.atleast_2d(derivative(x))
 
-    def with_error(x, t0, t1):
-        state, product = flow(x, t0, t1)
-        return state, product, 4e-16 * np.abs(product)
-
-    return PeriodicSystem(dimension, 1.0, flow, flow_with_error=with_error, **more)
+    return systems.of_map(image, dimension, share=4e-16, **more)
 
 
 def rescaled(family, units):

@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import expm
 
 from chilopod.errors import ParameterError
-from chilopod.stability import Ending, Kind, PeriodicSystem, follow, locate, switch
+from chilopod.stability import Ending, Kind, follow, locate, switch
 from chilopod.stability.symmetry.equivariants import SymmetricKind
+from helpers import systems
 
 BETWEEN = (-2.0, 1.0)
 
@@ -25,19 +26,12 @@ def ring(cells, power, units=1.0, declared=True, moves=0.3):
     def family(c):
         center = (0.5 + moves * c) * units
 
-        def flow(x, t0, t1):
-            product = np.eye(cells)
-            for _ in range(round(t1 - t0)):
-                u = (x - center) / units
-                product = (0.5 * np.eye(cells) - c * coupling - np.diag(power * u ** (power - 1))) @ product
-                x = center + units * (0.5 * u - c * coupling @ u - u**power)
-            return x, product
+        def image(x):
+            u = (x - center) / units
+            slope = 0.5 * np.eye(cells) - c * coupling - np.diag(power * u ** (power - 1))
+            return center + units * (0.5 * u - c * coupling @ u - u**power), slope
 
-        def with_error(x, t0, t1):
-            state, product = flow(x, t0, t1)
-            return state, product, 4e-16 * np.abs(product)
-
-        return PeriodicSystem(cells, 1.0, flow, flow_with_error=with_error, **symmetry)
+        return systems.of_map(image, cells, share=4e-16, **symmetry)
 
     return family
 
@@ -121,12 +115,7 @@ def linear(matrix):
 
     def family(p):
         a = np.array(matrix(p), dtype=float)
-
-        def flow(x, t0, t1):
-            derivative = expm(a * (t1 - t0))
-            return derivative @ x, derivative
-
-        return PeriodicSystem(len(a), 1.0, flow)
+        return systems.linear(lambda t0, t1: expm(a * (t1 - t0)), len(a), orbit=None)
 
     return family
 

@@ -1,7 +1,7 @@
 """Curves of bifurcation points in two parameters, and their points of codimension two, with known answers."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numba
 import numpy as np
@@ -10,18 +10,9 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_b
 
 from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, PeriodicSystem, follow2, from_rhs, locate
+from helpers.systems import henon, of_map
 
-
-def mapped(dimension, image, error=1e-15, **known):
-    """A system given by its return map: ``image(x)`` -> (H(x), H'(x))."""
-    return PeriodicSystem(
-        dimension,
-        1.0,
-        lambda x, t0, t1: image(x),
-        flow_with_error=lambda x, t0, t1: (*image(x), error),
-        flow_states=lambda states, t0, t1: np.array([image(x)[0] for x in states]),
-        **known,
-    )
+mapped = partial(of_map, many=True)
 
 
 def with_parameters(rhs, dimension, period, constants=(), **known):
@@ -81,7 +72,7 @@ def test_cusp(unit):
     """x -> x + p + q x - x^3 has folds at 27 p^2 = 4 q^3."""
 
     def family2(p, q):
-        return mapped(1, lambda x: (x + p + q * x - x**3 / unit**2, np.array([[1.0 + q - 3.0 * x[0] ** 2 / unit**2]])))
+        return mapped(lambda x: (x + p + q * x - x**3 / unit**2, np.array([[1.0 + q - 3.0 * x[0] ** 2 / unit**2]])))
 
     x = -np.sqrt(0.5 / 3.0)
     start = BifurcationPoint(
@@ -102,11 +93,11 @@ def test_cusp(unit):
 def area_changing(a, b, c=0.2):
     """(x, y) -> (y, a - b x - y^2 + c x y): at its fixed point the determinant is b - c x, the trace (c - 2) x."""
     return mapped(
-        2,
         lambda x: (
             np.array([x[1], a - b * x[0] - x[1] * x[1] + c * x[0] * x[1]]),
             np.array([[0.0, 1.0], [c * x[1] - b, c * x[0] - 2.0 * x[1]]]),
         ),
+        2,
     )
 
 
@@ -154,7 +145,7 @@ def test_double_multiplier_and_flip_on_a_curve_of_folds(units, first):
             state, jacobian = plain.flow(x / units, 0.0, 1.0)
             return state * units, jacobian * units[:, None] / units
 
-        return mapped(2, image, 1e-15 * np.outer(units, 1.0 / units))
+        return mapped(image, 2, 1e-15 * np.outer(units, 1.0 / units))
 
     x = np.full(2, -1.5 / 1.6)
     start = BifurcationPoint(Kind.FOLD, -(1.5**2) / 3.2 * first, 0.0, x * units, units.astype(complex), 1.0 + 0j, 0.0)
@@ -180,13 +171,6 @@ def test_double_multiplier_and_flip_on_a_curve_of_folds(units, first):
 
 def test_double_multiplier_on_a_curve_of_flips():
     """The Henon map (x, y) -> (1 - a x^2 + y, b x) has its period doubling at a = 3 (1 - b)^2 / 4."""
-
-    def henon(a, b):
-        return mapped(
-            2,
-            lambda x: (np.array([1.0 - a * x[0] ** 2 + x[1], b * x[0]]), np.array([[-2.0 * a * x[0], 1.0], [b, 0.0]])),
-        )
-
     (start,) = locate(lambda a: henon(a, 0.3), (0.1, 0.8), orbit=[0.8, 0.24])
     curve = follow2(henon, start, ((0.05, 5.0), (-1.4, 0.7)), second=0.3, longest=0.1)
     check_curve(curve, lambda values: values[0] - 0.75 * (1.0 - values[1]) ** 2)
@@ -201,7 +185,6 @@ def test_generalised_period_doubling():
     def family2(p, q):
         m = 1.0 + p - q * q
         return mapped(
-            1,
             lambda x: (-m * x + 0.6 * x**2 + q * x**3, np.array([[-m + 1.2 * x[0] + 3.0 * q * x[0] ** 2]])),
             orbit=np.zeros(1),
         )
@@ -221,11 +204,11 @@ def test_degenerate_pitchfork_of_an_orbit_with_a_spatial_symmetry():
 
     def family2(p, q):
         return mapped(
-            2,
             lambda z: (
                 np.array([z[0] * (1.0 + p + z[1]) - (2.5 + q) * z[0] ** 3, 0.5 * z[1] + 0.2 * q + z[0] ** 2]),
                 np.array([[1.0 + p + z[1] - 3.0 * (2.5 + q) * z[0] ** 2, z[0]], [2.0 * z[0], 0.5]]),
             ),
+            2,
             spatial_symmetry=np.diag([-1.0, 1.0]),
         )
 
@@ -253,7 +236,7 @@ def test_chenciner():
             mapped_z = turn * z * factor
             return np.array([mapped_z.real, mapped_z.imag]), np.array(columns).T
 
-        return mapped(2, image, orbit=np.zeros(2))
+        return mapped(image, 2, orbit=np.zeros(2))
 
     (start,) = locate(lambda p: family2(p, 0.1), (-0.2, 0.3))
     curve = follow2(family2, start, ((-0.5, 0.5), (-0.6, 0.6)), second=0.1)
@@ -284,7 +267,7 @@ def test_two_at_once(first, second, expected):
         blocks[: len(first), : len(first)] = (1.0 + p - 0.25 * q) * first
         blocks[len(first) :, len(first) :] = (1.0 + p * p + q - 0.2) * second
         matrix = basis @ blocks @ np.linalg.inv(basis)
-        return mapped(n, lambda x: (matrix @ x, matrix), orbit=np.zeros(n))
+        return mapped(lambda x: (matrix @ x, matrix), n, orbit=np.zeros(n))
 
     (start,) = locate(lambda p: family2(p, 0.05), (-0.1, 0.2), normal_form=False)
     curve = follow2(family2, start, ((-0.5, 0.5), (-0.4, 0.4)), second=0.05, coefficients=False)

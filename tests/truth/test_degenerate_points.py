@@ -13,7 +13,6 @@ from chilopod.stability import (
     BifurcationPoint,
     CodimensionTwo,
     Kind,
-    PeriodicSystem,
     follow,
     follow2,
     from_rhs,
@@ -21,6 +20,7 @@ from chilopod.stability import (
     switch,
     switch2,
 )
+from helpers.systems import of_map
 
 FIFTH = -0.8
 BOX = ((-0.3, 0.6), (-0.6, 0.8))
@@ -61,22 +61,9 @@ def sheared(sign, units, basis, orbit):
             steps = 1e-30j * np.diag(units)
             return (image(x + steps).imag / (1e-30 * units[:, None])).T
 
-        def flow(x, t0, t1):
-            derivative = np.eye(2)
-            for _ in range(round(t1 - t0)):
-                x, derivative = image(x), slopes(x) @ derivative
-            return x, derivative
-
-        def flow_states(states, t0, t1):
-            for _ in range(round(t1 - t0)):
-                states = image(states)
-            return states
-
-        def flow_with_error(x, t0, t1):
-            return (*flow(x, t0, t1), 3e-15 * units[:, None] / units)
-
         known = {"orbit": orbit * units} if sign > 0.0 else {}
-        return PeriodicSystem(2, 1.0, flow, flow_with_error=flow_with_error, flow_states=flow_states, **known)
+        error = 3e-15 * units[:, None] / units
+        return of_map(lambda x: (image(x), slopes(x)), 2, error, many=True, **known)
 
     return family2
 

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 from chilopod.errors import AnalysisError
 from chilopod.stability import PeriodicSystem, exponents
 from chilopod.stability.spectrum.splitting import split_leading
+from helpers.systems import linear
 
 PERIOD = 2 * pi
 SKEW = np.array([[0.0, 0.5, -0.2, 0.3], [-0.5, 0.0, 0.4, 0.1], [0.2, -0.4, 0.0, -0.6], [-0.3, -0.1, 0.6, 0.0]])
@@ -22,12 +23,8 @@ def frame(t):
 
 def exactly(generator):
     """x = P(t) u with u' = generator u, by its exact flow."""
-
-    def flow(x, t0, t1):
-        matrix = frame(t1) @ expm(generator * (t1 - t0)) @ np.linalg.inv(frame(t0))
-        return matrix @ x, matrix
-
-    return PeriodicSystem(4, PERIOD, flow, orbit=np.zeros(4))
+    inverse = np.linalg.inv
+    return linear(lambda t0, t1: frame(t1) @ expm(generator * (t1 - t0)) @ inverse(frame(t0)), 4, PERIOD)
 
 
 def rotation(a, w):
@@ -79,13 +76,7 @@ def test_order_is_by_falling_real_part_with_positive_frequency_first():
 
 def half_turn(generator, signs):
     """u' = generator u with the symmetry u -> diag(signs) u of half a period."""
-
-    def flow(x, t0, t1):
-        matrix = expm(generator * (t1 - t0))
-        return matrix @ x, matrix
-
-    n = len(generator)
-    return PeriodicSystem(n, PERIOD, flow, symmetry=np.diag(signs), orbit=np.zeros(n))
+    return linear(lambda t0, t1: expm(generator * (t1 - t0)), len(generator), PERIOD, symmetry=np.diag(signs))
 
 
 def test_half_period_gives_the_principal_logarithm_of_the_full_period():

@@ -8,12 +8,11 @@ from chilopod.stability import Ending, Kind, begin, follow, from_rhs, locate
 
 def forced(mu):
     """With y = x - cos(t) / 10 it is y' = mu - y^2: orbits y^2 = mu, the fold at 0; the second state follows."""
-    return from_rhs(
-        lambda t, x, mu: [mu - (x[0] - 0.1 * np.cos(t)) ** 2 - 0.1 * np.sin(t), x[0] - x[1]],
-        2,
-        2.0 * np.pi,
-        args=(mu,),
-    )
+
+    def rhs(t, x, mu):
+        return [mu - (x[0] - 0.1 * np.cos(t)) ** 2 - 0.1 * np.sin(t), x[0] - x[1]]
+
+    return from_rhs(rhs, 2, 2.0 * np.pi, args=(mu,))
 
 
 def forced_orbit(mu):

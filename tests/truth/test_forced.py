@@ -9,16 +9,14 @@ from scipy.linalg import expm
 from scipy.optimize import fsolve
 
 from chilopod.stability import Criticality, Kind, find_orbit, from_rhs, locate, multipliers
+from helpers.spectra import farthest
 
 
 def assert_same(found, known, least=1e-14):
     """Every multiplier within the bound of one that is known, each used once."""
-    left, bound = list(known), max(found.error_bound, least)
+    bound = max(found.error_bound, least)
     assert bound < 1e-8
-    assert len(left) == len(found.values)
-    for value in found.values:
-        nearest = min(range(len(left)), key=lambda i: abs(left[i] - value))
-        assert abs(left.pop(nearest) - value) <= bound
+    assert farthest(found.values, known) <= bound
 
 
 # A double pendulum with a moving pivot

@@ -15,13 +15,10 @@ ORIGIN = [0.0, 0.0]
 
 
 def mathieu(q, damping=0.0):
-    return lambda a: from_rhs(
-        lambda t, y, a: [y[1], -(a - 2.0 * q * np.cos(2.0 * t)) * y[0] - 2.0 * damping * y[1]],
-        2,
-        pi,
-        args=(a,),
-        orbit=ORIGIN,
-    )
+    def rhs(t, y, a):
+        return [y[1], -(a - 2.0 * q * np.cos(2.0 * t)) * y[0] - 2.0 * damping * y[1]]
+
+    return lambda a: from_rhs(rhs, 2, pi, args=(a,), orbit=ORIGIN)
 
 
 def check(found, expected, closest=1e-12):
@@ -132,17 +129,12 @@ def test_tongues_of_meissner(switches):
     ]
     assert len(expected) == 6
 
-    def meissner(a):
-        return from_rhs(
-            lambda t, y, a: [y[1], -(a + 0.2 * np.sign(np.cos(t))) * y[0]],
-            2,
-            2 * pi,
-            args=(a,),
-            orbit=ORIGIN,
-            switch_times=switches,
-        )
+    def meissner(t, y, a):
+        return [y[1], -(a + 0.2 * np.sign(np.cos(t))) * y[0]]
 
-    check(locate(meissner, (0.1, 3.0)), sorted(expected))
+    known = {"orbit": ORIGIN, "switch_times": switches}
+    found = locate(lambda a: from_rhs(meissner, 2, 2 * pi, args=(a,), **known), (0.1, 3.0))
+    check(found, sorted(expected))
 
 
 M = 0.5

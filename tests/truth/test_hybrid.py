@@ -212,22 +212,24 @@ def hopper_period(speed, gravity, stiffness):
     return 2.0 * speed / gravity + 2.0 * (math.pi - math.atan(speed * w / gravity)) / w
 
 
+def hopper(touches, stiffness, metre=1.0):
+    """A mass on a leg; a third state says whether the foot is down, and ``touches`` what touch-down makes of all."""
+    touch = Event(lambda t, x: x[0], touches, -1)
+    leave = Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], 0.0], 1)
+
+    def rhs(t, x):
+        return [x[1], -GRAVITY * metre - stiffness * x[2] / metre * x[0], 0.0]
+
+    return from_rhs(rhs, 3, None, events=[touch, leave], guess_period=0.5)
+
+
 @pytest.mark.parametrize("as_event", [True, False])
 @pytest.mark.parametrize("metre", [1.0, 1e-6])
 def test_a_hopper_keeps_its_energy(metre, as_event):
     """Every height has its hop: a family of orbits, whose multiplier is 1."""
     gravity, stiffness, speed = GRAVITY * metre, 400.0, 1.7 * metre
-    if as_event:  # a third state says whether the foot is down
-        system = from_rhs(
-            lambda t, x: [x[1], -gravity - stiffness * x[2] / metre * x[0], 0.0],
-            3,
-            None,
-            events=[
-                Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], metre], -1),
-                Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], 0.0], 1),
-            ],
-            guess_period=0.5,
-        )
+    if as_event:
+        system = hopper(lambda t, x: [x[0], x[1], metre], stiffness, metre)
         guess, known = [0.1 * metre, math.sqrt(speed**2 - 0.2 * metre * gravity), 0.0], [1.0, 0.0]
     else:
         system = from_rhs(lambda t, x: [x[1], -gravity - stiffness * np.minimum(x[0], 0.0)], 2, None, guess_period=0.5)
@@ -242,21 +244,10 @@ def test_a_hopper_keeps_its_energy(metre, as_event):
 def test_a_hopper_that_loses_and_gains():
     """At touch-down its speed v becomes r v + c, so c / (1 - r) comes back, and the multiplier is r."""
     stiffness, gain = 400.0, 0.9
-
-    def hopper(keeps):
-        touch = Event(lambda t, x: x[0], lambda t, x: [x[0], keeps * x[1] - gain, 1.0], -1)
-        leave = Event(lambda t, x: x[0], lambda t, x: [x[0], x[1], 0.0], 1)
-        return from_rhs(
-            lambda t, x: [x[1], -GRAVITY - stiffness * x[2] * x[0], 0.0],
-            3,
-            None,
-            events=[touch, leave],
-            guess_period=0.5,
-        )
-
     for keeps in (0.5, -0.3):
         speed = gain / (1.0 - keeps)
-        found = multipliers(hopper(keeps), [0.5 * speed**2 / GRAVITY - 0.01, 0.4, 0.0])
+        system = hopper(lambda t, x, keeps=keeps: [x[0], keeps * x[1] - gain, 1.0], stiffness)
+        found = multipliers(system, [0.5 * speed**2 / GRAVITY - 0.01, 0.4, 0.0])
         assert_multipliers(found, [keeps, 0.0])
         assert found.period == pytest.approx(hopper_period(speed, GRAVITY, stiffness), rel=1e-13)
 
@@ -405,19 +396,23 @@ def test_a_ball_that_comes_to_rest_is_named():
     assert "Zeno" in said
 
 
+WALLED = 0.1, 1.7
+"""Damping and frequency of a driven mass beside a wall."""
+
+
+def forced(t, x, force):
+    z, w = WALLED
+    return [x[1], -x[0] - 2.0 * z * x[1] + force * np.cos(w * t)]
+
+
 def test_a_wall_that_is_touched_as_forces_grow():
     """The motion of amplitude X(F) reaches the wall at F = d |1 - w^2 + 2 i z w|. From there on it is another one,
     whose derivative begins at infinity (Nordmark, J. Sound Vib. 145, 1991): the orbit cannot be followed."""
-    z, w, wall = 0.1, 1.7, 0.5
+    z, w, wall = *WALLED, 0.5
 
     def family(force):
-        return from_rhs(
-            lambda t, x, f: [x[1], -x[0] - 2.0 * z * x[1] + f * np.cos(w * t)],
-            2,
-            2.0 * math.pi / w,
-            args=(force,),
-            events=[Event(lambda t, x, f: x[0] - wall, lambda t, x, f: [x[0], -0.8 * x[1]], 1)],
-        )
+        hit = Event(lambda t, x, f: x[0] - wall, lambda t, x, f: [x[0], -0.8 * x[1]], 1)
+        return from_rhs(forced, 2, 2.0 * math.pi / w, args=(force,), events=[hit])
 
     touches = wall * abs(1.0 - w**2 + 2j * z * w)
     found = locate(family, (0.5 * touches, 1.5 * touches), orbit=[0.0, 0.0])
@@ -428,18 +423,10 @@ def test_a_wall_that_is_touched_as_forces_grow():
 
 
 def test_a_wall_that_is_never_reached_does_nothing():
-    z, w = 0.1, 1.7
-    plain, walled = (
-        from_rhs(
-            lambda t, x: [x[1], -x[0] - 2.0 * z * x[1] + np.cos(w * t)],
-            2,
-            2.0 * math.pi / w,
-            events=[Event(lambda t, x: x[0] - 50.0, lambda t, x: [x[0], -x[1]], 0)][:count],
-        )
-        for count in (0, 1)
-    )
+    z, w = WALLED
     known = np.exp(2.0 * math.pi / w * np.roots([1.0, 2.0 * z, 1.0]))
-    for system in (plain, walled):
+    for events in ([], [Event(lambda t, x, f: x[0] - 50.0, lambda t, x, f: [x[0], -x[1]], 0)]):
+        system = from_rhs(forced, 2, 2.0 * math.pi / w, args=(1.0,), events=events)
         assert_multipliers(multipliers(system, [0.0, 0.0]), known)
 
 

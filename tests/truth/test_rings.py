@@ -11,6 +11,7 @@ from chilopod.stability.symmetry.equivariants import SymmetricKind, symmetric_cr
 from chilopod.stability.symmetry.groups import commutes, finite_group
 from chilopod.stability.symmetry.isotypic import isotypic
 from chilopod.stability.unit_circle.spectra import Event
+from helpers.spectra import farthest
 
 
 def ring_group(cells, states, mirrored, scales):
@@ -24,17 +25,6 @@ def ring_group(cells, states, mirrored, scales):
 def ring_matrix(own, from_left, from_right, cells):
     shift = np.roll(np.eye(cells), 1, axis=0)
     return np.kron(np.eye(cells), own) + np.kron(shift, from_left) + np.kron(shift.T, from_right)
-
-
-def paired(found, known):
-    """Largest distance between numbers and those known, each paired once."""
-    left = list(known)
-    assert len(found) == len(left)
-    worst = 0.0
-    for value in found:
-        nearest = min(range(len(left)), key=lambda i: abs(left[i] - value))
-        worst = max(worst, abs(left.pop(nearest) - value))
-    return worst
 
 
 @pytest.mark.parametrize("states", [1, 2, 3])
@@ -58,8 +48,8 @@ def test_mirrored_ring(cells, states):
         assert block.real
         assert block.multiplicity == states
         found = np.linalg.eigvals(block.reduced(matrix))
-        nearest = min(range(len(left)), key=lambda i: paired(found, left[i]))
-        assert paired(found, left.pop(nearest)) < 1e-12
+        nearest = min(range(len(left)), key=lambda i: farthest(found, left[i]))
+        assert farthest(found, left.pop(nearest)) < 1e-12
 
 
 @pytest.mark.parametrize("states", [1, 2, 3])
@@ -76,7 +66,7 @@ def test_one_way_ring(cells, states):
         assert block.real == (block.dimension == 1)
         found += np.linalg.eigvals(block.reduced(matrix)).tolist()
     waves = [own + cmath.exp(2j * math.pi * k / cells) * from_left for k in range(cells)]
-    assert paired(found, np.concatenate([np.linalg.eigvals(wave) for wave in waves])) < 1e-12
+    assert farthest(found, np.concatenate([np.linalg.eigvals(wave) for wave in waves])) < 1e-12
 
 
 def test_five_van_der_pol_cells():
@@ -96,7 +86,7 @@ def test_five_van_der_pol_cells():
         stiffness = 1.0 + 2.0 * coupling * (1.0 - cosine)
         root = cmath.sqrt(0.25 * growth**2 - stiffness)
         known = [cmath.exp((0.5 * growth + sign * root) * duration) for sign in (1, -1)]
-        assert paired(np.linalg.eigvals(matrix), known) < 1e-13
+        assert farthest(np.linalg.eigvals(matrix), known) < 1e-13
         crossing = symmetric_crossing(block, Event.PAIR)
         assert crossing.kind is (
             SymmetricKind.NEIMARK_SACKER if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER

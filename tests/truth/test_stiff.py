@@ -8,11 +8,7 @@ from scipy.linalg import expm
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.taylor.flow import TaylorFlow
 from chilopod.stability import Event, Kind, exponents, find_orbit, from_rhs, locate, multipliers
-
-
-def van_der_pol(t, x, mu, a=1.0, b=1.0):
-    u, v = x[0] / a, x[1] / b
-    return [v * a, (mu * (1.0 - u * u) * v - u) * b]
+from helpers.systems import van_der_pol
 
 
 def oregonator(t, x):

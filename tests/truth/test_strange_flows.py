@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
-from chilopod.stability import Criticality, Kind, find_orbit, from_rhs, locate, multipliers
+from chilopod.stability import Criticality, Kind, find_orbit, locate, multipliers
+from helpers.systems import lorenz, roessler
 
 # c and period of the first two period doublings, a = b = 0.2
 DOUBLINGS = [(2.832445027862538915, 5.7698200165065631905), (3.8373581684100937586, 11.572688804465817831)]
@@ -17,26 +18,6 @@ DOUBLINGS = [(2.832445027862538915, 5.7698200165065631905), (3.83735816841009375
 LORENZ = (10.1211773312145627635, 25.737222654445643883, 0.67933676419821826034)
 LORENZ_MULTIPLIERS = (1.0320882978304110895, 8.9986280870868011905e-05)
 HOPF = 470.0 / 19.0  # sigma (sigma + b + 3) / (sigma - b - 1)
-
-
-def roessler(c, guess_period=5.8, units=(1.0, 1.0, 1.0)):
-    p, q, r = units
-
-    def rhs(t, s, c):
-        x, y, z = s[0] / p, s[1] / q, s[2] / r
-        return [(-y - z) * p, (x + 0.2 * y) * q, (0.2 + z * (x - c)) * r]
-
-    return from_rhs(rhs, 3, None, args=(c,), guess_period=guess_period)
-
-
-def lorenz(r, guess_period=0.68):
-    return from_rhs(
-        lambda t, s, r: [10.0 * (s[1] - s[0]), r * s[0] - s[1] - s[0] * s[2], s[0] * s[1] - 8.0 / 3.0 * s[2]],
-        3,
-        None,
-        args=(r,),
-        guess_period=guess_period,
-    )
 
 
 @pytest.mark.parametrize("units", [(1.0, 1.0, 1.0), (1e9, 1e-9, 1e3)])

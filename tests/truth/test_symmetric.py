@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chilopod.stability import Criticality, Kind, PeriodicSystem, from_rhs, locate, multipliers
+from helpers.systems import linear
 
 FORCE, RATE = 0.4, 1.3
 PERIOD = 2.0 * math.pi / RATE
@@ -76,14 +77,14 @@ def test_three_genes_that_repress_each_other_in_turn():
 def plane(p, turns=(0.0,)):
     """Oscillators that grow as exp(p t) and turn by given angles in a period of 1; those that do not turn are lines."""
 
-    def flow(x, t0, t1):
-        derivative = np.zeros((x.size, x.size))
+    def moves(t0, t1):
+        derivative = np.zeros((2 * len(turns), 2 * len(turns)))
         for i, turn in enumerate(turns):
             c, s = math.cos(turn * (t1 - t0)), math.sin(turn * (t1 - t0))
             derivative[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = math.exp(p * (t1 - t0)) * np.array([[c, -s], [s, c]])
-        return derivative @ x, derivative
+        return derivative
 
-    return PeriodicSystem(2 * len(turns), 1.0, flow, orbit=np.zeros(2 * len(turns)))
+    return linear(moves, 2 * len(turns))
 
 
 @pytest.mark.parametrize(

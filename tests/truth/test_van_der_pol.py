@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chilopod.stability import exponents, find_orbit, from_rhs, locate, multipliers
+from helpers.systems import van_der_pol
 
 # mu, period, largest x, logarithm of the multiplier
 KNOWN = [
@@ -23,13 +24,8 @@ KNOWN = [
 UNITS = [(1.0, 1.0), (1e9, 1e-9), (1e-9, 1e9), (1e-7, 1e-7)]
 
 
-def rhs(t, x, mu, a, b):
-    u, v = x[0] / a, x[1] / b
-    return [v * a, (mu * (1.0 - u * u) * v - u) * b]
-
-
 def oscillator(mu, guess_period, units=(1.0, 1.0)):
-    return from_rhs(rhs, 2, None, args=(mu, *units), guess_period=guess_period)
+    return from_rhs(van_der_pol, 2, None, args=(mu, *units), guess_period=guess_period)
 
 
 @pytest.mark.parametrize(("mu", "period", "peak", "log"), KNOWN)

@@ -291,23 +291,16 @@ def test_progress_goes_from_nothing_to_everything():
 @pytest.mark.parametrize(
     ("arguments", "field"),
     [
-        ({"duration": 0.0}, "duration"),
-        ({"duration": 1e9}, "duration"),
-        ({"rate": 0.0}, "rate"),
-        ({"duration": 9e4, "rate": 1e5}, "rate"),
         ({"robots": [PRESET, PRESET.set_from_text(["gait.stride=2 cm"])]}, "robots"),
         ({"robots": [PRESET, PRESET.set_from_text(["twin.servo_stiffness=8"])]}, "robots"),
         ({"robots": [PRESET, load_robot("aoi2022-planar")]}, "twin"),
         ({"robots": load_robot("aoi2022-planar")}, "twin"),
         ({"robots": PRESET.set_from_text(["twin.hip_height=13 cm"])}, "twin.hip_height"),
-        ({"initial": np.zeros(16)}, "initial"),
         ({"initial": np.zeros((0, 38))}, "initial"),
         ({"initial": np.full(38, np.nan)}, "initial"),
         ({"initial": np.zeros((3, 38)), "target": np.zeros((2, 2))}, "target"),
         ({"robots": [PRESET, PRESET], "seeds": [1, 2, 3]}, "robots"),
-        ({"friction": np.zeros((6, 2))}, "friction"),
         ({"friction": np.ones((5, 2))}, "friction"),
-        ({"target": 1.0}, "target"),
     ],
 )
 def test_bad_arguments_are_named(arguments, field):

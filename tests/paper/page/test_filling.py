@@ -20,7 +20,6 @@ from chilopod.paper.page.page import Film, State, page
 from chilopod.paper.section import Context, Found, Section, reproduce
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.show.panel import Panel
-from helpers.browser import CHROMIUM, Browser
 from helpers.html_page import Page as PAGE
 
 RUNNING = 'data-state="running"'
@@ -103,14 +102,6 @@ def test_what_is_shown_beside_others_is_drawn_once_more(tmp_path):
     assert seen == [None, 2]
     write_report(Found(values={one: 1, TWO: 2}), tmp_path)
     assert seen == [None, 2, 2]
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("there is no Chromium")
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        yield browser
 
 
 def test_new_sections_are_put_in_and_the_readers_place_stays(browser, tmp_path):

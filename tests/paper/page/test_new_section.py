@@ -1,18 +1,17 @@
 """docs/new-section.md, followed to the letter."""
 
-import json
 import re
 from pathlib import Path
 
 import chilopod.paper
-from chilopod.cli import main
 from chilopod.paper import registry
+from helpers.command_line import printed
 
 PAGE = (Path(__file__).parents[3] / "docs" / "new-section.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"```(?:python|text)\n(.*?)```", re.DOTALL)
 
 
-def test_what_the_page_says_adds_a_section(monkeypatch, capsys, tmp_path):
+def test_what_the_page_says_adds_a_section(monkeypatch, tmp_path):
     files = re.findall(r"`src/(chilopod/\S+\.py)`", PAGE)
     computed, drawn, line = BLOCK.findall(PAGE)
     for name, code in zip(files, (computed, drawn), strict=True):
@@ -23,8 +22,7 @@ def test_what_the_page_says_adds_a_section(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(chilopod.paper, "__path__", [*chilopod.paper.__path__, str(tmp_path / "chilopod" / "paper")])
     monkeypatch.setattr(registry, "REGISTRY", {**registry.REGISTRY, **eval(f"{{{line}}}")})
 
-    assert main(["reproduce", "--only", "stride", "--out", str(tmp_path / "report"), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = printed("reproduce", "--only", "stride", "--out", tmp_path / "report", "--json")
     assert [(row["quantity"], row["verdict"]) for row in found["rows"]] == [
         ("critical k1 at 1.8 cm", "agrees"),
         ("critical k1 at 4 cm", "not printed"),

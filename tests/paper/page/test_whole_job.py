@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chilopod.cli import main
 from chilopod.paper.fit_data import critical_mode_data, variant_settings
 from chilopod.paper.registry import load_sections
 from chilopod.paper.straight.sections import IDENTIFICATION
 from chilopod.tasks.identify import planar
-from helpers.browser import CHROMIUM, Browser
+from helpers.command_line import printed
 from helpers.html_page import Page as PAGE
 
 HERE = Path(__file__).parent
@@ -33,14 +32,6 @@ PLAYED = """new Promise((done) => {
 })"""
 SHOWN = """(play.textContent === "Pause" && play.click(), scrub.value = %s, scrub.dispatchEvent(new Event("input")),
   [clock.value, [...document.querySelectorAll("canvas")].map((each) => each.toDataURL())])"""
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    if CHROMIUM is None:
-        pytest.skip("there is no Chromium")
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        yield browser
 
 
 def test_every_section_is_computed_and_on_the_page(tiny):
@@ -151,7 +142,6 @@ def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
     assert set(result["constants"]) == set(planar.FREE)
 
 
-def test_from_the_command_line(capsys, tmp_path):
-    assert main(["reproduce", "--tiny", "--only", "modules", "--out", str(tmp_path), "--json"]) == 0
-    (row,) = json.loads(capsys.readouterr().out)["rows"]
+def test_from_the_command_line(tmp_path):
+    (row,) = printed("reproduce", "--tiny", "--only", "modules", "--out", tmp_path, "--json")["rows"]
     assert "7 to 7 modules" in row["quantity"]

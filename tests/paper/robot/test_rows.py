@@ -70,6 +70,13 @@ def base_with(**changes):
     return walks(base=series(SPRINGS, **{"onset": 34.0, **changes}))
 
 
+BASE = series(SPRINGS, 34.0)
+WIDE = series(SPRINGS, 34.0, scatter=0.1)
+FALLING = BASE.assign(mean_angle=BASE.mean_angle.where(BASE.spring <= 27.0, WIDE.mean_angle))
+TO_THE_RIGHT = BASE.assign(direction=BASE.direction.where(BASE.direction != "left", "right"))
+FAILED = BASE.assign(direction=BASE.direction.where(BASE.spring < 70.0, ""))  # a walk that failed is not straight
+
+
 def test_what_a_quick_report_has_is_judged_as_in_the_whole_one_and_the_rest_needs_more_trials():
     whole = [*walk_rows(walks()), *turning_rows(turning(), walks())]
     few = walks(variants={}, lower_steps={}, uniform=None)
@@ -99,36 +106,16 @@ def test_what_a_quick_report_has_is_judged_as_in_the_whole_one_and_the_rest_need
         (base_with(onset=45.0), "walks with k1 = 41 and 75", "outside"),
         (base_with(onset=27.0), "walks with k1 = 15", "outside"),
         (base_with(scatter=1.0), "angle of joint 1", "undecided"),
-        (walks(base=series(SPRINGS, 34.0).assign_coords(spring=list(SPRINGS[::-1]))), "angle of", "outside"),
+        (walks(base=BASE.assign_coords(spring=list(SPRINGS[::-1]))), "angle of", "outside"),
+        (base_with(scatter=0.01), "fluctuation", "within"),
+        (base_with(scatter=0.0), "fluctuation", "undecided"),
+        (walks(base=FALLING), "fluctuation", "outside"),
+        (walks(base=TO_THE_RIGHT), "walks with k1 = 15", "outside"),
+        (walks(base=FAILED), "walks with k1 = 41", "outside"),
     ],
 )
 def test_the_base_series_on_both_sides_of_what_is_asked(found, start, verdict):
     assert row_of(walked(found), start).verdict == verdict
-
-
-@pytest.mark.parametrize(("scatter", "verdict"), [(0.01, "within"), (0.0, "undecided")])
-def test_fluctuation_that_grows_or_does_not(scatter, verdict):
-    assert row_of(walked(base_with(scatter=scatter)), "fluctuation").verdict == verdict
-
-
-def test_fluctuation_that_falls_is_not_the_paper_s():
-    base = series(SPRINGS, 34.0)
-    wide = series(SPRINGS, 34.0, scatter=0.1)
-    stiff = base.spring > 27.0
-    mixed = base.assign(mean_angle=base.mean_angle.where(~stiff, wide.mean_angle))
-    assert row_of(walked(walks(base=mixed)), "fluctuation").verdict == "outside"
-
-
-def test_curves_to_one_side_only_are_not_the_paper_s():
-    base = series(SPRINGS, 34.0)
-    right = base.assign(direction=base.direction.where(base.direction != "left", "right"))
-    assert row_of(walked(walks(base=right)), "walks with k1 = 15").verdict == "outside"
-
-
-def test_a_walk_that_failed_is_not_straight():
-    base = series(SPRINGS, 34.0)
-    failed = base.assign(direction=base.direction.where(base.spring < 70.0, ""))
-    assert row_of(walked(walks(base=failed)), "walks with k1 = 41").verdict == "outside"
 
 
 def variants_with(**changes):

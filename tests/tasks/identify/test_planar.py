@@ -12,6 +12,7 @@ from chilopod.tasks.identify import TEMPLATE, CriticalMode, planar
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
+BEST = np.array([ROBOT.get(path) for path in planar.FREE])
 
 
 def test_residuals_need_the_number_of_modules_of_the_data():
@@ -31,13 +32,12 @@ def met(constants):
 
 
 def test_ranges_are_the_projection_of_what_the_tolerances_allow():
-    best = np.array([ROBOT.get(path) for path in planar.FREE])
-    ranges, cut = planar._ranges(ROBOT, DATA, best)
+    ranges, cut = planar._ranges(ROBOT, DATA, BEST)
     # By a program of its own, with sequential linear programming.
     np.testing.assert_allclose(ranges, [[227.695, 259.59], [0.0622, 0.08558], [0.03524, 0.06359]], rtol=1e-3)
     assert not cut.any()
     # A random walk within the set stays within the ranges, and comes far along the valley.
-    rng, here, seen = np.random.default_rng(1), best, [best]
+    rng, here, seen = np.random.default_rng(1), BEST, [BEST]
     for _ in range(40):
         there = here + rng.normal(size=3) * [6.0, -0.006, -0.006] * rng.uniform()
         here = there if met(there) <= 1.0 else here
@@ -64,7 +64,7 @@ def test_ranges_hold_the_constants_of_a_robot_of_another_size():
 
 def test_data_that_contradict_each_other_allow_nothing():
     data = CriticalMode(**{**dict(DATA), "components": DATA.components[::-1]})
-    ranges, _ = planar._ranges(ROBOT, data, np.array([ROBOT.get(path) for path in planar.FREE]))
+    ranges, _ = planar._ranges(ROBOT, data, BEST)
     assert np.isnan(ranges).all()
 
 
@@ -100,12 +100,11 @@ def test_the_template_is_read_as_the_papers_data(tmp_path):
 
 
 def test_no_direction_changes_the_residuals_less_than_the_valley():
-    best = np.array([ROBOT.get(path) for path in planar.FREE])
-    scale, (along, flatter) = planar._scale(ROBOT, DATA), planar._valley(ROBOT, DATA, best)
-    off = planar.residuals(planar.with_constants(ROBOT, best), DATA)
+    scale, (along, flatter) = planar._scale(ROBOT, DATA), planar._valley(ROBOT, DATA, BEST)
+    off = planar.residuals(planar.with_constants(ROBOT, BEST), DATA)
 
     def change(direction):
-        there = best + 1e-4 * scale * direction / np.linalg.norm(direction)
+        there = BEST + 1e-4 * scale * direction / np.linalg.norm(direction)
         return np.linalg.norm(planar.residuals(planar.with_constants(ROBOT, there), DATA) - off)
 
     least = change(along / scale)
