@@ -100,7 +100,7 @@ def _each(
 
 
 def as_now(trials: Sequence[Trial]) -> list[Trial]:
-    """Trials with the present code and fields of their controllers."""
+    """Trials with the current code and fields of their controllers."""
     found = [trial.as_now() for trial in trials]
     with meanwhile_unchanged():
         for trial in found:

@@ -52,8 +52,8 @@ class Summary:
 
 
 def titled(name: str, spring: float) -> str:
-    """Title of a strategy: its name, or the spring (N*mm/deg) that it walks with. On courses the best spring of a
-    strategy may lie on either side of the bifurcation that it is named for."""
+    """Title of a strategy: its name, or its spring (N*mm/deg), which may lie on either side of the bifurcation of
+    that name."""
     strategy = ON_COURSES[name]
     if strategy.springs is None or np.isnan(spring):
         return name
