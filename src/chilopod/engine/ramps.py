@@ -11,9 +11,9 @@ Array = NDArray[np.float64]
 
 
 class Ramps:
-    """Values that move to their setpoints at constant rate, each on its own.
+    """Values that move to their setpoints at constant rates, independently.
 
-    A value that is given its old setpoint again goes on, and arrives no later than the new command demands.
+    A repeated setpoint does not restart the ramp of a value, which then arrives no later than the new command demands.
 
     Parameters
     ----------

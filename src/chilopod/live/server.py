@@ -154,7 +154,7 @@ class Live:
             raise self.failure
 
     def close(self) -> None:
-        """End everything; a recording that is under way is kept."""
+        """End the walk, the server and all processes; a recording under way is kept."""
         self._over.set()
         try:
             if hasattr(self, "_thread"):

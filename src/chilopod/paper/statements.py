@@ -27,7 +27,7 @@ class VariantStatements:
 
 @dataclass(frozen=True)
 class TaskStatements:
-    """Statements on a turning task: the spring of its circle, its outcome, and where the criteria are smallest."""
+    """Statements on a turning task: the spring of its circle, its outcome, and the minima of the criteria."""
 
     k_hat: Statement[Band]
     outcomes: Statement[Said]

@@ -169,7 +169,7 @@ class Scene:
     arrival_radius: float
 
     def begun(self, robot: int, now: float) -> tuple[Aim, ...]:
-        """The targets of a robot that have had their turn at a time (s), or have it."""
+        """Past and present targets of a robot at a time, s."""
         return tuple(aim for aim in self.aims[robot] if now >= aim.since - 1e-9)
 
 

@@ -68,7 +68,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
 
     def near_jacobian(self, place: float) -> Array:
-        """The same, on the cubic through the ends of the step if that is close enough."""
+        """Derivative at a place, by the cubic through the ends of the step if that is close enough."""
         step, start = self.step, self.step.start
         if place in (0.0, step.size):
             return self.jacobian(place)

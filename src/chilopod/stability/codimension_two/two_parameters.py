@@ -168,7 +168,7 @@ class _Half:
     reason: str = ""
 
     def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
-        """Station at the end of a step, and events within it; the curve of a pair ends where it meets."""
+        """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
         station = self.detector.station(step.end)
         special: tuple[SpecialPoint2, ...] = ()
         for spot, point in self.detector.events(step, self.last.signals, station.signals):

@@ -52,7 +52,7 @@ REPEATED = 10.0
 
 @dataclass(frozen=True)
 class Section(ReadOnlyArrays):
-    """A hyperplane that the orbit of a system without a period of its own crosses once a return along its normal.
+    """Hyperplane that the orbit of a system without a period of its own crosses once in a return, along the normal.
 
     Attributes
     ----------
