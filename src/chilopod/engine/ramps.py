@@ -49,7 +49,7 @@ class Ramps:
         return _at(self._ramps, times.reshape(-1, *[1] * self.goal.ndim))
 
     def restart(self, which: NDArray[np.bool_]) -> None:
-        """Set some values to 0 from now on, whatever their setpoints; only without a log (``keep``)."""
+        """Set some values to 0 from now on, in place of their setpoints; only without a log (``keep``)."""
         ramps = self._ramps.copy()
         ramps[:, which] = 0.0
         self._ramps = ramps

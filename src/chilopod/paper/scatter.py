@@ -1,4 +1,4 @@
-"""Statements about trials that scatter: decided beyond doubt, or left open.
+"""Statements about trials that scatter, decided or left undecided.
 
 Every answer is yes, no, or undecided: True, False or None.
 """

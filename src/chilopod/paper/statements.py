@@ -138,7 +138,7 @@ PLANAR_LIMIT: Statement[Band] = Statement(
     Band("no counterpart", "3 % of the planar model", 0.97, 1.03),
     _CHECKED,
 )
-"""Over where the planar model loses it."""
+"""Point of the twin's planar limit over that of the planar model."""
 
 ORDER: tuple[Statement[Said], ...] = (
     *(STRAIGHT, CURVED, ONSET, *RADII.values(), SPEED, RISING, FLUCTUATION),

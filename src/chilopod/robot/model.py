@@ -196,7 +196,7 @@ class Robot(Description):
         return self._locate(path).quantity.display
 
     def si_unit_of(self, path: str) -> str:
-        """Return the SI unit of what `get` returns, such as ``N*m/rad``."""
+        """Return the SI unit of the result of `get`, such as ``N*m/rad``."""
         return self._locate(path).quantity.si
 
     def with_value(self, path: str, value: float) -> Self:

@@ -39,7 +39,7 @@ _ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks
 
 @dataclass(frozen=True)
 class Trial:
-    """Everything that defines a walk.
+    """Description of a walk: everything that defines it.
 
     Attributes
     ----------

@@ -99,7 +99,7 @@ def share_of_courses(arrived: xr.DataArray) -> Interval:
 
 
 def _reached(one: xr.Dataset, name: str) -> Array:
-    """Over (course, goal), NaN where the target was not reached."""
+    """Values over (course, goal), NaN where the target was not reached."""
     values = one[name].where(one.arrived > 0.5)
     return np.asarray(values.transpose("course", "goal").values)
 

@@ -41,7 +41,7 @@ SHORTER = (20.0, 30.0, 40.0, 60.0)
 """Further durations of the base series, s, as the paper does not print the duration of its trials."""
 
 UNIFORM_DURATION = 60.0
-"""s, of walks with all springs alike, which settle sooner."""
+"""Duration of walks with all springs alike, which settle sooner, s."""
 
 _RATE = 50.0
 _EXAMPLES = (41.0, 15.0)

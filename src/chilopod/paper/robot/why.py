@@ -1,4 +1,5 @@
-"""Why the robot bends at 34 and the planar model says 12: from the planar model's assumptions to the twin's.
+"""Reasons why the robot bends at 34 and the planar model at 12: steps from the planar model's assumptions to the
+twin's.
 
 The twin has a planar limit. Its legs are as stiff as the step allows, lift their feet high and put them down on the
 point. Its feet never reach the Coulomb limit, so the floor resists them like a viscous one with the coefficient of the

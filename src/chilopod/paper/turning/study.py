@@ -42,7 +42,7 @@ FARTHER = (1.3, 2.0, 3.0, 4.5)
 FARTHER_SPRINGS = (8, 9, 10, 11, 12, 12.5, 13, 14, 15, 17, 19, 21, 24, 28, 41)
 QUICK_SPRINGS = (6, 7, 8, 9, 10, 11, 12, 21)
 ROUGH_SPRINGS = (6, 7, 8, 8.5, 9, 9.5, 10, 11, 12, 13, 15, 21)
-"""N*mm/deg."""
+"""Springs of these trials, of quick ones, and of rough ones, N*mm/deg."""
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def follow2(
 
 
 def over_periods(family2: Family2, periods: int) -> Family2:
-    """The same systems for orbits over several periods, or without their symmetry in time."""
+    """Systems for orbits over several periods, or without their symmetry in time."""
     return lambda p, q: whole_period(family2(p, q), periods)
 
 
