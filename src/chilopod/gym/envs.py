@@ -87,8 +87,8 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Row, dict[str, Any]]:
-        """Begin an episode with every robot. ``seed`` is the seed of robot 0, to which robot i adds i, or a list with a
-        seed for each robot; None continues the generators."""
+        """Begin an episode with every robot. Robot i has ``seed`` + i, or its own seed of a list; None continues the
+        generators."""
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:

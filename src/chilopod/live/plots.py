@@ -84,8 +84,7 @@ class Plots:
 
 
 def _branch(theory: Theory, spring: float, radius: float) -> tuple[Array, ...]:
-    """Springs in rising order, with the values of every series at each: stable and unstable curved walks, the
-    pitchfork, and the present walk."""
+    """Springs in rising order, with each series: stable and unstable walks, the pitchfork, the present walk."""
     along = np.linspace(0.0, len(theory.springs) - 1.0, _BETWEEN * len(theory.springs))
     points = np.arange(len(theory.springs))
     springs, radii, stable = np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_)

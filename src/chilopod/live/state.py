@@ -79,8 +79,7 @@ def as_finite(field: str, value: object) -> float:
 
 
 def as_within(field: str, value: object, limits: tuple[float, float], unit: str) -> float:
-    """Checked number between two others; raises a ParameterError with the field and the allowed range for any other
-    value."""
+    """Checked number between two others; a ParameterError names the field and the allowed range."""
     number, (low, high) = as_finite(field, value), limits
     # The ends of a slider are those of its range up to round-off.
     if not low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9):

@@ -47,8 +47,8 @@ class Report:
 
     As a context manager it writes the page on entry and completes it on exit. Meanwhile ``news.js`` announces new
     results. Figures are drawn in a thread beside the computation of the next section, and ``progress`` receives the
-    fraction drawn. The page begins with ``plan``, see :func:`chilopod.paper.duration.plan`. A missing folder is
-    created.
+    fraction drawn. The page begins with ``plan``, see :func:`chilopod.paper.duration.plan`. It creates a missing
+    folder.
 
     Raises
     ------

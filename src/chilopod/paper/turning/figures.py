@@ -1,5 +1,4 @@
-"""The turning tasks: figures of the paper's section "Turning maneuverability", and reasons of the model's
-differences."""
+"""The turning tasks: figures of the paper's section "Turning maneuverability", and reasons of differences."""
 
 from __future__ import annotations
 
@@ -364,7 +363,7 @@ def draw_without(data: xr.Dataset, narrow: bool) -> Figure:
 
 
 def why(found: Turning) -> Panel:
-    """Reasons why the best spring is not the law's: the start, and the length of the way."""
+    """Reasons why the best spring is not the law's: start and length of the way."""
     settled, farther = found.settled, found.farther
     best = [float(farther.spring[int(row.argmin())]) for row in farther.effort.values]
     cm = 100.0 * settled.start_nearest

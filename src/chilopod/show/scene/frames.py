@@ -151,8 +151,7 @@ class Floor:
     grid: float
 
     def span(self) -> tuple[Array, float]:
-        """Middle of the positions on a page, and their largest distance from it, m: the floor with a margin of its
-        size."""
+        """Middle of positions on a page, and their largest distance from it, m: the floor with a margin of its size."""
         middle = np.array([0.5 * (self.x0 + self.x1), 0.5 * (self.y0 + self.y1)])
         return middle, 1.5 * max(self.x1 - self.x0, self.y1 - self.y0)
 
