@@ -92,15 +92,14 @@ def test_another_robot_or_number_is_noticed(monkeypatch):
 # docs/new-section.md is followed by a test of its own.
 @pytest.mark.parametrize("page", [name for name in PAGES if name != "docs/new-section.md"])
 def test_python_blocks_print_what_they_say(page, tmp_path, monkeypatch):
-    """One after the other in one namespace. A block that is not run says why in a comment before it."""
+    """Each as a file of its own. A block that is not run says why in a comment before it."""
     monkeypatch.chdir(tmp_path)
-    names = {}
     for block in FENCED.finditer(PAGES[page]):
         if block["kind"] == "python" and not block["why"]:
             claimed = [line[2:] for line in block["code"].splitlines() if line.startswith("# ")]
             output = io.StringIO()
             with contextlib.redirect_stdout(output):
-                exec(compile(block["code"], page, "exec"), names)
+                exec(compile(block["code"], page, "exec"), {"__name__": "__main__"})
             if claimed:
                 assert output.getvalue().splitlines() == claimed
 

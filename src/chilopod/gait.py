@@ -85,7 +85,7 @@ class Gait(Description):
 
     @property
     def half_period_symmetric(self) -> bool:
-        """True if the right legs do half a period later what the left legs do: side_phase is half a turn."""
+        """True if the right legs repeat the motion of the left legs half a period later: side_phase is half a turn."""
         return abs((self.side_phase / _TURN) % 1.0 - 0.5) <= _SAME_PHASE
 
     def leg_phases(self, modules: int) -> NDArray[np.float64]:
@@ -105,7 +105,7 @@ class Gait(Description):
         return stands
 
     def stroke(self, phase: ArrayLike) -> NDArray[np.float64]:
-        """Return how far a foot is ahead of mid-stroke at a phase (in cycles, in [0, 1)), m, of its shape.
+        """Return the distance of a foot ahead of mid-stroke at a phase (in cycles, in [0, 1)), m, of its shape.
 
         Standing it moves from stride/2 to -stride/2 at constant speed; it swings back as a half ellipse looks from
         above.
@@ -115,7 +115,7 @@ class Gait(Description):
         return np.where(self.stands(cycles), back, forward) * self.stride
 
     def swing_angle(self, phase: ArrayLike) -> NDArray[np.float64]:
-        """Return how far along its half ellipse a swinging foot is, from 0 at lift-off to pi at touch-down, rad."""
+        """Return the angle of a swinging foot along its half ellipse, from 0 at lift-off to pi at touch-down, rad."""
         angle: NDArray[np.float64] = np.pi * (np.asarray(phase, dtype=np.float64) - self.duty) / (1.0 - self.duty)
         return angle
 

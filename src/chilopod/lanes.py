@@ -27,7 +27,7 @@ LANES = 8
 """Number of lanes of double precision in the widest registers; narrower ones are used two or four at a time."""
 
 HALF = LANES // 2
-"""Lanes for what has few numbers side by side."""
+"""Lanes for computations with few numbers side by side."""
 
 _CACHE_LINE = 8  # numbers
 _INDEX = ir.IntType(32)

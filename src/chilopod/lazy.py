@@ -1,4 +1,4 @@
-"""Packages that load what they export on first use (PEP 562).
+"""Packages that load their exports on first use (PEP 562).
 
 A function then loads only the modules that it needs itself.
 """

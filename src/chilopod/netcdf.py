@@ -23,7 +23,7 @@ _OUR_FAULT = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
 
 
 class UnsoundError(ValueError):
-    """A file differs from what was written; the message says how."""
+    """Error of a file that differs from its written contents; the message names the difference."""
 
 
 def storable(data: xr.Dataset) -> xr.Dataset:

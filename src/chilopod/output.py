@@ -123,7 +123,7 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
 
 
 def spool(path: Path, size: int = 0) -> IO[bytes]:
-    """Temporary file without a name, on the same disk, for a large result under computation; it ends with this process.
+    """Unnamed temporary file on the same disk, for a large result under computation; it vanishes with this process.
 
     Room is set aside for twice the size (bytes): for the file, and for the copy that :func:`write_atomic` makes of it.
     """

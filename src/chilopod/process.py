@@ -86,7 +86,7 @@ def unwritten(stdout: Stream) -> str | None:
 
 
 def answer_interrupts() -> None:
-    """Let Ctrl-C, SIGTERM and SIGHUP end this process with one line and exit code 128 + signal, whatever it is doing.
+    """Let Ctrl-C, SIGTERM and SIGHUP end this process with one line and exit code 128 + signal at any moment.
 
     The signals raise KeyboardInterrupt, so that cleanup runs. During an import (where C code may change or lose the
     exception) and at a second Ctrl-C the process ends at once; files are complete or absent at any moment. If stopping

@@ -15,7 +15,7 @@ _PACKAGE = Path(__file__).parent
 
 @functools.cache
 def checkout() -> str:
-    """Commit of the checkout that this package is or was built from, such as ``g29a026a.dirty``; empty for a
+    """Commit of the checkout in which this package lies or was built, such as ``g29a026a.dirty``; empty for a
     release."""
     with suppress(OSError):
         return (_PACKAGE / "checkout.txt").read_text(encoding="utf-8").strip()

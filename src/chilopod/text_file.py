@@ -12,7 +12,7 @@ _LARGEST: Final = 1_000_000
 
 
 def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
-    """Read a small text file, with bounded time and memory whatever the path leads to.
+    """Read a small text file, with bounded time and memory for any path.
 
     Raises ``refused`` if the path is missing or not a regular file, or the file is too large, empty or not text;
     ``kind`` is the expected content, such as ``robot file``.

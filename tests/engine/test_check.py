@@ -17,7 +17,7 @@ DOCS = Path(__file__).parents[2] / "docs" / "engines.md"
 
 @pytest.fixture(scope="module")
 def docs():
-    """What the code in the docs page defines, which checks its own engine as it runs."""
+    """Names that the code in the docs page defines."""
     code = "\n".join(re.findall(r"```python\n(.*?)```", DOCS.read_text(), flags=re.S))
     names = {"__name__": "docs"}
     exec(compile(code, str(DOCS), "exec"), names)

@@ -27,14 +27,10 @@ def folder(tmp_path, monkeypatch):
     (code,) = [
         each for each in re.findall(r"```python\n(.*?)```", DOCS.read_text(), flags=re.S) if "class Sketch" in each
     ]
-    code = code.replace(
-        "from chilopod.engine import", "from chilopod import load_robot\nfrom chilopod.engine import", 1
-    )
     (tmp_path / "own_engines.py").write_text(
-        re.sub(r"(?m)^print\(.*$", "", code)
+        code
         + """
 import sys
-sketch = Sketch()
 class Lazy(Sketch):
     def start(self, robots, **given): return None
 class OldWalk(SketchWalk):

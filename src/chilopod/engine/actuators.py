@@ -156,7 +156,7 @@ class Actuators:
         return np.diff(_integral(self.profile, self.lag, edges), axis=0) / np.diff(edges, axis=0)
 
     def stiffness_rate(self, time: float) -> Array:
-        """How fast every spring stiffens at a time from the last command on, N*m/rad/s, shape (robots, N-1)."""
+        """Rate of the stiffness of every spring at a time after the last command, N*m/rad/s, shape (robots, N-1)."""
         return _rate(self.profile, self.lag, time)
 
     def add_to(self, data: xr.Dataset) -> None:

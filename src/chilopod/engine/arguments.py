@@ -73,7 +73,7 @@ def as_robot(robot: object) -> Robot:
 
 
 def check_wishes(record: object, expected: object) -> float:
-    """Duration of a walk, s, checked together with what an engine is to record."""
+    """Checked duration of a walk, s, together with the contents of its record."""
     if not isinstance(record, Recording | None):
         raise ParameterError(
             "must be a Recording or None", field="record", value=record, allowed="a chilopod.record.Recording, or None"

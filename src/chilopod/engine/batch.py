@@ -101,7 +101,7 @@ class BatchWalk(Walk):
 
     @property
     def time(self) -> float:
-        """Time that the walk has been advanced to, s."""
+        """Present time of the walk, s."""
         return self._time
 
     def save(self) -> bytes:

@@ -68,9 +68,10 @@ class Observation:
     distance
         Distance of the target from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
     joint_angles
-        Joint angles of the yaw joints, rad, shape (robots, N-1); NaN for a robot that no longer walks.
+        Angles of the yaw joints, heading of the module behind minus heading of the module before (positive: bent to the
+        right), rad, shape (robots, N-1); NaN for a robot that no longer walks.
     leg_yaw
-        Angles last commanded for the left and right leg of module 1, rad, shape (robots, 2).
+        Angles last commanded for the left and right leg of module 1, left positive, rad, shape (robots, 2).
     stiffness
         Stiffness of the springs of the yaw joints at this moment, N*m/rad, shape (robots, N-1).
     """
@@ -142,7 +143,7 @@ class Walk(Protocol):
 
     @property
     def time(self) -> float:
-        """Time that the walk has been advanced to, s; the gait is at phase 0 at time 0."""
+        """Present time of the walk, s; the gait is at phase 0 at time 0."""
 
     @property
     def status(self) -> tuple[Status, ...]:

@@ -11,9 +11,9 @@ Array = NDArray[np.float64]
 
 
 class Ramps:
-    """Values that move to their setpoints at constant rate, each on its own.
+    """Values that move to their setpoints at constant rates, independently.
 
-    A value that is given its old setpoint again goes on, and arrives no later than the new command demands.
+    A repeated setpoint does not restart the ramp of a value, which then arrives no later than the new command demands.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Ramps:
         return _at(self._ramps, times.reshape(-1, *[1] * self.goal.ndim))
 
     def restart(self, which: NDArray[np.bool_]) -> None:
-        """Set some values to 0 from now on, whatever their setpoints; only without a log (``keep``)."""
+        """Set some values to 0 from now on, in place of their setpoints; only without a log (``keep``)."""
         ramps = self._ramps.copy()
         ramps[:, which] = 0.0
         self._ramps = ramps

@@ -67,7 +67,7 @@ class CalledFlow:
         return self._over(x, parts, self.tolerance, sizes, self._gradient(x, sizes)[0])
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, float]:
-        """The same with a bound on the error of the largest entry of the derivative."""
+        """State and derivative, with a bound on the error of the largest entry of the derivative."""
         parts = self._parts(t0, t1)
         sizes = self._sizes(x, parts)
         gradient, floor = self._gradient(x, sizes)
@@ -211,7 +211,7 @@ class CalledFlow:
 
 
 def _cut(parts: Parts) -> Parts:
-    """The same parts, each cut in three, so that the steps differ almost from the start."""
+    """Parts of an integration, each cut in three, so that the steps differ almost from the start."""
     cuts = [[a + part * (b - a) for part in (0.0, 0.0477, 0.382)] + [b] for a, b in parts]
     return [part for times in cuts for part in zip(times, times[1:], strict=False)]
 

@@ -15,7 +15,7 @@ from chilopod.frozen import Array
 RESOLUTION = 4096  # number of grid points over the period; a pulse in time that the grid meets is resolved exactly
 
 DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
-"""How an integration ends."""
+"""Ending of an integration."""
 
 _REASONS = {
     NOT_FINITE: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),

@@ -117,8 +117,8 @@ class Actions:
         return np.clip(2.0 * (np.log(stiffness) - low) / (high - low) - 1.0, -1.0, 1.0)
 
     def commands(self, actions: Array, leg_yaw: Array) -> list[tuple[float, Command]]:
-        """Commands of a gait cycle from :meth:`checked` actions and the present leg yaw, rad, shape (robots, 2):
-        fractions of the cycle, and the commands at these times."""
+        """Times of a gait cycle, as fractions of it, with their commands, from :meth:`checked` actions and the present
+        leg yaw, rad, shape (robots, 2)."""
         stiffness = np.tile(self.robot.springs.stiffness, (len(actions), 1))
         stiffness[:, self.joints] = self.stiffness(actions)
         wanted, yaw = self.legs.limit * actions[:, len(self.joints) :], leg_yaw.copy()

@@ -87,8 +87,8 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Row, dict[str, Any]]:
-        """Begin an episode with every robot: ``seed`` is that of robot 0, to which robot i adds i, or a list of one
-        each; None continues the generators."""
+        """Begin an episode with every robot. Robot i has ``seed`` + i, or its own seed of a list; None continues the
+        generators."""
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:
@@ -108,7 +108,7 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         return step.observation, step.reward, step.terminated, step.truncated, _infos(step)
 
     def render(self) -> tuple[Pixels, ...] | None:
-        """A picture of every robot, from above; None without a render mode."""
+        """Picture of every robot from above; None without a render mode."""
         drawn = _drawn(self)
         return None if drawn is None else tuple(drawn)
 

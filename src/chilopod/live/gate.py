@@ -280,7 +280,7 @@ def _policy(host: str) -> str:
 
 @cache
 def _scripts() -> str:
-    """Hashes of viser's two scripts: one that unpacks, and what it unpacks from five digits of 88 for four bytes."""
+    """Hashes of viser's two scripts: one that unpacks, and the unpacked one (from five digits of 88 for four bytes)."""
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
     digits = {digit: place for place, digit in enumerate(sorted({*map(chr, range(33, 127))} - {*"\"&'<>`"}))}
     packed = bytearray()

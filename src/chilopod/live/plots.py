@@ -28,7 +28,7 @@ _BETWEEN = 4  # dots from one point of the branch to the next
 
 
 class Plots:
-    """Three plots of a walk of a robot with so many yaw joints; nothing is created as it goes on."""
+    """Three plots of a walk of a robot with some number of yaw joints; nothing is created during the walk."""
 
     def __init__(self, gui: viser.GuiApi, joints: int) -> None:
         self._times: deque[float] = deque(maxlen=_POINTS)
@@ -84,8 +84,7 @@ class Plots:
 
 
 def _branch(theory: Theory, spring: float, radius: float) -> tuple[Array, ...]:
-    """Springs in rising order, and for each of them what there is of every series: the curved walks, stable and not,
-    the pitchfork, and what walks now."""
+    """Springs in rising order, with each series: stable and unstable walks, the pitchfork, the present walk."""
     along = np.linspace(0.0, len(theory.springs) - 1.0, _BETWEEN * len(theory.springs))
     points = np.arange(len(theory.springs))
     springs, radii, stable = np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_)

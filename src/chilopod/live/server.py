@@ -145,7 +145,7 @@ class Live:
         self._wished = True
 
     def wait(self, seconds: float | None = None) -> None:
-        """Wait so long, or until the thread of the walk fails, and raise its error then."""
+        """Wait for the given time, or until the thread of the walk fails; then raise its error."""
         end = math.inf if seconds is None else time.monotonic() + seconds
         # Not by joining the thread: Ctrl-C within a join that has a limit leaves a thread that counts as ended.
         while not self._ended.wait(min(0.5, max(0.0, end - time.monotonic()))) and time.monotonic() < end:
@@ -154,7 +154,7 @@ class Live:
             raise self.failure
 
     def close(self) -> None:
-        """End everything; a recording that is under way is kept."""
+        """End the walk, the server and all processes; a recording under way is kept."""
         self._over.set()
         try:
             if hasattr(self, "_thread"):

@@ -35,7 +35,7 @@ from chilopod.trials import Disturbance
 Array = NDArray[np.float64]
 
 LOOKS = 6
-"""In a gait cycle: means over a cycle are those of so many."""
+"""Number of samples in a gait cycle, for means over the cycle."""
 
 _SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
 _NUDGE = math.radians(0.5)  # standard deviation of what a nudge turns a joint by, held by its spring

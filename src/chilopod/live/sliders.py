@@ -39,7 +39,7 @@ class Slider:
     folder: str = ""  # of the panel, empty for none
 
     def at_page(self, value: float) -> float:
-        """A value in the unit of the page."""
+        """Value in the unit of the page."""
         return float(f"{units.from_si(value, self.unit):.9g}")
 
     def from_page(self, value: float) -> float:

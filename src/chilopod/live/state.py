@@ -79,7 +79,7 @@ def as_finite(field: str, value: object) -> float:
 
 
 def as_within(field: str, value: object, limits: tuple[float, float], unit: str) -> float:
-    """A number between two others; a ParameterError that names the field and what is allowed if it is not."""
+    """Checked number between two others; a ParameterError names the field and the allowed range."""
     number, (low, high) = as_finite(field, value), limits
     # The ends of a slider are those of its range up to round-off.
     if not low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9):

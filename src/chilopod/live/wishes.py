@@ -72,8 +72,8 @@ class Steering(Wish):
 
 @dataclass(frozen=True)
 class Pull(Wish):
-    """A torque on a yaw joint, N*m, positive where it turns what is behind the joint to the left; for some time (s), or
-    until another pull."""
+    """A torque on a yaw joint, N*m, positive where it turns the part behind the joint to the left; for some time (s),
+    or until another pull."""
 
     joint: int
     torque: float

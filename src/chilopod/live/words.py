@@ -86,7 +86,7 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
 
 
 def _moving(radius: float, settled: float, seen: Seen) -> str:
-    """Where a curve is and where it goes, which need not be the same way: a bend overshoots, and sways."""
+    """Present radius beside the branch's, and its change, in words; a bend may overshoot and sway."""
     moves, towards = "tightens" if seen.turning > 0.0 else "widens", "tightens" if radius > settled else "widens"
     if seen.turning and moves == towards:
         return f"{moves} towards the branch's {settled:.2f} m"
@@ -103,5 +103,5 @@ def _arc(seen: Seen) -> str:
 
 
 def _percent(growth: Growth) -> str:
-    """By how much a disturbance changes in a second."""
+    """Change of a disturbance in a second, in words."""
     return f"{100.0 * abs(math.expm1(growth.rate)):.0f} %"

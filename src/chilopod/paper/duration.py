@@ -1,7 +1,7 @@
 """Duration of a report on this machine, before it is computed.
 
-:data:`SECONDS` says how long sections take on two idle cores of one machine, drawing included. A few walks of the whole
-robot tell how fast another machine is, and how busy.
+:data:`SECONDS` has the durations on two idle cores of one machine, drawing included. A few walks of the whole robot
+measure the speed of this machine.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _IN_FULL: Final = {
 
 
 def plan(sections: Sequence[Section[Any]], size: Size, named: bool = False) -> str:
-    """Kind of a report of a size, its duration here, and what a larger one adds; ``named`` if its sections were."""
+    """Kind of a report of a size, its duration here, and additions of a larger one; ``named`` for named sections."""
     what = f"{len(sections)} of all sections" if named else f"{size.value[0].upper()}{size.value[1:]}"
     own = seconds(sections, size)
     if own < _SHORT:

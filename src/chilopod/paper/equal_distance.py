@@ -1,11 +1,10 @@
-"""Radius of a variant of a robot beside that of the robot, at equal distances from the onset: at an equal distance from
-where its own curved walks set in.
+"""Radius of a variant over that of the robot, at equal distances from the onset of each one's curved walks.
 
-By the square-root law the bend is A sqrt(1/k1 - 1/k*): two robots of equal A that set in at different k* turn alike at
-equal 1/k1 - 1/k*. The ratio of the amplitudes A of two fits would do if the law held, but the bend saturates. So the
-measured bends themselves are compared: squared, as they are nearly linear in 1/k1 then, joined by straight lines, over
-the distances at which there are trials of both. Only the onsets come from fits, to the summed bend of the trials of
-each; these move with saturation too, but both to stiffer springs, so that little of it remains in the ratio.
+By the square-root law the bend is A sqrt(1/k1 - 1/k*). Two robots of equal A and different onsets k* turn alike at
+equal 1/k1 - 1/k*. Far from the onset the bend saturates, so a ratio of fitted amplitudes A is not exact. Therefore the
+measured bends are compared, over the distances at which both have trials. Squared bends are nearly linear in 1/k1 and
+are joined by straight lines. Only the onsets come from fits, to the summed bend of the trials of each. Saturation moves
+both onsets to stiffer springs, so that little of it remains in the ratio.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from chilopod.paper.measures import counted, fitted, point_of
 from chilopod.paper.scatter import Array, drawn_anew, mean_and_error
 
 DRAWN = 200
-"""Sets of trials that are drawn anew for the standard errors."""
+"""Number of bootstrap samples for the standard errors."""
 
 
 @dataclass(frozen=True)
 class RadiusRatio:
-    """Radius of a variant over that of the robot as built; NaN where nothing is in common."""
+    """Radius of a variant over that of the robot as built; NaN without a common distance."""
 
     distance: float  # at equal distances from each one's own onset
     distance_error: float  # standard error
@@ -35,11 +34,10 @@ class RadiusRatio:
 
 
 def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed: int = 0) -> RadiusRatio:
-    """Compare the radii of two series of trials over spring and repeat, as
-    :func:`chilopod.tasks.radius_law.end_of_walk` has them, of which those count that
-    :func:`chilopod.paper.measures.counted` tells.
+    """Compare the radii of two series of trials over spring and repeat, from
+    :func:`chilopod.tasks.radius_law.end_of_walk`; only trials that are :func:`chilopod.paper.measures.counted` count.
 
-    Trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0 times for none.
+    The standard errors come from a bootstrap at every spring, with onsets fitted anew; 0 samples: no errors.
     """
     inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
     found = _ratios(inverse, bends)
@@ -53,7 +51,7 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
 
 
 def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> float:
-    """Radius at equal springs by the square-root law with equal amplitudes: what the onsets alone make of it.
+    """Radius at equal springs by the square-root law with equal amplitudes: effect of the onsets alone.
 
     Mean over the springs (N*mm/deg) softer than both onsets; NaN if there is none.
     """
@@ -62,7 +60,7 @@ def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> floa
 
 
 def onset_of_bend(data: xr.Dataset) -> float:
-    """Where the curved walks of a series set in by a fit to their summed bend, N*mm/deg; NaN if nowhere."""
+    """Onset of the curved walks of a series by a fit to their summed bend, N*mm/deg; NaN if there is none."""
     return _onset(*_bends(data))
 
 

@@ -11,7 +11,7 @@ from chilopod.tasks.identify import BaseSeries, CriticalMode
 
 
 def critical_mode_data() -> CriticalMode:
-    """Critical mode of the planar model: six numbers, of which half the last digit is left open."""
+    """Critical mode and spring of the planar model: six numbers, each exact to half of its last digit."""
     return CriticalMode(
         k1=stiffness(printed.CRITICAL_K1.value),
         components=tuple(each.value for each in printed.MODE),
@@ -22,7 +22,7 @@ def critical_mode_data() -> CriticalMode:
 
 
 def variant_settings() -> Mapping[str, Sequence[str]]:
-    """The paper's variants of its robot: what is set in each, by name."""
+    """Settings of the paper's variants of its robot, by name."""
     return {name: each.overrides for name, each in printed.VARIANTS.items()}
 
 
@@ -32,7 +32,7 @@ def base_series_data() -> BaseSeries:
     They are straight at k1 = 75 and 41, curved at 28, 21, 17 and 15; curves set in at 34, with a radius
     of 1.2 m at 26 and 0.88 m at 21, at a speed of 0.056 m/s (:func:`walking_speed`).
 
-    The tolerance is half of what the report calls agreeing.
+    The tolerances are half of those in the report's verdicts.
     """
     return BaseSeries(
         curved=printed.CURVED,
@@ -46,7 +46,7 @@ def base_series_data() -> BaseSeries:
 
 
 def walking_speed() -> float:
-    """Speed of the robot, m/s; the paper prints no speed, but the time at which it was there.
+    """Speed of the robot, m/s, from its arrival time, as the paper prints no speed.
 
     In task A the target is R = 1.3 m away, psi = 45 deg to the side. The circle to it has the radius R / (2 sin psi)
     and turns by 2 psi on the way, 1.444 m in all. The robot was within 0.15 m of the target after 23 s at the earliest:

@@ -23,7 +23,7 @@ from chilopod.trials import Trial
 Folder = str | Path | None
 
 SEEDS = 10_000
-"""Seeds between springs, so that more repeats leave the other trials as they are."""
+"""Distance of the seeds of neighbouring springs; more repeats then do not change the other trials."""
 
 _RATE = 50.0  # Hz
 
@@ -42,9 +42,9 @@ def spring_walks(
 ) -> list[xr.Dataset]:
     """Records of walks with some springs (N*mm/deg; a stiffness by its path), one spring after the other.
 
-    All walks last as long (s), or those with each spring. ``repeats`` is the number of walks with each spring,
-    ``seeds`` are those of the first of them (0 by default), from which the others count up; ``walk`` are other fields
-    of :class:`chilopod.trials.Trial`.
+    ``duration`` (s) is one for all walks, or one for each spring. ``repeats`` is the number of walks with each spring,
+    ``seeds`` are the seeds of the first of them (0 by default), from which the others count up. ``walk`` are other
+    fields of :class:`chilopod.trials.Trial`.
     """
     durations = np.broadcast_to(duration, len(springs)).tolist()
     asked = [
@@ -61,7 +61,7 @@ def spring_seeds(springs: Sequence[float]) -> list[int]:
 
 
 def by_spring(walks: Sequence[xr.Dataset], springs: Sequence[float]) -> xr.Dataset:
-    """Measures of walks, over spring (N*mm/deg) and repeat; of each spring as many, one after the other."""
+    """Measures of walks over spring (N*mm/deg) and repeat, from walks in this order."""
     repeats = len(walks) // len(springs)
     rows = [xr.concat(walks[i : i + repeats], "repeat") for i in range(0, len(walks), repeats)]
     return xr.concat(rows, "spring").assign_coords(spring=over_springs(springs), repeat=np.arange(repeats))
@@ -105,7 +105,7 @@ def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
 
 
 def fitted(inverse: ArrayLike, bends: ArrayLike, resampled: int = RESAMPLED) -> SquareRootFit | None:
-    """The square-root law of bends over 1/k, as of :func:`square_root_fit`; None if they do not determine a point."""
+    """Square-root law of bends over 1/k by :func:`square_root_fit`; None if they do not determine a point."""
     try:
         return square_root_fit(inverse, bends, resampled)
     except AnalysisError:
@@ -118,7 +118,7 @@ def point_of(fit: SquareRootFit | None) -> tuple[float, float]:
 
 
 def onset(data: xr.Dataset, joint: int = 1, settled: bool = True) -> SquareRootFit | None:
-    """Where curved walks set in by the paper's method: the square-root fit to the trials that are :func:`counted`."""
+    """Onset of curved walks by the paper's method: the square-root fit to the trials that are :func:`counted`."""
     here = counted(data, settled)
     inverse = np.broadcast_to(1.0 / data.spring.values[:, None], here.shape)
     return fitted(inverse[here], data.mean_angle.sel(joint=joint).values[here])
@@ -138,10 +138,10 @@ def radius_at(data: xr.Dataset, spring: float, settled: bool = True) -> tuple[fl
 
 
 def spring_for(data: xr.Dataset, radius: float) -> tuple[float, float]:
-    """The paper's k1-hat: the spring whose walks have a radius, between trials, N*mm/deg; NaN outside of them.
+    """The paper's k1-hat: spring of a radius, interpolated between trials, N*mm/deg; NaN outside of them.
 
-    The squared curvature is interpolated in 1/k1, in which it is linear by the square-root law. With its standard error
-    from drawing trials anew at every spring.
+    The squared curvature is interpolated in 1/k1, in which it is linear by the square-root law. The standard error
+    comes from a bootstrap at every spring.
     """
     here = counted(data)
     curved = here.any(axis=1)
@@ -162,5 +162,5 @@ def spring_for(data: xr.Dataset, radius: float) -> tuple[float, float]:
 
 
 def cycle_means(angles: Array, samples: int) -> Array:
-    """Means of joint angles over gait cycles of so many samples, shape (cycles, joints)."""
+    """Means of joint angles over gait cycles of ``samples`` samples, shape (cycles, joints)."""
     return angles[: len(angles) // samples * samples].reshape(-1, samples, angles.shape[1]).mean(axis=1)

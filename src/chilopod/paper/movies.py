@@ -28,9 +28,9 @@ _BEND = tuple(float(angle) for angle in np.deg2rad([20.0, 10.0, 14.0, 12.0, 4.0]
 def movies(context: Context, progress: Progress, best: float) -> list[Movie]:
     """Walk the films of the planar robot.
 
-    The walks of movie 1, one straight, one that curves a little, one that curves a lot, start bent in the shape of the
-    critical mode, for from straight it would take them minutes to bend. Movie 2 shows the best first spring for task A
-    (N*mm/deg) between one that is too stiff and one that is too soft.
+    Movie 1 has a straight walk, a wide curve and a tight curve. They start bent in the shape of the critical mode, as
+    the bend would take minutes to grow from straight. Movie 2 shows the best first spring for task A (N*mm/deg)
+    between one that is too stiff and one that is too soft.
     """
     robot, shorter, spring = context.robot, context.size.cut(1.0, 0.1), stiffness(best)
     joints = robot.body.modules - 1
@@ -40,7 +40,7 @@ def movies(context: Context, progress: Progress, best: float) -> list[Movie]:
 
 
 def robot_movies(context: Context, progress: Progress) -> list[Movie]:
-    """The same of the whole robot: the walks of movie 1 start straight but for their disturbance, as the paper's do."""
+    """Walk the films of the whole robot; movie 1 starts straight but for the disturbance, as in the paper."""
     shorter, springs = context.size.cut(1.0, 0.013), tuple(map(stiffness, (*_ROBOT_FILMED, *_ROBOT_TRIED)))
     walk = Trial(context.whole, shorter * _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True)
     found = _movies(context, progress, "robot-", walk, shorter * _ROBOT_TASK, springs)
@@ -54,7 +54,7 @@ def robot_movies(context: Context, progress: Progress) -> list[Movie]:
 def _movies(
     context: Context, progress: Progress, prefix: str, walk: Trial, duration: float, springs: tuple[float, ...]
 ) -> list[Movie]:
-    """Movie 1 of a walk, and movie 2 of task A, in the same engine and so long, with three springs (N*m/rad) each."""
+    """Movie 1 of a walk and movie 2 of task A, in the same engine and duration, with three springs (N*m/rad) each."""
     steered: dict[str, Any] = {"target": TASK_A, "controller": LegYawController(), "disturbance": NONE}
     task = replace(walk, duration=duration, seed=0, joint_angles=(), **steered)
     pairs = zip([walk] * 3 + [task] * 3, springs, strict=True)

@@ -1,7 +1,7 @@
 """Printed numbers of the paper, and the condition on a number that agrees with each.
 
 S. Aoi et al., "Advanced turning maneuver of a many-legged robot using pitchfork bifurcation", IEEE Transactions on
-Robotics, 2022: of its planar model, and of its robot. Springs are in N*mm/deg, as it has them.
+Robotics, 2022. The numbers are those of its planar model and of its robot; springs are in N*mm/deg, as printed.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Band(Said):
 
 @dataclass(frozen=True)
 class Number:
-    """A number that is printed, its unit, and the largest deviation of one that agrees, in the same unit."""
+    """A printed number, its unit, and the largest deviation of a number that agrees, in the same unit."""
 
     value: float
     unit: str
@@ -64,8 +64,8 @@ class Number:
 
 @dataclass(frozen=True)
 class Variant:
-    """A change of the robot, as ``--set`` takes it: the planar model's critical k1 over that as built, the spring at
-    which the robot's curved walks set in, and their radius over that as built."""
+    """Change of the robot, as for ``--set``: critical k1 of the planar model over that as built, onset of the robot's
+    curved walks, and their radius over that as built."""
 
     overrides: tuple[str, ...]
     model: Band
@@ -95,7 +95,7 @@ def _spring(value: float, tolerance: float = ONSETS) -> Number:
 
 
 def _around(k_hat: float) -> Band:
-    """Around it is between the paper's own neighbours of 21."""
+    """Bounds of a spring around 21: its neighbours in the paper."""
     low, high = 17.0 / 21.0 * k_hat, 28.0 / 21.0 * k_hat
     condition = f"{low:.3g} to {high:.3g} {PAPER_UNIT}, with all that are no worse"
     return Band(f"around k1 = {k_hat:g} {PAPER_UNIT}", condition, low, high)
@@ -134,7 +134,7 @@ AS_BUILT = "as built"
 """The robot beside its variants."""
 
 STRAIGHT, CURVED = (41.0, 75.0), (15.0, 17.0, 21.0, 28.0)
-"""k1 with which the robot walks straight, and with which it curves."""
+"""Springs k1 of straight walks of the robot, and of curved ones."""
 
 EXPERIMENTS = "section Pitchfork bifurcation of straight walk, experimental results of the robot"
 RADII = {21.0: Number(0.88, "m", 0.088), 26.0: Number(1.2, "m", 0.12)}
@@ -150,7 +150,7 @@ CRITERION_NAMES = {"distance": "ε1, distance", "angle": "ε2, angle", "effort":
 """Names of the robot's criteria."""
 
 ARRIVAL = Number(23.0, "s", 0.15 * 23.0)
-"""The robot's earliest, in task A."""
+"""Earliest arrival of the robot in task A."""
 
 SPEED = 0.10
 """Relative tolerance of the walking speed, which follows from the earliest arrival (:mod:`chilopod.paper.fit_data`)."""
@@ -190,5 +190,5 @@ def mode_shape(robot: Robot) -> tuple[float, ...]:
 
 
 def onset(variant: str) -> Number:
-    """Where curved walks of the robot as built, or of a variant, set in."""
+    """Onset of curved walks of the robot as built, or of a variant."""
     return ONSET if variant == AS_BUILT else VARIANTS[variant].onset

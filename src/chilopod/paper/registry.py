@@ -45,10 +45,10 @@ def load_sections() -> tuple[Section[Any], ...]:
 
 
 def chosen(only: Iterable[str] | None = None, size: Size | None = None, paper: bool = False) -> list[Section[Any]]:
-    """The sections asked for, by default those that a report of a size has (all but those that are computed on request,
-    if none is given), in the order they are computed; a report of the paper leaves out studies beyond its experiments.
+    """Sections of a report, in the order in which they are computed: those of ``only``, else those of a report of
+    ``size``, else all but those computed on request. With ``paper``, studies beyond the paper are left out.
 
-    Raises ParameterError if one of them does not exist, or goes beyond the paper in a report of the paper.
+    Raises ParameterError if a named section does not exist, or goes beyond the paper in a report of the paper.
     """
     sections = {section.name: section for section in load_sections()}
     if only is None:

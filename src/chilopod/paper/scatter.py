@@ -1,4 +1,4 @@
-"""Statements about trials that scatter: decided beyond doubt, or left open.
+"""Statements about trials that scatter, decided or left undecided.
 
 Every answer is yes, no, or undecided: True, False or None.
 """
@@ -14,18 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 Answer = bool | None
-"""True, False, or None where the scatter leaves it open."""
+"""True, False, or None if the scatter leaves it undecided."""
 
 INCREASES: Mapping[Answer, str] = {True: "increases", False: "not throughout", None: "not told apart everywhere"}
 """Words for the answers of :func:`increases`."""
 
 SURE = 2.0
-"""Standard errors beyond which two means, or a mean and a bound, are told apart."""
+"""Number of standard errors that distinguish two means, or a mean and a bound."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One mean less another, and its standard error, which is NaN where it is not known, as of single trials."""
+    """Difference of two means, and its standard error; NaN if unknown, as for single trials."""
 
     value: float
     error: float
@@ -52,10 +52,10 @@ class Difference:
 
 
 def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Difference:
-    """The mean of some trials less that of others, shapes (n,) and (m,); NaN does not count.
+    """Mean of some trials minus that of others, shapes (n,) and (m,); NaN is left out.
 
-    If they are paired, trials of equal index belong together, as those of one seed do; then the scatter of their
-    differences counts. Else the trials are independent.
+    Paired trials have equal indices, as those of one seed, and the error is that of their differences. Other trials are
+    independent.
     """
     x, y = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
     if paired:
@@ -88,14 +88,14 @@ def means(values: Array, here: NDArray[np.bool_] | bool = True) -> tuple[Array, 
 
 
 def with_error(value: float, error: float, digits: int) -> str:
-    """A number and, if it is known and not zero, its standard error, with so many decimals."""
+    """Text of a number with some decimals, and of its standard error, if known and not zero."""
     return f"{value:.{digits}f}" + (f" ± {error:.{digits}f}" if error > 0.0 else "")
 
 
 def between(value: float, error: float, low: float, high: float) -> Answer:
     """True if a mean lies between two bounds: undecided within :data:`SURE` standard errors of the nearer bound.
 
-    What is not finite lies nowhere; a mean whose error is not known (NaN) is undecided.
+    False for a mean that is not finite; undecided for an unknown error (NaN).
     """
     if not np.isfinite(value):
         return False
@@ -122,10 +122,10 @@ def increases(trials: Iterable[ArrayLike]) -> Answer:
 
 
 def drawn_anew(trials: Array, rng: np.random.Generator) -> Array:
-    """Another set of trials for a bootstrap, shape (conditions, trials): in every row its mean and deviations from it.
+    """Set of trials for a bootstrap, shape (conditions, trials): mean of every row plus drawn deviations from it.
 
-    Deviations from the mean of n trials are too small by sqrt((n - 1) / n) on average, for which they are widened.
-    NaN stays where it is, single trials as they are.
+    Deviations from the mean of n trials are too small by sqrt((n - 1) / n) on average, so they are widened by this
+    factor. NaN stays NaN, and single trials do not change.
     """
     drawn = trials.copy()
     for row in drawn:

@@ -23,14 +23,14 @@ T = TypeVar("T")
 Line = Row | OfTwin | OfPlanar
 
 NEEDS_MORE = "needs more trials"
-"""Words of a quick report for what it leaves out."""
+"""Words of a quick report for the studies that it leaves out."""
 
 SectionProgress = Callable[[str, float, str], None]
-"""Called with the section, the part of it that is done (0 to 1), and a few words."""
+"""Function of a section, the fraction of it that is done (0 to 1), and a few words."""
 
 
 class Size(Enum):
-    """Size of a report: how much of everything it computes, in words."""
+    """Size of a report."""
 
     FULL = "the paper's own experiments and everything beyond them"
     MAIN = "the paper's own experiments, and one headline of every chapter beyond them from fewer trials"
@@ -38,11 +38,11 @@ class Size(Enum):
     TINY = "every section, but hardly anything of it: walks of the whole robot are cut before they have settled"
 
     def of(self, full: S, quick: S, tiny: S) -> S:
-        """The one of three that is this size's."""
+        """Value for this size, out of three."""
         return {Size.FULL: full, Size.MAIN: full, Size.QUICK: quick, Size.TINY: tiny}[self]
 
     def cut(self, usual: S, tiny: S) -> S:
-        """Value for a report that is not tiny; a tiny one has less of it."""
+        """Value ``usual``, or ``tiny`` for a tiny report."""
         return self.of(usual, usual, tiny)
 
     def has(self, section: Section[Any]) -> bool:
@@ -59,7 +59,7 @@ class Size(Enum):
 
 @dataclass(frozen=True)
 class Context:
-    """Ground that sections are computed from; the paper's numbers are those of ``aoi2022-planar`` and ``aoi2022``."""
+    """Robots, size and folder of a report; the paper's numbers are those of ``aoi2022-planar`` and ``aoi2022``."""
 
     robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))  # of the planar model
     whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))  # of the sections in three dimensions
@@ -87,7 +87,7 @@ def nothing(*found: object) -> Sequence[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Section(Generic[T]):
-    """A part of the report: something that is computed, its lines of the tables, its figures and films."""
+    """Part of the report: a computation, its lines of the tables, its figures and films."""
 
     name: str  # on the command line
     chapter: str  # of the page
@@ -110,7 +110,7 @@ class Section(Generic[T]):
 
 @dataclass
 class Found:
-    """Results by section: ``found[section]`` is its result, None if there is none."""
+    """Results by section: ``found[section]`` is the result, or None."""
 
     context: Context = field(default_factory=Context)  # of the computation
     values: dict[Section[Any], Any] = field(default_factory=dict)  # results
@@ -137,7 +137,7 @@ class Found:
         self.values[section], self.rows[section] = value, rows
 
     def copy(self) -> Found:
-        """As it is now, whatever is added later."""
+        """Copy that does not change when results are added."""
         return Found(self.context, {**self.values}, {**self.rows}, {**self.seconds}, {**self.failures})
 
     def planar_rows(self) -> dict[str, list[Row]]:
@@ -163,7 +163,7 @@ def reproduce(
     """Compute sections of the report; one that fails does not keep the others from being computed.
 
     ``sections`` are those of :func:`chilopod.paper.registry.chosen`, the context by default that of the paper's robots.
-    ``progress`` is called as the work goes on, ``callback`` after every section with all that is found by then, and the
+    ``progress`` is called during the work. ``callback`` is called after every section, with all results so far and the
     section. An OutputError is raised if trials cannot be kept.
     """
     found = Found(context or Context())

@@ -27,7 +27,7 @@ class VariantStatements:
 
 @dataclass(frozen=True)
 class TaskStatements:
-    """Statements on a turning task: the spring of its circle, its outcome, and where the criteria are smallest."""
+    """Statements on a turning task: the spring of its circle, its outcome, and the minima of the criteria."""
 
     k_hat: Statement[Band]
     outcomes: Statement[Said]
@@ -138,7 +138,7 @@ PLANAR_LIMIT: Statement[Band] = Statement(
     Band("no counterpart", "3 % of the planar model", 0.97, 1.03),
     _CHECKED,
 )
-"""Over where the planar model loses it."""
+"""Point of the twin's planar limit over that of the planar model."""
 
 ORDER: tuple[Statement[Said], ...] = (
     *(STRAIGHT, CURVED, ONSET, *RADII.values(), SPEED, RISING, FLUCTUATION),

@@ -113,7 +113,7 @@ class PlanarModel(ReadOnlyArrays):
 
     @property
     def symmetry(self) -> Array | None:
-        """The reflection if the right legs do half a period later what the left legs do, else None."""
+        """Reflection, if the right legs repeat the motion of the left legs half a period later; else None."""
         return self.reflection if self.use_symmetry and self.robot.gait.half_period_symmetric else None
 
     @property

@@ -65,7 +65,7 @@ class Timeline:
         return begins, starts, widths, numbers[0, :count], numbers[1, :count]
 
     def rest(self, until: float) -> tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]]:
-        """Piece from the last cut to a later time, to which :meth:`whole_pieces` went, without a sample at its end."""
+        """Piece from the last cut to the later end of :meth:`whole_pieces`, without a sample at its end."""
         number, switch, _ = _interval_after(self._times, self.cut, int(self.position[1]))
         cut = self.position[:1].copy()
         which = np.array([number % (len(self._times) - 1)])

@@ -24,7 +24,7 @@ def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
 
 
 def yaw_inertia_range(body: Body, legs: Legs, twin: Twin) -> tuple[float, float]:
-    """Least and greatest yaw inertia of a module, kg*m^2: with the body's mass in the middle, or half at either end."""
+    """Least and greatest yaw inertia of a module, kg*m^2: body's mass in the middle, or half of it at each end."""
     mass = body_mass(body, twin)
     least = legs_yaw_inertia(legs, twin) + mass * twin.body_width**2 / 12.0
     return least, least + 0.25 * mass * (body.length / body.modules) ** 2

@@ -196,16 +196,16 @@ class Robot(Description):
         return self._locate(path).quantity.display
 
     def si_unit_of(self, path: str) -> str:
-        """Return the SI unit of what `get` returns, such as ``N*m/rad``."""
+        """Return the SI unit of the result of `get`, such as ``N*m/rad``."""
         return self._locate(path).quantity.si
 
     def with_value(self, path: str, value: float) -> Self:
         """Return this robot with one parameter changed to `value` in SI units; about 20 us, for sweeps.
 
         `path` is as for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring
-        and damper for joints that are new and drops those that are gone; length and mass are those of the whole robot
-        and stay. The provenance of a changed parameter becomes a note that it was overridden. ParameterError if `value`
-        is out of range.
+        and damper for new joints, and drops those of removed ones. Length and mass are those of the whole robot and
+        stay. The provenance of a changed parameter becomes a note that it was overridden. ParameterError if `value` is
+        out of range.
         """
         place = self._locate(path)
         try:
@@ -217,7 +217,7 @@ class Robot(Description):
     def override(self, path: str, value: object) -> Self:
         """Return this robot with one parameter changed: a number in SI units or text with its unit.
 
-        Otherwise as `with_value`; also raises `UnitError` if the text is not a quantity or has another dimension.
+        Like `with_value`; also raises `UnitError` if the text is not a quantity or has another dimension.
         """
         place = self._locate(path)
         try:
@@ -237,7 +237,7 @@ class Robot(Description):
         return robot
 
     def with_(self, **fields: Any) -> Self:
-        """Return this robot with whole fields replaced, such as ``name=`` or ``gait=``, validated again."""
+        """Return a validated copy of this robot with whole fields replaced, such as ``name=`` or ``gait=``."""
         return type(self)(**{**dict(self), **fields})
 
     def with_twin_of(self, other: Robot) -> Self:

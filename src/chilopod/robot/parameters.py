@@ -69,7 +69,7 @@ def place_of(path: str) -> Place:
 
 
 def spring_index(path: str, changed: str) -> int:
-    """Return the index of a spring in a path that a change of `changed` concerns, and -1 in any other."""
+    """Return the index of a spring in a path that a change of `changed` concerns, -1 for any other path."""
     match = _PATH.fullmatch(path)
     if match is None or match[2] is None or (changed != "body.modules" and match[1] != changed):
         return -1

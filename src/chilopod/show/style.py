@@ -25,7 +25,7 @@ GREY: Final = "#767676"
 PALE: Final = "#e8e8e8"
 
 CURVES: Final = (BLUE, GREEN, PURPLE, ORANGE, SKY, GREY)
-"""For curves that are only to be told apart; :data:`VERMILLION` is kept for the loss of stability."""
+"""Colours of curves without a meaning of their own; :data:`VERMILLION` marks the loss of stability."""
 
 SCENE: Final = {
     "ink": BLACK,
@@ -92,7 +92,7 @@ def figure(wide: Layout, narrow: Layout, is_narrow: bool) -> tuple[Figure, dict[
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Within it figures look alike, whatever the user's matplotlib is set to."""
+    """Context in which figures look alike under any settings of the user's matplotlib."""
     with styled("default"):
         mpl.rcParams.update(_RC)
         yield
@@ -128,7 +128,7 @@ def bare(axes: Axes) -> None:
 
 
 def note(axes: Axes, text: str, at: tuple[float, float], away: tuple[float, float], **look: Any) -> None:
-    """Small text beside a point, so many points of a printer away from it; `look` as for an annotation."""
+    """Small text beside a point, at a distance in printer's points; `look` as for an annotation."""
     axes.annotate(text, at, away, textcoords="offset points", fontsize=SMALL, **look)
 
 

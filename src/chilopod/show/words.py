@@ -13,7 +13,7 @@ _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits, trailing zeros and all, and a true minus sign."""
+    """Number with some significant digits, trailing zeros included, and a true minus sign."""
     text = f"{value:#.{digits}g}".rstrip(".")
     return minus(text if "e" not in text else f"{value:.{digits - 1}e}")
 
@@ -25,7 +25,7 @@ def round_down(value: float) -> float:
 
 
 def signed(value: float, digits: int = 0) -> str:
-    """A number with its sign and so many decimals."""
+    """Number with its sign and some decimals."""
     return minus(f"{value:+.{digits}f}")
 
 

@@ -230,7 +230,7 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
 
 
 def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: float = math.inf) -> Exponents:
-    """All Floquet exponents and modes, the strongly damped ones included; arguments as for :func:`multipliers`.
+    """All Floquet exponents and modes, including strongly damped ones; arguments as for :func:`multipliers`.
 
     The state space is split along the factors of the period, so a multiplier of 1e-60 has the same relative accuracy as
     one of 0.5.

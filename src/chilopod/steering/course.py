@@ -38,7 +38,8 @@ class Goal:
     Attributes
     ----------
     x, y
-        Position on the floor, where the robot starts at the origin along x; or ahead of module 1 and to its left, m.
+        Position on the floor, m; the robot starts at the origin along x. If ``relative``, ahead of module 1 and to its
+        left.
     relative
         True if the position is relative to module 1 at the end of the goal before.
 

@@ -18,11 +18,11 @@ SIDES = ("left", "right")
 
 @dataclass(frozen=True)
 class LegYawController:
-    """Once in every swing of each leg of module 1, its yaw moves towards the target's bearing by at most ``step``.
+    """Controller that yaws each leg of module 1 towards the target, by at most ``step`` in every swing.
 
-    At ``start`` of the swing the bearing psi is read; until ``end`` of the swing the desired yaw then ramps by psi less
-    the present yaw, or by sign(psi - yaw) times ``step`` if that is less; and it never exceeds ``limit``. The yaw stays
-    constant while the foot stands, and while the target is not seen.
+    At ``start`` of the swing the bearing psi is read. Until ``end`` of the swing the yaw then ramps by psi - yaw, or by
+    sign(psi - yaw) times ``step`` if that is less. It never exceeds ``limit``. The yaw stays constant while the foot
+    stands, and while the target is not seen.
 
     Attributes
     ----------

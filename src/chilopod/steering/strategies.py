@@ -1,4 +1,4 @@
-"""Strategies for turning a robot. A new one is a class with :meth:`Strategy.prepare` and an entry in _ALL."""
+"""Strategies for turning a robot. A new one is a :class:`Strategy` and an entry in ``_ALL``, see docs/courses.md."""
 
 from __future__ import annotations
 

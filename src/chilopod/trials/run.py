@@ -73,7 +73,7 @@ def run_each(
     executor: Executor | None = None,
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
     """Run or read trials as :func:`run` does, and yield each distinct trial and its record as soon as it is ready, in
-    any order; memory holds a batch at a time."""
+    any order. Memory holds one batch at a time."""
     yield from _each(as_now(trials), folder, progress, executor)
 
 
@@ -100,7 +100,7 @@ def _each(
 
 
 def as_now(trials: Sequence[Trial]) -> list[Trial]:
-    """Trials with the present code and fields of their controllers."""
+    """Trials with the current code and fields of their controllers."""
     found = [trial.as_now() for trial in trials]
     with meanwhile_unchanged():
         for trial in found:

@@ -39,7 +39,7 @@ _ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks
 
 @dataclass(frozen=True)
 class Trial:
-    """Everything that defines a walk.
+    """Description of a walk: everything that defines it.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Trial:
         return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 
     def as_now(self) -> Trial:
-        """The same trial with the present code and fields of its controller."""
+        """The same trial with the current code and fields of its controller."""
         own = ":" in self.engine or any(not is_ours(kind) for kind in classes_in(self.controller))
         return replace(self) if own else self
 

@@ -48,8 +48,8 @@ def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
 
 
 def servo_targets(robot: Robot, times: ArrayLike) -> Array:
-    """Hip and knee of every leg at times, s, shape (T,): rad, shape (T, modules, 2 sides, 2 joints). ParameterError if
-    the legs cannot follow."""
+    """Angles of hip and knee of every leg at times (s, shape (T,)), rad, shape (T, modules, 2 sides, 2 joints).
+    ParameterError if the legs cannot follow."""
     twin = twin_of(robot)
     tip = tip_path(robot, robot.gait.phases(times, robot.body.modules))
     return joint_angles(twin, tip[..., 0], twin.hip_height - tip[..., 1])

@@ -34,7 +34,7 @@ traits = Traits(
 
 
 def common(robot: Robot) -> Robot:
-    """Properties of a batch, see :class:`chilopod.engine.Engine`: all but the numbers of the springs."""
+    """Properties that all robots of a batch share: everything but spring stiffness and damping."""
     twin_of(as_robot(robot))
     return without_springs(robot)
 

@@ -27,7 +27,7 @@ class Opaque(Exception):
 
 
 def python_function(value: Any) -> Any:
-    """The Python function behind a compiled one; any other value itself."""
+    """Python function behind a compiled one; any other value is returned unchanged."""
     inner = getattr(value, "py_func", None)
     return inner if isinstance(inner, types.FunctionType) else value
 

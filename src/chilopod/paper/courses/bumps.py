@@ -9,7 +9,7 @@ from chilopod import twin
 from chilopod.robot import Robot
 
 HEIGHT = 0.004
-"""m, of the highest bumps; a foot is lifted by not much more."""
+"""Height of the highest bumps, m; a foot is lifted by little more."""
 
 _GRID = 0.05  # m between heights
 _REACH = 12.0  # m from the start, farther than courses lead

@@ -131,7 +131,7 @@ def intervals(
 
 
 def where(data: xr.Dataset) -> Panel:
-    """Where targets are missed, by the variable spring and by the best spring for all of a course."""
+    """Positions of missed targets, with the variable spring and with the best constant one."""
     shown = (VARIABLE.name, STRATEGIES["pitchfork"].name)
     maps = {name: share_map(data.sel(case=name)) for name in shown}
     ours, fixed = (maps[name] for name in shown)
@@ -164,7 +164,7 @@ def where(data: xr.Dataset) -> Panel:
 
 
 def share_map(one: xr.Dataset) -> Array:
-    """Share of targets that were reached, over distance and bearing; NaN where none was put up."""
+    """Share of targets that were reached, over distance and bearing; NaN in fields without targets."""
     at = np.rad2deg(one.bearing.values).ravel(), one.away.values.ravel()
     reached = one.arrived.transpose("course", "goal").values.ravel()
     all_, *_ = np.histogram2d(at[1], at[0], (_AWAY, _BEARINGS))
@@ -173,7 +173,7 @@ def share_map(one: xr.Dataset) -> Array:
 
 
 def _missed(share: Array) -> str:
-    """Fields of a map where many are missed, in words."""
+    """Fields of a map with many missed targets, in words."""
     fields = [
         f"at {abs(_BEARINGS[column]):.0f}° to {abs(_BEARINGS[column + 1]):.0f}° to the "
         f"{'left' if _BEARINGS[column] >= 0.0 else 'right'} and {_AWAY[row]:.1f} to {_AWAY[row + 1]:.1f}\u00a0m"
@@ -199,7 +199,7 @@ def _draw_where(maps: dict[str, Array], narrow: bool) -> Figure:
 
 
 def robust(found: Robust) -> Panel:
-    """Steps of the law, and conditions that it does not know of, in the planar model."""
+    """Steps of the law, and conditions unknown to it, in the planar model."""
     steps, conditions = found.courses, found.conditions
     grown = listing(f"{name} {percent(share_of_targets(steps.arrived.sel(case=name)))}" for name in steps.case.values)
     return Panel(

@@ -19,7 +19,7 @@ from chilopod.tasks.course import Driver, driver
 from chilopod.trials import Disturbance
 
 USUAL = "as usual"
-"""The case that others are held against."""
+"""Case that others are compared with."""
 
 PLANAR_COURSES = (range(2000, 2200), range(2000, 2040), range(2000, 2001))
 WHOLE_COURSES = (range(2000, 2020), range(2000, 2005), range(2000, 2001))
@@ -43,7 +43,7 @@ class Robust:
 
 @dataclass(frozen=True)
 class Condition:
-    """Something that is not as the law takes it to be."""
+    """Condition that breaks an assumption of the law."""
 
     name: str  # in a few words
     changes: tuple[str, ...] = ()  # of the robot, as ``--set`` takes them; the law does not know
@@ -81,7 +81,7 @@ def whole_conditions(robot: Robot) -> list[Condition]:
 
 
 def ablated(context: Context, variable: Driver, seeds: Sequence[int], progress: Progress = silent) -> xr.Dataset:
-    """Courses by the law as it grew, see :func:`chilopod.paper.courses.steps.steps`: the cases of
+    """Courses by each step of the law, see :func:`chilopod.paper.courses.steps.steps`: the cases of
     :func:`chilopod.paper.courses.study.driven` are its steps."""
     assert isinstance(variable.controller, SpringLaw)
     cases = [Case(name, replace(variable, controller=law)) for name, law in steps(variable.controller).items()]

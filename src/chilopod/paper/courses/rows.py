@@ -1,4 +1,4 @@
-"""Lines of the table on courses: measured, and nothing that the paper prints."""
+"""Lines of the table on courses: measured results, without printed ones."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def _film(context: Context, report: Progress, found: xr.Dataset | None) -> list[
 
 
 def best_fixed(data: xr.Dataset | None, otherwise: float) -> float:
-    """The best first spring for all of a course, N*mm/deg."""
+    """Best constant first spring for a course, N*mm/deg."""
     return otherwise if data is None else float(data.spring.sel(case=STRATEGIES["pitchfork"].name))
 
 

@@ -18,14 +18,14 @@ _DRAWN = 2000
 
 @dataclass(frozen=True)
 class Interval:
-    """A number and between which bounds it lies, as sure as :data:`LEVEL` says; NaN where nothing is known."""
+    """A number and the bounds of its interval at :data:`LEVEL`; NaN if unknown."""
 
     value: float
     low: float
     high: float
 
     def above(self, other: Interval) -> Answer:
-        """True if it lies above another, bounds and all; undecided where they overlap."""
+        """True if the whole interval lies above another; undecided if they overlap."""
         if self.low > other.high:
             return True
         return False if self.high < other.low else None
@@ -51,8 +51,8 @@ def wilson(successes: int, count: int) -> Interval:
 def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
     """Mean of the numbers that are not NaN, with the percentile interval of the bootstrap.
 
-    Groups, shape (groups,) or (groups, members), are independent and are drawn anew as a whole; members of one, as the
-    targets of one course, need not be.
+    Groups, shape (groups,) or (groups, members), are independent and are drawn anew as a whole. Members of a group,
+    as the targets of one course, may depend on each other.
     """
     table = np.asarray(values, dtype=np.float64)
     table = table.reshape(len(table), -1)

@@ -16,11 +16,11 @@ _ALL_THE_WAY = 1e9  # m: to the target, however far
 
 @dataclass(frozen=True)
 class InverseLaw(SpringLaw):
-    """The paper's k1-hat of the circle to the target, set anew in every gait cycle; a target that is not seen leaves
-    the spring as it is."""
+    """The paper's k1-hat of the circle to the target, set anew in every gait cycle. The spring stays as it is while
+    the target is not seen."""
 
     def spring(self, seen: Observation) -> Array:
-        """Stiffness of the first spring for what is seen, N*m/rad, shape (robots,)."""
+        """Stiffness of the first spring for an observation, N*m/rad, shape (robots,)."""
         curvature = 2.0 * np.sin(np.abs(seen.bearing)) / np.maximum(seen.distance, ARRIVAL_RADIUS)
         steady = np.clip(np.interp(curvature, self.curvatures, self.springs), self.softest, self.stiffest)
         return np.where(np.isnan(curvature), seen.stiffness[:, 0], steady)
@@ -28,13 +28,13 @@ class InverseLaw(SpringLaw):
 
 @dataclass(frozen=True)
 class EarlierLaw(SpringLaw):
-    """As the law, but it never straightens for a target within its tightest circle; it looks for a target that is not
-    seen if it ``searches``, else that leaves the spring as it is."""
+    """Law without straightening for a target within its tightest circle. Without ``searches`` the spring stays as it is
+    while the target is not seen."""
 
     searches: bool = True
 
     def spring(self, seen: Observation) -> Array:
-        """Stiffness of the first spring for what is seen, N*m/rad, shape (robots,)."""
+        """Stiffness of the first spring for an observation, N*m/rad, shape (robots,)."""
         # A circle that leads round no target.
         towards = SpringLaw.spring(replace(self, tightest=ARRIVAL_RADIUS), seen)
         lost = super().spring(seen) if self.searches else seen.stiffness[:, 0]
@@ -42,7 +42,7 @@ class EarlierLaw(SpringLaw):
 
 
 def steps(law: SpringLaw) -> Mapping[str, SpringLaw]:
-    """Laws from the first step to the given one, by the part that each adds to the one before."""
+    """Laws from the first step to the given one, by the name of the part that each adds."""
     circle = {each.name: getattr(law, each.name) for each in fields(SpringLaw)} | {"ahead": _ALL_THE_WAY}
     return {
         "the spring of the circle to the target, once a cycle": InverseLaw(**circle),

@@ -1,7 +1,7 @@
 """Strategies on the same courses: a spring that is set on the way, one spring for all, none, and torques at all joints.
 
 Courses are random, five targets each, and a course's seed is that of its disturbance too, so that strategies are
-compared pair by pair. A strategy that walks with one spring is given the best there is, found on other courses.
+compared pair by pair. A strategy with one constant spring gets the best one, found on other courses.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Case:
     disturbance: Disturbance = field(default_factory=Disturbance)
 
     def on(self, course: Course, seed: int) -> Trial:
-        """Its trial of a course."""
+        """Trial of a course."""
         return replace(self.driver.trial(course, seed, brief=True), disturbance=self.disturbance)
 
 
@@ -75,13 +75,13 @@ def driven(context: Context, cases: Sequence[Case], seeds: Sequence[int], progre
     Parameters
     ----------
     cases, seeds
-        In one engine, or in engines that have the same patience, and the seeds of the courses.
+        Drivers by name, all of the same patience, and seeds of the courses.
 
     Returns
     -------
     Dataset over (case, course, goal): ``arrived``, ``seconds`` (s), and, as in :func:`chilopod.steering.add_measures`,
     ``goal_path`` and ``goal_shortest`` (m), ``goal_effort`` (rad^2 s), ``goal_spring_work`` and ``goal_drive_work``
-    (J); over (course, goal): ``bearing`` (rad) and ``away`` (m) of the target when its turn comes.
+    (J); over (course, goal): ``bearing`` (rad) and ``away`` (m) of the target when it is put up.
     """
     engine = cases[0].driver.engine
     tiny = context.size is Size.TINY and engine != "planar"
@@ -120,10 +120,9 @@ def compared(context: Context, variable: Driver, plan: Plan, progress: Progress 
 
     Returns
     -------
-    As of :func:`driven`, the cases being :data:`chilopod.steering.ON_COURSES`, with their ``spring`` (N*mm/deg, NaN for
-    those that have none to choose) and ``cost``, the steering cost of transport of all courses; and over (tried): which
-    ``tried_spring`` (N*mm/deg) of which ``tried_case`` reached which share of the targets of other courses
-    (``tried_arrived``).
+    Dataset of :func:`driven` with :data:`chilopod.steering.ON_COURSES` as cases, with their ``spring`` (N*mm/deg, NaN
+    without one to choose) and ``cost``, the steering cost of transport of all courses. Over (tried): ``tried_case``,
+    ``tried_spring`` (N*mm/deg), and ``tried_arrived``, the share of reached targets of other courses.
     """
     robot = robot_of(context, variable)
     tried = [(name, float(spring)) for name, springs in plan.springs.items() for spring in springs]

@@ -52,8 +52,8 @@ class Summary:
 
 
 def titled(name: str, spring: float) -> str:
-    """Title of a strategy: its name, or the spring (N*mm/deg) that it walks with. On courses the best spring of a
-    strategy may lie on either side of the bifurcation that it is named for."""
+    """Title of a strategy: its name, or its spring (N*mm/deg), which may lie on either side of the bifurcation of
+    that name."""
     strategy = ON_COURSES[name]
     if strategy.springs is None or np.isnan(spring):
         return name
@@ -99,7 +99,7 @@ def share_of_courses(arrived: xr.DataArray) -> Interval:
 
 
 def _reached(one: xr.Dataset, name: str) -> Array:
-    """Over (course, goal), NaN where the target was not reached."""
+    """Values over (course, goal), NaN where the target was not reached."""
     values = one[name].where(one.arrived > 0.5)
     return np.asarray(values.transpose("course", "goal").values)
 

@@ -25,17 +25,17 @@ from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
 
 AGREEMENT_SPRINGS = (8.0, 10.0, 11.0)
-"""N*mm/deg, where trials without spread of friction are held against the branch."""
+"""Springs of the trials without spread of friction that are compared with the branch, N*mm/deg."""
 
 TINY_SPRINGS = (7.0, 8.5, 10.0, 41.0)
-"""N*mm/deg: as wide a range as in earnest."""
+"""Springs of a tiny report, N*mm/deg, over the full range."""
 
 _NARROWEST, _WIDEST = 1e-4, 0.4  # of the critical spring, ranges that the law is fitted over along the branch
 
 
 @dataclass(frozen=True)
 class CurvedStudy:
-    """Everything the trials of curved walks found."""
+    """Results of the trials of curved walks."""
 
     trials: xr.Dataset  # see :func:`chilopod.paper.curved.trials.curved_trials`
     examples: xr.Dataset  # see :func:`chilopod.paper.measures.example_walks`
@@ -113,8 +113,8 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     Dataset over softest (the softest spring fitted, N*mm/deg): ``critical_k1``, its ``error`` and ``bootstrap_error``
-    (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, what the fit gives if every trial is
-    replaced by the exact walk of its spring: the part of being off that no repeating cures, and ``trials``.
+    (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, the fit with every trial replaced by
+    the exact walk of its spring (its error does not shrink with repeats), and ``trials``.
     """
     curved = trials.isel(spring=is_curved(trials).any(axis=1))
     softest, rows = curved.spring.values[:-1][::-1], []
@@ -169,7 +169,7 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
     Returns
     -------
     Dataset over variant and ratio (of k1 to the variant's own critical one): ``fitted_k1`` with its ``error`` (of the
-    bootstrap), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1``, up to which curved walks exist (above
+    bootstrap), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1`` of the curved walks (above
     ``exact_k1`` where the branch folds back), all in N*mm/deg; ``criticality``; ``radius`` with ``radius_error``, mean
     and standard error over the trials that settled on a curved walk (m; NaN where there are fewer than two);
     ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios; ``equal_spring``, over that

@@ -4,8 +4,8 @@ The paper walks its robot at k1 = 15, 17, 21, 28, 41 and 75 N*mm/deg, from 0.44 
 the curved walk set in. In the planar model that happens at 12.0, and a joint passes a right angle below about 0.55
 times that, so the springs here are spread about 12, denser where the bend grows steeply.
 
-A bend grows from nothing at the rate of the straight walk's leading exponent, 0.06/s at 10 N*mm/deg and a quarter of
-that at 11.5: every trial walks for a number of e-folds of it, and says whether it had settled by then.
+A small bend grows at the rate of the straight walk's leading exponent, 0.06/s at 10 N*mm/deg and a quarter of that at
+11.5. Every trial walks for a number of e-folds of this rate; ``settled`` tells whether it had settled by then.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ EXAMPLES = (41.0, 8.0)
 """k1 of the two walks that are shown over time, N*mm/deg: straight, and about as far below the point as the paper's."""
 
 BEFORE = 30.0
-"""s; the mean over so long before that tells whether they had settled."""
+"""Duration of the mean before that one, s; their difference decides whether a walk had settled."""
 
 SETTLED = 0.01
 """Largest change between those two means, relative to the largest joint angle."""
 
 STRAIGHT = float(np.deg2rad(0.1))
-"""Below this mean angle of every joint a walk is called straight."""
+"""Largest mean angle of any joint of a straight walk."""
 
 _E_FOLDS = 15.0  # growth from half a degree takes some 6, and a bend settles twice as fast as it grew
 _SHORTEST, _LONGEST = 180.0, 1200.0  # s
@@ -62,7 +62,7 @@ def curved_trials(
     folder: Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Walks from straight on, several at every spring (N*mm/deg, rising), and the bend that each ends in.
+    """Walks that start straight, several at every spring (N*mm/deg, rising), and their bends at the end.
 
     A trial walks for a number of e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
     at most. All have seeds of their own, and by default the disturbance of all studies.
@@ -95,8 +95,8 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     """Distance of the final walks from the branch's periodic orbit with the same spring.
 
     The orbit is solved anew at every spring, from the points beside it of a branch that turns right; a left turn is
-    compared with the mirror image of the right one half a period later. The trials, from :func:`curved_trials`, are
-    without spread of friction, which the branch does not have.
+    compared with the mirror image of the right one half a period later. The trials, from :func:`curved_trials`,
+    have no spread of friction, as the branch has none.
 
     Returns
     -------
@@ -121,8 +121,8 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
 def on_branch(branch: xr.Dataset, name: str, spring: float | Array) -> Array:
     """A quantity of the branch at a spring, or many (N*mm/deg), between its points, beyond the stiffest of them.
 
-    That is the pitchfork, or the fold at which a subcritical branch turns back; either way angles change with the root
-    of the distance from it, and from there on the walks are stable until something else happens.
+    The stiffest point is the pitchfork, or the fold at which a subcritical branch turns back. Near it angles change
+    with the root of the distance from it; softer walks are stable up to the next bifurcation.
     """
     beyond = branch.isel(point=slice(int(branch.parameter.values.argmax()), None))
     stiffest = float(beyond.parameter.values[0])
@@ -137,8 +137,8 @@ def variant_trials(
 ) -> dict[str, xr.Dataset]:
     """Trials of the paper's variants, by name, at the same springs relative to each one's own pitchfork.
 
-    ``base`` are trials of the robot as built, from :func:`curved_trials`, of which the first so many repeats at springs
-    up to 1.2 times the critical one are used.
+    ``base`` are trials of the robot as built, from :func:`curved_trials`. The first ``repeats`` of them are used, at
+    springs up to 1.2 times the critical one.
     """
     ratios = base.spring.values / base.attrs["critical_k1"]
     ratios = ratios[ratios < 1.2]

@@ -1,4 +1,4 @@
-"""The figure that the page begins with: bends of planar model, twin and robot over the first spring, on one axis."""
+"""First figure of the page: bends of planar model, twin and robot over the first spring, on one axis."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LOOKS: Final[dict[str, dict[str, Any]]] = {
 
 
 def pitchfork(robot: Robot, curved: CurvedStudy | None, walks: RobotWalks | None) -> Panel:
-    """Signed bend over k1/k1* of the trials that there are, of the exact walks and of the paper's robot."""
+    """Signed bend over k1/k1* of trials, exact walks and the paper's robot."""
     columns, points = _paper(robot), [("the paper's robot", printed.ONSET.value)]
     if curved is not None:
         exact = float(curved.trials.attrs["critical_k1"])
@@ -83,7 +83,7 @@ def _trials(data: xr.Dataset, critical: float, what: str) -> dict[str, Any]:
 
 
 def _branch(branch: xr.Dataset, critical: float) -> dict[str, Any]:
-    """Bends of the exact walks to the right, and whether they are stable."""
+    """Bends of the exact walks to the right, and mask of the stable ones."""
     columns = _columns("branch", branch.parameter.values / critical, np.abs(branch.mean_angle.values).sum(axis=-1))
     return {**columns, "branch_stable": ("branch", branch.stable.values.astype(int))}
 

@@ -1,4 +1,4 @@
-"""The page: everything in one HTML file that needs nothing else."""
+"""Page of the report: one HTML file that needs no other file."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Shown:
 
 
 class State(Enum):
-    """State of a report: still computed, complete, or stopped before it was."""
+    """State of a report: still computed, complete, or stopped early."""
 
     RUNNING = "running"
     DONE = "done"
@@ -99,11 +99,11 @@ def page(
     plan: str = "",
     headline: Drawn | None = None,
 ) -> str:
-    """The page as HTML, which takes in what is new while it is running.
+    """The page as HTML, which loads new results while the report is running.
 
-    It begins with the figure ``headline``. Figures of the robot itself open the first chapter; figures and films drawn
-    so far stand in their chapters, those with a letter first. Sections failed, or are waiting to be computed or drawn.
-    Commands call this robot ``robot_file``: a preset, or the path of a file.
+    It begins with the figure ``headline``. Figures of the robot itself open the first chapter. Figures and films drawn
+    so far stand in their chapters, those with a letter first. Other sections have failed, or wait. ``robot_file`` is
+    the name of the robot in commands: a preset, or the path of a file.
     """
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
@@ -143,7 +143,7 @@ def page(
 
 
 def _first(films: Sequence[Film]) -> Film | None:
-    """The film that the page begins with: of the robot in three dimensions, if there is one."""
+    """First film of the page: that of the robot in three dimensions, if there is one."""
     return next(
         (film for film in reversed(films) if film.pictured), next((film for film in films if film.encoded), None)
     )
@@ -189,7 +189,7 @@ def _embedded(svg: bytes) -> str:
 
 
 def _robots(results: Found) -> list[dict[str, Any]]:
-    """The robots of the report, with the files their numbers stand in."""
+    """Robots of the report, with the files of their numbers."""
     found = [("The robot of the planar model", results.context.robot, "robot.toml")]
     if any(row.twin for row in results.robot_rows()):
         found.append(("The robot in three dimensions", results.context.whole, "robot-3d.toml"))

@@ -1,4 +1,4 @@
-"""The folder of a report: its page, which is there at once and fills in as sections are computed, and its films."""
+"""Folder of a report: its page, which appears at once and fills as sections are computed, and its films."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ _NEWS, _BETWEEN_NEWS = "news.js", 3.0  # s
 
 
 class Report:
-    """A page that opens from disk and shows all figures without any other file, whole at any time.
+    """Page that opens from disk, needs no other file, and is complete HTML at any time.
 
     Beside ``index.html`` there are ``figures/NAME.png`` and ``.svg``, ``data/NAME.csv`` and ``.nc`` for every figure,
     ``movies/NAME.mp4`` and ``.html``, and ``data/robot.toml`` and ``robot-3d.toml``. Files of these names are replaced,
-    each as a whole. Where films cannot be encoded, the replays are there without them.
+    each as a whole. If films cannot be encoded, there are replays only.
 
-    Used as a context: the page is there as soon as it is entered, and complete when it is left. While it fills in,
-    ``news.js`` says that there is more. Figures are drawn in a thread beside the computation of the next section, and
-    ``progress`` receives the fraction drawn. The page begins with ``plan``, see :func:`chilopod.paper.duration.plan`.
-    The folder is created where there is none.
+    As a context manager it writes the page on entry and completes it on exit. Meanwhile ``news.js`` announces new
+    results. Figures are drawn in a thread beside the computation of the next section, and ``progress`` receives the
+    fraction drawn. The page begins with ``plan``, see :func:`chilopod.paper.duration.plan`. It creates a missing
+    folder.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class Report:
     ) -> None:
         self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
-        """Why sections could not be computed or drawn."""
+        """Reasons of sections that could not be computed or drawn."""
         self._sections, self._progress, self._plan = sections, progress, plan
         self._found = Found(context)
         self._opening: list[Drawn] = []
@@ -103,7 +103,7 @@ class Report:
                 (self.page.parent / _NEWS).unlink()
 
     def _tell(self) -> None:
-        """Say every few seconds in a file beside the page which page it is, and that the computation goes on."""
+        """Write every few seconds the number of the page, and that the computation goes on, into a file beside it."""
         told = False
         while not told:
             with suppress(OutputError):
@@ -111,12 +111,12 @@ class Report:
             told = self._over.wait(_BETWEEN_NEWS)
 
     def add(self, found: Found, sections: Collection[Section[Any]]) -> None:
-        """Show sections that were computed, or that failed; returns at once."""
+        """Show sections that were computed or failed; return at once."""
         self._added += 1
         self._thread.submit(self._add, found.copy(), sections)
 
     def _open(self) -> None:
-        """Draw the robot, which needs nothing computed."""
+        """Draw the robot, which needs no computation."""
         panel = schematic.panel(self._found.context.robot)
         self._opening = [_again(partial(self._draw_panel, panel))]
         self._draw_headline(self._found, self._sections)
@@ -142,7 +142,7 @@ class Report:
             self._write_if_possible()
 
     def _draw_headline(self, found: Found, sections: Collection[Section[Any]]) -> None:
-        """Draw the figure that the page begins with, if some sections have to do with it."""
+        """Draw the first figure of the page, if some of the sections belong to it."""
         if CURVED in sections or WALKS in sections:
             panel = pitchfork(found.context.robot, found[CURVED], found[WALKS])
             self._headline = _again(partial(self._draw_panel, panel))
@@ -194,7 +194,7 @@ class Report:
 
 
 def write_report(found: Found, folder: str | Path) -> Path:
-    """Draw all that was found and write its page, see :class:`Report`; returns the path of the page."""
+    """Draw all results and write the page, see :class:`Report`; return the path of the page."""
     sections = [*found.values, *found.failures]
     with Report(sections, found.context, folder) as report:
         report.add(found, sections)
@@ -205,7 +205,7 @@ def write_report(found: Found, folder: str | Path) -> Path:
 
 
 def _again(draw: Callable[[], T]) -> T:
-    """Draw, and once more if the folder was deleted meanwhile."""
+    """Draw; draw again if the folder was deleted meanwhile."""
     try:
         return draw()
     except OutputError:
@@ -217,11 +217,11 @@ def _is_preset(robot: Robot) -> bool:
 
 
 def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *, replace: bool = False) -> None:
-    """Make sure, before any work is done for it, that a report of some sections and size can be written into a folder;
-    one that has no more is resumed.
+    """Check, before any work, that a report of some sections and size can be written into a folder; an existing report
+    with no more sections is resumed.
 
-    An OutputError if the folder cannot be written, or if there is a page that is no report, a report that has more, or
-    files beside which there is no page, unless these may be replaced.
+    Raises an OutputError if the folder cannot be written. Raises one too for a page that is not a report, a report with
+    more sections, or files without a page, unless these may be replaced.
     """
     page = folder / "index.html"
     held = _held(page)

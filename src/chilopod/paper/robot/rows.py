@@ -52,7 +52,7 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
 
 
 def _spring(statement: Statement[Band], twin: tuple[float, float], reading: str = "") -> OfTwin:
-    """A spring (N*mm/deg) that is to be near the paper's; NaN if the trials determine none, or no error."""
+    """Spring (N*mm/deg) beside the paper's; NaN if the trials determine no spring, or no error."""
     value, error = twin
     off = f"{with_error(value, error, 1)} {PAPER_UNIT} ({100.0 * (value / statement.said.middle - 1.0):+.0f} %)"
     words = off if np.isfinite(value) else "not determined by trials"
@@ -73,7 +73,7 @@ def _curved(base: xr.Dataset) -> OfTwin:
 
 
 def _most(base: xr.Dataset, what: str, springs: tuple[float, ...]) -> tuple[str, bool]:
-    """Numbers of curved or straight walks at some springs, in words, and True if they are most at each spring."""
+    """Numbers of curved or straight walks at some springs, in words; True if they are the majority at each spring."""
     share, repeats = shares(base)[what].sel(spring=list(springs)).values, base.sizes["repeat"]
     pairs = zip(springs, repeats * share, strict=True)
     counts = ", ".join(f"{count:.0f} of {repeats} at {spring:g}" for spring, count in pairs)
@@ -131,7 +131,7 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
 
 
 def duration_rows(data: xr.Dataset) -> list[OfTwin]:
-    """Quantities of :func:`chilopod.paper.robot.walks.by_duration`, and whether they hang on how long walks last."""
+    """Quantities of :func:`chilopod.paper.robot.walks.by_duration`, and their dependence on the duration of walks."""
     answers = [printed.ONSET.answer(*pair) for pair in zip(data.onset.values, data.onset_error.values, strict=True)]
     values = f"{_numbers(data.onset.values, 1)} {PAPER_UNIT}"
     rows = [_duration_row(data, statements.ONSET_BY_DURATION, values, answers)]
@@ -204,7 +204,7 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
 
 
 def _became(criteria: xr.Dataset, task: Task) -> bool:
-    """True if that becomes of a task at the paper's own springs, or between two that miss to either side."""
+    """True if a task has the outcome at the paper's own springs, or between two that miss to either side."""
     outcomes, k_hat = springs_by_outcome(criteria), task.k_hat.value
     if not task.outcomes:
         return bool(outcomes[Outcome.OUTSIDE] and outcomes[Outcome.INSIDE]) and k_hat in outcomes[Outcome.ARRIVED]
@@ -213,6 +213,6 @@ def _became(criteria: xr.Dataset, task: Task) -> bool:
 
 
 def _needs_leg_yaw(walks: LegYaw) -> bool:
-    """True if many fail without leg yaw, and none with it."""
+    """True if many walks fail without leg yaw, and none with it."""
     (few, without), (many, with_) = arrivals(walks.alone), arrivals(walks.helped)
     return few <= without // 2 and many == with_

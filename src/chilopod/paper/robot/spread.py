@@ -1,8 +1,8 @@
 """Spread of the twin's predictions: the same predictions by other sets of constants that fit as well.
 
-``twin_fits.json`` holds what ``chilopod identify twin`` found: the sets of constants that meet the base series within
-its tolerance. Those that differ most from each other predict what the paper prints of other experiments, each with few
-and undisturbed walks.
+``twin_fits.json`` holds the results of ``chilopod identify twin``: sets of constants that meet the base series within
+its tolerance. The most different ones predict the printed results of other experiments, each with few undisturbed
+walks.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
 TASK_SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0)
 UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0)
 COUNT = 6
-"""Sets of constants that predict, the preset's among them."""
+"""Number of sets of constants that predict, with the preset's."""
 
 LOWER = ", lower steps"
-"""Suffix of a variant's name: its steps are as much lower as they are shorter."""
+"""Suffix of a variant's name with steps lowered in proportion to their length."""
 
 _DURATION = 60.0  # s
 _BENT = 0.8  # rad in all, that walks begin with
@@ -51,9 +51,9 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
     -------
     Dataset over set (0 the preset's): the constants (SI; ``unit`` is the unit of the robot file) by path over
     ``constant``, ``misfit``, and predictions: over variant ``onset`` (N*mm/deg, NaN where walks determine none;
-    ``paper`` what is printed) and ``radius`` (over that as built, at an equal distance from each one's own onset),
+    ``paper`` as printed) and ``radius`` (over that as built, at an equal distance from each one's own onset),
     ``uniform`` (N*mm/deg), and over task ``best``, the spring that comes nearest to the target (N*mm/deg), and
-    ``arrives``, whether that arrives.
+    ``arrives``, True if its walk arrives.
     """
     robot, folder, size = context.whole, context.folder, context.size
     fits = unlike(known(), size.of(COUNT, 2, 1))
@@ -91,13 +91,13 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
 
 
 def printed_number(reading: str) -> printed.Number:
-    """Where the paper's curved walks of a variant, in one of its readings, set in."""
+    """Onset of the paper's curved walks of a variant in one of its readings."""
     return printed.onset(reading.removesuffix(LOWER))
 
 
 def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size: Size = Size.FULL) -> dict[str, Any]:
-    """Where curved and undulating walks set in other than in the base series, and how tight they are, by few and
-    undisturbed walks, which begin bent.
+    """Onsets of curved and undulating walks outside the base series, and their radii, by few undisturbed walks, which
+    begin bent.
 
     By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
     NaN where walks determine none; and ``uniform``.
@@ -126,8 +126,8 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
 
 
 def nearest_springs(robot: Robot, folder: Folder = None, size: Size = Size.FULL) -> dict[str, dict[str, Any]]:
-    """For each of the paper's tasks the spring that comes ``best``, nearest to the target (N*mm/deg), undisturbed, and
-    whether it ``arrives``."""
+    """For each of the paper's tasks ``best``, the spring that comes nearest to the target undisturbed (N*mm/deg), and
+    ``arrives``, True if its walk arrives."""
     found: dict[str, dict[str, Any]] = {"best": {}, "arrives": {}}
     springs, duration = size.cut((TASK_SPRINGS, TASK_DURATION), (TASK_SPRINGS[::3], 2.0))
     same: dict[str, Any] = {"duration": duration, "disturbance": NONE, "rate": 20.0, "engine": "twin"}

@@ -1,10 +1,9 @@
 """Other structures of the robot: changes to the twin, each with its constants fitted anew.
 
-A twin that meets the base series with one structure may do so with another, and predict something else. Here each of
-some structures is given to the preset, its constants are moved by least squares until it meets the base series again
-(one law of the residuals, measured by differences at the preset, serves all), and what it then predicts is set beside
-what the paper prints. That says which structures the paper's numbers speak for or against, and how firmly: a change of
-2 in chi squared is nothing, one of 10 is a lot.
+Twins of several structures may meet the base series and predict different results. Here the preset gets each of some
+structures, and least squares move its constants until it meets the base series again. All structures share one
+derivative of the residuals, measured by differences at the preset. The predictions are then compared with the printed
+results, by chi squared: a change of 2 decides nothing, a change of 10 speaks clearly for or against a structure.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ PHASE, UNIFORM = "module phase 180 deg", "all springs alike"
 """Names of the variants, and of the predictions."""
 
 TOLERANCE = 0.05
-"""Tolerance of a printed onset, relative: half of what the report calls agreeing; what chi squared counts in."""
+"""Tolerance of a printed onset, relative: half of the report's; unit of the residuals in chi squared."""
 
 _STEP = 0.06  # of a constant's range, for differences: where walks change evenly
 _ROUNDS, _MET = 5, 0.7  # steps at most, and misfit at which that ends
@@ -109,8 +108,8 @@ HEAVY_FRONT = twin.Edited("heavy front", _heavy_front)
 
 @dataclass(frozen=True)
 class Structure:
-    """Structure that the robot could have, in a word and a sentence: overrides of the robot's description, as ``--set``
-    takes them, or the name of an engine in this module, if a robot file cannot say it."""
+    """Structure that the robot could have: a word, a sentence, and overrides as for ``--set``, or the name of an engine
+    in this module if a robot file cannot express it."""
 
     name: str
     sentence: str
@@ -139,11 +138,11 @@ STRUCTURES = (
     Structure("slow commands", "every 10 ms instead of 2", ("twin.control_interval=0.01 s",)),
     Structure("slow scanner", "a scan in 0.5 s instead of 0.1", ("twin.scanner_period=0.5 s",)),
 )
-"""Structures that are tried, the robot as it is first."""
+"""Structures that are tried; the first is the robot as it is."""
 
 
 def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
-    """Predictions by other structures, with their constants fitted anew; if tiny, by one, whose constants are not.
+    """Predictions by other structures, with constants fitted anew; if tiny, by one with the preset's constants.
 
     Returns
     -------

@@ -24,13 +24,13 @@ HOPF_SPRINGS = (8.7, 11.0, 15.0, 21.0, 41.0)
 """All springs, of the strategy by Hopf bifurcation, N*mm/deg: the paper's."""
 
 TASK_DURATION = 1.5 * DURATION
-"""s: the paper does not print how long its tasks last, but longer than the earliest arrival of any of its robots; half
-as long again lets a robot that is as fast arrive, or pass the target."""
+"""Duration of the tasks, s. The paper prints the earliest arrival only; in 1.5 times this time a robot of the same
+speed arrives, or passes the target."""
 
 
 @dataclass(frozen=True)
 class RobotTurning:
-    """Results of the paper's tasks, by letter, of task A with uniform springs (None if that is left out), and of task A
+    """Results of the paper's tasks, by letter, of task A with uniform springs (None if left out), and of task A
     with and without leg yaw at the paper's spring."""
 
     robot: Robot

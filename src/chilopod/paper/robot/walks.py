@@ -33,15 +33,15 @@ UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0, 18.0, 21.0, 30.0)
 """All springs together, N*mm/deg."""
 
 SWINGING = 15.0
-"""N*mm/deg: of the paper's uniform springs, those up to here are on the soft side of its Hopf point."""
+"""Stiffest of the paper's uniform springs on the soft side of its Hopf point, N*mm/deg."""
 
 REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS = 10, 5, 3
 
 SHORTER = (20.0, 30.0, 40.0, 60.0)
-"""s, after which the base series is judged besides: the paper does not say how long its trials last."""
+"""Further durations of the base series, s, as the paper does not print the duration of its trials."""
 
 UNIFORM_DURATION = 60.0
-"""s, of walks with all springs alike, which settle sooner."""
+"""Duration of walks with all springs alike, which settle sooner, s."""
 
 _RATE = 50.0
 _EXAMPLES = (41.0, 15.0)
@@ -68,7 +68,7 @@ class RobotWalks:
 
 
 def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
-    """All walks of the paper by the whole robot; if quick, those of the base series, all of them."""
+    """All walks of the paper by the whole robot; if quick, those of the base series only."""
     robot, folder, size = context.whole, context.folder, context.size
     quick = size is Size.QUICK
     repeats, fewer, fewest = size.cut((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (1, 1, 1))
@@ -97,7 +97,7 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
 
 
 def lower_steps(robot: Robot, variant: Robot) -> Robot:
-    """A variant with another stride whose swing clearance is in proportion to the stride, as the robot has it."""
+    """Variant of another stride, with the swing clearance in proportion to the stride."""
     part = variant.gait.stride / robot.gait.stride
     return variant.with_value("twin.clearance", part * robot.get("twin.clearance"))
 
@@ -105,7 +105,7 @@ def lower_steps(robot: Robot, variant: Robot) -> Robot:
 def walk_records(
     robot: Robot, springs: Sequence[float] = SPRINGS, repeats: int = REPEATS, *, duration: float = DURATION, **walk: Any
 ) -> list[xr.Dataset]:
-    """Records of walks of the twin from straight on, all with seeds of their own."""
+    """Records of walks of the twin that start straight, each with a seed of its own."""
     seeds = measures.spring_seeds(springs)
     return measures.spring_walks(
         robot, springs, duration, repeats=repeats, seeds=seeds, rate=_RATE, engine="twin", **walk
@@ -115,9 +115,8 @@ def walk_records(
 def walk_ends(
     records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float], duration: float | None = None
 ) -> xr.Dataset:
-    """Numbers that walks of :func:`walk_records` come to at their ends, or where they are cut, ``duration`` (s) after
-    the start, over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of
-    each."""
+    """Results of :func:`chilopod.tasks.radius_law.end_of_walk` for walks of :func:`walk_records`, at their ends or
+    ``duration`` (s) after the start, over spring (N*mm/deg), repeat and joint."""
     last = float(records[0].time[-1]) if duration is None else duration
     ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
     data = measures.by_spring(ends, springs)
@@ -126,7 +125,7 @@ def walk_ends(
 
 
 def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float]) -> xr.Dataset:
-    """Numbers of the walks of :func:`walk_records`, had they ended earlier.
+    """Results of the walks of :func:`walk_records` after shorter durations.
 
     Returns
     -------
@@ -169,9 +168,9 @@ def undulations(
     Returns
     -------
     Dataset over spring (N*mm/deg) and repeat: ``amplitude``, root mean square of the joint angles, averaged over gait
-    cycles, about their mean over the last 24 s (rad), and ``status``; attributes ``critical_k``, where by a square-root
-    fit to those at most :data:`SWINGING` the undulation sets in, and ``critical_k_error``, its standard error by the
-    bootstrap; NaN if they determine no point.
+    cycles, about their mean over the last 24 s (rad), and ``status``; attributes ``critical_k``, the onset of the
+    undulation by a square-root fit to springs up to :data:`SWINGING`, and ``critical_k_error``, its standard error by
+    the bootstrap; NaN if they determine no point.
     """
     wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(robot.body.modules - 1) * np.pi / 2.0))
     walk: dict[str, Any] = {"joint_angles": wave, "engine": engine, "rate": _PER_CYCLE / robot.gait.period}

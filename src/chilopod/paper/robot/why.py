@@ -1,13 +1,14 @@
-"""Why the robot bends at 34 and the planar model says 12: from the planar model's assumptions to the twin's.
+"""Reasons why the robot bends at 34 and the planar model at 12: steps from the planar model's assumptions to the
+twin's.
 
-The twin has a planar limit: legs as stiff as the step allows that lift their feet high and put them down on the point,
-and feet that never reach the Coulomb limit, so that the floor's hold on them is a viscous one with the coefficient of
-the planar model (see :mod:`chilopod.twin.creep`). There the two engines have to agree. Each :class:`Factor` then takes
-one assumption back. Factors are switched on alone in the planar limit, switched off alone in the twin, and switched on
-one after the other.
+The twin has a planar limit. Its legs are as stiff as the step allows, lift their feet high and put them down on the
+point. Its feet never reach the Coulomb limit, so the floor resists them like a viscous one with the coefficient of the
+planar model (see :mod:`chilopod.twin.creep`). There the two engines have to agree. Each :class:`Factor` then removes
+one assumption. Factors are switched on alone in the planar limit, switched off alone in the twin, and switched on one
+after the other.
 
-The measure is the paper's: where curved walks set in by a square-root fit to the bend of joint 1. That the engines
-agree in the planar limit is held to a finer one: how fast a bend of one degree grows, and where that changes sign.
+The measure is the paper's: the onset of curved walks by a square-root fit to the bend of joint 1. The agreement of
+the engines in the planar limit has a finer one: the spring at which the growth rate of a bend of 1 deg changes sign.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from chilopod.twin.creep import foot_creep
 from chilopod.twin.legs import twin_of
 
 SPRINGS = (7.0, 10.0, 15.0, 22.0, 33.0, 50.0)
-"""k1 that is tried first, N*mm/deg."""
+"""First springs k1 that are tried, N*mm/deg."""
 
 PLANAR = {
     "twin.sliding_friction": 1000.0,
@@ -59,7 +60,7 @@ FINER = {
     "twin.control_interval": 0.001,
     "twin.timestep": 2e-4,
 }
-"""A planar limit that is nearer still, at 2.5 times the work."""
+"""Planar limit with smaller remaining differences, at 2.5 times the work."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ FACTORS = (
         ("twin.link_mass", "twin.foot_radius", "twin.contact_time"),
     ),
 )
-"""In the order in which they are switched on one after the other."""
+"""Factors, in the order in which they are switched on one after the other."""
 
 _BEND = float(np.deg2rad(1.0))
 _DURATION, _SKIPPED = 18.0, 6.0  # s
@@ -113,7 +114,7 @@ def _limit(robot: Robot, planar: Robot, constants: Mapping[str, float]) -> Robot
 
 
 def with_grip(robot: Robot, coefficient: float) -> Robot:
-    """The robot with feet that creep like viscous ones of a coefficient, N*s/m; it is in proportion to impratio."""
+    """Robot whose feet creep with a coefficient, N*s/m, which is proportional to ``impedance_ratio``."""
     ratio = robot.get("twin.impedance_ratio")
     return robot.with_value("twin.impedance_ratio", ratio * coefficient / foot_creep(robot).across)
 
@@ -157,8 +158,8 @@ def sign_change(springs: ArrayLike, growth: Array) -> float:
 
 
 def onset(robot: Robot, folder: Folder = None, size: Size = Size.FULL) -> float:
-    """Where curved walks set in, N*mm/deg, by the paper's method: the square-root fit to the bend of joint 1 of walks
-    that begin bent; over the three stiffest springs that curve, then over three beside the point that these give.
+    """Onset of curved walks, N*mm/deg, by the paper's method: the square-root fit to the bend of joint 1 of walks that
+    begin bent. The first fit is over the three stiffest springs that curve, the second over three beside its point.
 
     Infinite if walks curve at the stiffest spring tried, NaN if at fewer than two, or if their bends point beyond it.
     If not full, without the second fit.
@@ -210,8 +211,8 @@ def limit_point(
     folder: Folder = None,
     duration: float = _DURATION,
 ) -> float:
-    """Where a small bend neither grows nor dies out in the planar limit, N*mm/deg: what the planar model calls its
-    pitchfork; NaN if nowhere near that."""
+    """Spring at which a small bend neither grows nor dies out in the planar limit, N*mm/deg, near the planar model's
+    pitchfork; NaN if there is none."""
     springs = [round(part * pitchfork(planar, normal_form=False).value, 2) for part in (0.95, 1.05)]
     return sign_change(springs, growth(planar_limit(robot, planar, constants), springs, folder, duration))
 
@@ -226,9 +227,9 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
     -------
     Dataset over factor: ``alone``, the point in the planar limit with only this one (N*mm/deg); ``without``, in the
     twin without it; ``path``, with it and all before it. Infinite where walks curve at all springs tried, NaN where at
-    none. Attributes: ``limit`` and ``twin``, the same with none and all; ``vouched`` and ``exact``, the points of the
-    planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep
-    coefficient, and ``viscous``, the planar model's (N*s/m).
+    none. Attributes: ``limit`` and ``twin``, the point without factors and with all; ``vouched`` and ``exact``, the
+    points of the planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep coefficient,
+    and ``viscous``, the planar model's (N*s/m).
     """
     robot, planar, folder, size = context.whole, context.robot, context.folder, context.size
     names = [factor.name for factor in FACTORS]
@@ -259,13 +260,13 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
 
 
 def _shape(robot: Robot) -> Array:
-    """Shape of the bend that is started with."""
+    """Shape of the bend at the start."""
     mode = np.array(printed.mode_shape(robot))
     return mode / np.linalg.norm(mode)
 
 
 def rows(data: xr.Dataset) -> list[OfTwin | OfPlanar]:
-    """The line of the robot's table: whether the engines vouch for each other."""
+    """Line of the robot's table on the agreement of the engines in the planar limit."""
     point, exact = data.attrs["vouched"], data.attrs["exact"]
     words = f"{point:.2f} {PAPER_UNIT} ({100.0 * (point / exact - 1.0):+.1f} %, without an error)"
     return [

@@ -1,1 +1,1 @@
-"""The straight walk and where it bends."""
+"""The straight walk and its bifurcations."""

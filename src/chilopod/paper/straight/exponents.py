@@ -26,7 +26,7 @@ _STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "marke
 
 
 def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
-    """The exponents over k1; the crossing is the located pitchfork where it is there."""
+    """Exponents over k1; the crossing is the located pitchfork if there is one."""
     critical = _critical(data)
     value = None if critical is None else _crossing(data, critical) if mode is None else mode.attrs["value"]
     count = data.sizes["exponent"]
@@ -78,7 +78,7 @@ def _critical(data: xr.Dataset) -> int | None:
 
 
 def _crossing(data: xr.Dataset, critical: int) -> float:
-    """Where the curve passes zero, read off between the values of the sweep."""
+    """Zero of the curve, interpolated between the values of the sweep."""
     real = data["real"].values[:, critical]
     after = int(np.flatnonzero(real > 0.0)[0])
     beside = slice(after - 1, after + 1)
@@ -86,8 +86,8 @@ def _crossing(data: xr.Dataset, critical: int) -> float:
 
 
 def _joined(data: xr.Dataset) -> tuple[Array, Array, Array]:
-    """k1, real and imaginary parts of the curves, with the points where two of them meet and part filled in: straight
-    lines between two values of the sweep would cut the corner there."""
+    """k1, real and imaginary parts of the curves, with added points where two of them meet and part, as straight lines
+    between two values of the sweep would cut the corner there."""
     values, logs = data["real"].values + 1j * data["imaginary"].values, np.log(data.k1.values)
     rows, at = [values[:1]], [logs[:1]]
     for index, (start, end) in enumerate(zip(values[:-1], values[1:], strict=True)):
@@ -231,7 +231,7 @@ def _back_to_front(count: int, lead: int) -> list[int]:
 
 
 def _arrow(axes: Axes, x: Array, y: Array, share: float, color: str) -> None:
-    """Draw an arrow head on a curve after some share of its length as it is seen, if it is long enough to be seen."""
+    """Draw an arrow head on a curve, after a share of its visible length, unless the curve is too short."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     steps = np.hypot(np.diff(x) / (right - left), np.diff(y) / (top - bottom))
     length = np.concatenate([[0.0], np.cumsum(steps)])

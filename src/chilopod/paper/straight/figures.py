@@ -95,7 +95,7 @@ def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
 
 
 def _broken(name: str) -> str:
-    """A name on two lines, the second of which begins with the value, if there is one: "stride" over "1.8 cm"."""
+    """Name on two lines; the second line begins with the value, if there is one: "stride" over "1.8 cm"."""
     words = name.split()
     cut = next((index for index, word in enumerate(words) if word[0].isdigit()), len(words))
     return "\n".join(" ".join(part) for part in (words[:cut], words[cut:]) if part)
@@ -259,7 +259,7 @@ def _bent_body(axes: Axes, components: np.ndarray) -> None:
 
 
 def uniform(data: xr.Dataset) -> Panel:
-    """Panel of uniform springs: the undulation that a Neimark-Sacker point sets off."""
+    """Panel of uniform springs: the undulation at a Neimark-Sacker point."""
     period, turns = data.attrs["oscillation_period_s"], data.phase.values[-1] / (2.0 * np.pi)
     runs = "from head to tail" if turns < 0.0 else "from tail to head"
     return Panel(

@@ -28,7 +28,7 @@ _NARROW = style.Layout("A;B;C", 8.6, heights=(0.9, 1.5, 1.7))
 
 
 def panel(robot: Robot) -> Panel:
-    """The schematic; it needs nothing computed."""
+    """Schematic of the robot, which needs no computation."""
     data = legs(robot)
     standing = int(data.stands.sum())
     return Panel(
@@ -55,7 +55,7 @@ def panel(robot: Robot) -> Panel:
 
 
 def legs(robot: Robot) -> xr.Dataset:
-    """Where every foot is at t = 0 and when it touches down, over module and side."""
+    """Place of every foot at t = 0 and time of its touch-down, over module and side."""
     gait, n = robot.gait, robot.body.modules
     phase = gait.leg_phases(n)
     stands = gait.stands(phase)
@@ -121,7 +121,7 @@ def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:
 
 
 def _springs(robot: Robot) -> str:
-    """The springs in one line; of many different ones the first three and the last."""
+    """Springs in one line; if there are many different ones, the first three and the last."""
     values = [f"{units.from_si(value, 'N*mm/deg'):.4g}" for value in robot.springs.stiffness]
     last = len(values)
     if len(set(values)) == 1:
@@ -131,7 +131,7 @@ def _springs(robot: Robot) -> str:
 
 
 def _foot(axes: Axes, robot: Robot, centre: float, foot: float, sign: float, color: str) -> None:
-    """A leg with its stroke; the foot itself only while it stands."""
+    """Leg with its stroke; the foot is drawn while it stands."""
     middle, half, y = centre + robot.legs.forward_offset, 0.5 * robot.gait.stride, sign * robot.legs.half_width
     stroke = [middle - half, middle + half], [y, y]
     if np.isnan(foot):

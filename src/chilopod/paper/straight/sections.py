@@ -1,4 +1,4 @@
-"""The straight walk and where it bends: the sections of this chapter, and their rows of the tables."""
+"""Sections on the straight walk and its bifurcations, with their rows of the tables."""
 
 from __future__ import annotations
 

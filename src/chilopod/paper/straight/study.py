@@ -32,8 +32,8 @@ def exponent_sweep(context: Context, progress: Progress = silent) -> xr.Dataset:
 
     Returns
     -------
-    Dataset over (k1, exponent): ``real``, ``imaginary`` (1/s), and ``follows_critical``, whether a curve is the one
-    that crosses.
+    Dataset over (k1, exponent): ``real``, ``imaginary`` (1/s), and ``follows_critical``, True for the curve that
+    crosses zero.
     """
     robot = context.robot
     ks = np.geomspace(75.0, 2.0, context.size.of(160, 40, 12))
@@ -60,7 +60,7 @@ def exponent_sweep(context: Context, progress: Progress = silent) -> xr.Dataset:
 def _followed(
     rows: list[NDArray[np.complex128]], values: NDArray[np.complex128], period: float
 ) -> NDArray[np.complex128]:
-    """``values`` in the order that continues the curves so far most smoothly."""
+    """``values`` in the order that continues the curves most smoothly."""
     last = rows[-1]
     expected = last if len(rows) < 2 else 2 * last - rows[-2]
     difference = values[None, :] - expected[:, None]
@@ -122,7 +122,7 @@ def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
     Returns
     -------
     Dataset over modules: ``critical_k1``, ``error_bound`` (N*mm/deg; NaN where the straight walk does not lose
-    stability through a pitchfork), ``says``; attribute ``built``, how many the robot has.
+    stability through a pitchfork), ``says``; attribute ``built``, the number of the robot as built.
     """
     counts = range(3, context.size.of(21, 11, 8))
     found: list[tuple[float, float, str]] = []
@@ -167,7 +167,7 @@ def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset
 
 
 def identified(context: Context, progress: Progress = silent) -> Identification:
-    """Constants that the paper does not print, from the numbers that it does."""
+    """Constants that the paper does not print, from its printed numbers."""
     points = context.size.of(25, 7, 5)
     return identify_planar(context.robot, critical_mode_data(), points, variant_settings(), progress)
 

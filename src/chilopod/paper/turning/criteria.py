@@ -21,15 +21,15 @@ _COLUMNS = ("spring", "at", "softest", "stiffest", "mean", "error")
 
 
 def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
-    """Where each criterion of a :class:`TurningTask` is smallest, in means over repeats, at an instant: 0 is the
-    earliest arrival, 1 the paper's 23 s.
+    """Minima of each criterion of a :class:`TurningTask`, in means over repeats, at an instant: 0 is the earliest
+    arrival, 1 the paper's 23 s.
 
     Returns
     -------
-    Dataset over criterion: the ``spring`` of the smallest mean, ``at``, where a parabola in 1/k1 through it and its
-    neighbours has its vertex (the spring itself at an end of the grid), ``softest`` and ``stiffest``, between which lie
-    the springs that are no worse by more than two standard errors of the difference (seed by seed), all in N*mm/deg;
-    ``mean`` and ``error`` of the smallest.
+    Dataset over criterion: the ``spring`` of the smallest mean; ``at``, the vertex of a parabola in 1/k1 through it and
+    its neighbours (the spring itself at an end of the grid); ``softest`` and ``stiffest`` of the springs that are worse
+    by at most two standard errors of the difference (seed by seed), all in N*mm/deg; ``mean`` and ``error`` of the
+    smallest.
     """
     at_instant = criteria.isel(instant=instant)
     rows = np.array([_minimum(at_instant, name) for name in CRITERIA])
@@ -65,8 +65,8 @@ def _vertex(springs: Array, mean: Array, lowest: int) -> float:
 
 
 def around(low: xr.Dataset, said: Band) -> Answer:
-    """True if one criterion of :func:`minima` is smallest where it is said to be (N*mm/deg): undecided if springs that
-    are no worse lie within as well as without."""
+    """True if the minimum of one criterion of :func:`minima` lies at some springs (N*mm/deg); undecided if springs that
+    are no worse lie within and outside them."""
     low_end, high_end = min(float(low.softest), float(low["at"])), max(float(low.stiffest), float(low["at"]))
     if said.low <= low_end and high_end <= said.high:
         return True
@@ -74,7 +74,7 @@ def around(low: xr.Dataset, said: Band) -> Answer:
 
 
 def differences(pitchfork: TurningTask, hopf: TurningTask) -> dict[str, Difference]:
-    """Smallest mean of every criterion with one strategy less that with the other, at the first instant.
+    """Smallest mean of every criterion with one strategy minus that with the other, at the first instant.
 
     Both have the seeds 0, 1, ...: with as many repeats they are compared seed by seed, else as independent trials.
     """
@@ -91,12 +91,12 @@ def _smallest(task: TurningTask, name: str) -> Array:
 
 
 def all_lower(pitchfork: TurningTask, hopf: TurningTask) -> Answer:
-    """True if all three minima of the pitchfork are the lower ones: no if any is higher beyond doubt."""
+    """True if all three minima of the pitchfork are lower; False if any is clearly higher."""
     return every(each.lower for each in differences(pitchfork, hopf).values())
 
 
 def in_words(pitchfork: TurningTask, hopf: TurningTask) -> str:
-    """Every criterion at its smallest with both, and whether the pitchfork's is lower, higher, or undecided."""
+    """Minimum of every criterion with both strategies, with the words lower, higher or undecided for the pitchfork."""
     ours, theirs = minima(pitchfork.criteria)["mean"], minima(hopf.criteria)["mean"]
     parts = []
     for name, apart in differences(pitchfork, hopf).items():
@@ -115,20 +115,20 @@ def counted(pitchfork: TurningTask, hopf: TurningTask) -> str:
 
 
 def softest_minima(hopf: TurningTask, point: float) -> tuple[str, bool]:
-    """Where the criteria are smallest with all springs alike, beside the point below which the body undulates, and
-    whether all of them are below it, in the unstable region."""
+    """Minima of the criteria with all springs alike, beside the point below which the body undulates; True if all of
+    them lie below it, in the unstable region."""
     at = minima(hopf.criteria).spring.sel(criterion=list(CRITERION_NAMES)).values
     places = " and ".join(f"{spring:g}" for spring in np.unique(at))
     return f"{places} {PAPER_UNIT}, the body undulates below {point:.2f}", bool((at < point).all())
 
 
 def saturated(time: float) -> float:
-    """The third criterion of legs that stand at their limit all the time, rad^2 s: as large as it gets."""
+    """Largest possible third criterion, rad^2 s: that of legs at their limit all the time."""
     return 2.0 * LegYawController().limit ** 2 * time
 
 
 def saturation(*tasks: TurningTask) -> str:
-    """Ratio of the third criterion of all springs to its limit: near it at every spring it says little."""
+    """Ratio of the third criterion of all springs to its limit; if all are near 1, it distinguishes little."""
     full, unit = saturated(tasks[0].time), SCALES["effort"][1]
     means = np.concatenate([task.criteria.effort_mean.isel(instant=0).values for task in tasks])
     return (

@@ -1,4 +1,4 @@
-"""The turning tasks: the figures of the paper's section "Turning maneuverability", and why the model's differ."""
+"""The turning tasks: figures of the paper's section "Turning maneuverability", and reasons of differences."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
 
 
 def _run(axes: Axes, time: Array, x: Array, y: Array, until: float, color: str) -> None:
-    """A line that is pale from the arrival on."""
+    """Line that is pale after the arrival."""
     after = time > until if np.isfinite(until) else np.zeros(time.size, bool)
     axes.plot(np.where(after, np.nan, x), np.where(after, np.nan, y), color=color, lw=1.1)
     if after.any():
@@ -133,7 +133,7 @@ def _run(axes: Axes, time: Array, x: Array, y: Array, until: float, color: str) 
 
 
 def _target(axes: Axes, x: float, y: float) -> None:
-    """The target, and the circle within which it counts as reached."""
+    """Target, and circle within which it counts as reached."""
     circle = Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=style.BLACK, lw=1.0, linestyle=DASHED, zorder=5)
     axes.add_patch(circle)
     axes.plot(x, y, "+", color=style.BLACK, markersize=9, markeredgewidth=1.6, zorder=6)
@@ -253,7 +253,7 @@ def _said(found: Turning, letter: str) -> str:
 
 
 def places(task: TurningTask) -> str:
-    """Where the criteria are smallest."""
+    """Springs at the minima of the criteria."""
     at = minima(task.criteria)["at"]
     return listing(
         f"{title.partition(',')[0]} at {number(float(at.sel(criterion=name)), 3)}"
@@ -343,7 +343,7 @@ def without(found: Turning) -> Panel:
 
 
 def sides(case: LegYaw) -> str:
-    """To which side the walks without leg yaw turn."""
+    """Sides to which the walks without leg yaw turn."""
     left = int((case.alone.turned > 0.0).sum())
     return f"{left} turn left and {arrivals(case.alone)[1] - left} right"
 
@@ -363,7 +363,7 @@ def draw_without(data: xr.Dataset, narrow: bool) -> Figure:
 
 
 def why(found: Turning) -> Panel:
-    """Why the best spring is not the law's: the start, and the way there is."""
+    """Reasons why the best spring is not the law's: start and length of the way."""
     settled, farther = found.settled, found.farther
     best = [float(farther.spring[int(row.argmin())]) for row in farther.effort.values]
     cm = 100.0 * settled.start_nearest

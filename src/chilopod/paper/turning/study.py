@@ -34,20 +34,20 @@ from chilopod.steering import LegYawController, Target, earliest_arrival, evalua
 from chilopod.trials import NONE, Disturbance, Trial
 
 ROUGH = 3.0
-"""Times the usual disturbance, for the check that conclusions do not hang on it."""
+"""Multiples of the usual disturbance, for the check that conclusions do not depend on it."""
 
 FARTHER = (1.3, 2.0, 3.0, 4.5)
-"""m: targets in the direction of task A, for the check of what a longer way changes."""
+"""Distances of targets in the direction of task A, for the effect of a longer way, m."""
 
 FARTHER_SPRINGS = (8, 9, 10, 11, 12, 12.5, 13, 14, 15, 17, 19, 21, 24, 28, 41)
 QUICK_SPRINGS = (6, 7, 8, 9, 10, 11, 12, 21)
 ROUGH_SPRINGS = (6, 7, 8, 8.5, 9, 9.5, 10, 11, 12, 13, 15, 21)
-"""N*mm/deg."""
+"""Springs of these trials, of quick ones, and of rough ones, N*mm/deg."""
 
 
 @dataclass(frozen=True)
 class Turning:
-    """Everything the turning studies found."""
+    """Results of the turning studies."""
 
     robot: Robot
     laws: RadiusLaws
@@ -89,11 +89,11 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
 
 
 def settled_start(robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target], folder: Folder = None) -> xr.Dataset:
-    """Arrival with the spring of the law, if the walk need not find its curve first.
+    """Arrival with the spring of the law if the walk begins on its curve.
 
-    One undisturbed trial without leg yaw each, at the spring of the law by the path of module 1: from "straight", from
-    the settled walk "bent" already, and bent with the target seen not from where module 1 points but from where it
-    moves to ("bent, aimed").
+    One undisturbed trial without leg yaw for each start, at the spring of the law by the path of module 1: "straight";
+    "bent", the settled walk; and "bent, aimed", with the target relative to the motion of module 1 instead of its
+    heading.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def farther_targets(
 ) -> xr.Dataset:
     """Results for targets in one direction at growing distances, with the effect of the time that a bend needs to grow.
 
-    One undisturbed trial each, with leg yaw, as much longer as the way is.
+    One undisturbed trial each, with leg yaw, with a duration in proportion to the distance.
 
     Returns
     -------

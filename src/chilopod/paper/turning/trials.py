@@ -26,13 +26,13 @@ from chilopod.steering.strategies import strategy_named
 from chilopod.trials import Trial
 
 DURATION = printed.ARRIVAL.value
-"""s: when the paper evaluates, and how long trials of the planar model are, which arrives well before."""
+"""Time of the paper's evaluation, and duration of trials of the planar model, which arrives well before, s."""
 
 SPRINGS = (5, 6, 7, 7.5, 8, 8.5, 9, 9.5, 10, 10.5, 11, 11.5, 12, 12.5, 13, 14, 15, 17, 21, 28, 41, 75)
-"""N*mm/deg: k1 of the turning tasks, close together where the planar model's criteria have their minima."""
+"""Springs k1 of the turning tasks, N*mm/deg, dense around the minima of the planar model's criteria."""
 
 UNIFORM_SPRINGS = (2, 3, 4, 5, 6, 8, 11, 15, 21, 41)
-"""N*mm/deg: all springs, of the strategy by Hopf bifurcation; as far below and above its point as the paper's."""
+"""Springs of the Hopf strategy, all alike, N*mm/deg, in the paper's ratios to the Hopf point."""
 
 CRITERIA = ("distance", "angle", "effort", "effort_until_arrival")
 """epsilon 1 to 3, and epsilon 3 integrated only until the robot has arrived."""
@@ -41,7 +41,7 @@ RATE = 50.0
 """Samples per second of these trials."""
 
 _PATH_STEP = 2
-"""Step between the samples of a record that are kept of a path that is drawn."""
+"""Step between the samples of a drawn path in the record."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def outcome_words(criteria: xr.Dataset, written: Callable[[list[float]], str]) -
 
 
 def span(springs: list[float]) -> str:
-    """From the softest to the stiffest."""
+    """Springs from the softest to the stiffest."""
     return f"{min(springs):g}" + (f" to {max(springs):g}" if len(springs) > 1 else "")
 
 

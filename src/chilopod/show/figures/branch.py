@@ -38,7 +38,7 @@ def panel(data: xr.Dataset) -> Panel:
 
 
 def table(data: xr.Dataset) -> xr.Dataset:
-    """A branch with one line per point: what it goes on from is left to netCDF, every joint gets a column."""
+    """Branch with one line per point and one column per joint, without the data for continuing it, which netCDF has."""
     angles = {f"mean_angle_{joint}": data.mean_angle.sel(joint=joint, drop=True) for joint in data.joint.values}
     single = data[[name for name in data.data_vars if data[name].dims == ("point",)]].drop_vars("parameter_si")
     found = single.assign(angles)

@@ -63,7 +63,7 @@ def title(done: Driven) -> str:
 
 
 def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
-    """Bearing of the target whose turn it is, deg; a line does not cross the picture where it jumps."""
+    """Bearing of the present target, deg, without lines across its jumps."""
     place = walk.position.transpose("time", "axis")
     # One that was the target all the time has one place for all times.
     place, target = place.values, walk.target.broadcast_like(place).transpose("time", "axis").values
@@ -75,7 +75,7 @@ def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
 
 
 def _turns(axes: Axes, walk: xr.Dataset, *, numbered: bool) -> None:
-    """When each goal of the first walk had its turn: bands, and their numbers above."""
+    """Bands of the times of each goal of the first walk, with numbers above."""
     begins, ends = walk.goal_begin.values, walk.goal_end.values
     for index, (begin, end) in enumerate(zip(begins, ends, strict=True)):
         if not (np.isfinite(begin) and np.isfinite(end)):

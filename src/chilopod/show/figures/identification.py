@@ -1,4 +1,4 @@
-"""How well a critical spring and its mode determine the constants of the planar model."""
+"""Figure of the ranges of the planar model's constants that a critical spring and its mode leave."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a robot of a record walked to which target."""
+"""Times and targets of a robot of a record."""
 
 from __future__ import annotations
 

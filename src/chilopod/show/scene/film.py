@@ -79,7 +79,7 @@ def poster(
 
 
 def telling(stage: Stage) -> bytes:
-    """PNG of the frame of a stage in its last third, when it shows what came of the walks."""
+    """PNG of the frame of a stage in its last third, when it shows the outcome of the walks."""
     stream = io.BytesIO()
     imsave(stream, stage.drawn(3 * (len(stage.shown.frames.time) - 1) // 4), format="png")
     return stream.getvalue()

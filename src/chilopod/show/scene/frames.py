@@ -116,7 +116,7 @@ def _interpolated(values: NDArray[Any], recorded: Array, times: Array) -> Array:
 
 
 def _strokes(robot: Robot, time: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """How far every foot is ahead of mid-stroke (m) and whether it stands, both (T, N, 2)."""
+    """Distance of every foot ahead of mid-stroke (m), and mask of standing feet, both (T, N, 2)."""
     phase = (robot.gait.phases(time, robot.body.modules) + _SAME_PHASE) % 1.0
     return robot.gait.stroke(phase), robot.gait.stands(phase)
 
@@ -151,7 +151,7 @@ class Floor:
     grid: float
 
     def span(self) -> tuple[Array, float]:
-        """Middle, and how far positions on a page may be from it: the floor, and as far again on every side, m."""
+        """Middle of positions on a page, and their largest distance from it, m: the floor with a margin of its size."""
         middle = np.array([0.5 * (self.x0 + self.x1), 0.5 * (self.y0 + self.y1)])
         return middle, 1.5 * max(self.x1 - self.x0, self.y1 - self.y0)
 
@@ -169,7 +169,7 @@ class Scene:
     arrival_radius: float
 
     def begun(self, robot: int, now: float) -> tuple[Aim, ...]:
-        """The targets of a robot that have had their turn at a time (s), or have it."""
+        """Past and present targets of a robot at a time, s."""
         return tuple(aim for aim in self.aims[robot] if now >= aim.since - 1e-9)
 
 

@@ -30,7 +30,7 @@ def chain(angles: ArrayLike, length: float) -> tuple[Array, Array, Array]:
 
 
 def turned_about_tail(centres: Array, headings: Array, joints: Array) -> tuple[Array, Array, Array]:
-    """The same chain with its last module at the origin, pointing along x."""
+    """Chain with its last module at the origin, pointing along x."""
     angle = -headings[-1]
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return (centres - centres[-1]) @ turn.T, headings + angle, (joints - centres[-1]) @ turn.T

@@ -24,6 +24,6 @@ def drawn(model: mujoco.MjModel) -> dict[int, str]:
 
 
 def yaw_joint(model: mujoco.MjModel) -> tuple[float, float]:
-    """Radius and half height of the upright cylinder that stands for one, m."""
+    """Radius and half height of the upright cylinder that represents a yaw joint, m."""
     _, half_width, half_height = model.geom("module1_box").size
     return float(_PIN[0] * 2.0 * half_width), float(_PIN[1] * half_height)

@@ -1,4 +1,4 @@
-"""Data of a page that plays walks of the three-dimensional robot, seen from wherever one likes."""
+"""Data of a page that plays walks of the three-dimensional robot from any point of view."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
 
 
 def _quaternions(model: mujoco.MjModel) -> list[int]:
-    """Where quaternions begin among the coordinates: those of free joints."""
+    """Indices of the coordinates at which quaternions of free joints begin."""
     free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
     return [int(at) + 3 for at in model.jnt_qposadr[free]]
 

@@ -243,7 +243,7 @@ def _dressed(robot: Robot, size: tuple[int, int], view: View, fine: bool) -> Any
 
 
 def _add_dress(spec: Any, robot: Robot) -> None:
-    """Joints between the modules, drives of the legs, the scanner: what makes boxes look like the robot."""
+    """Visible details of the robot: joints between the modules, drives of the legs, the scanner."""
     twin, ink = twin_of(robot), [*to_rgb(COLORS["ink"]), 1.0]
     length, inner, outer = robot.module_length, 0.4 * twin.body_width, robot.legs.half_width
     box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER

@@ -37,7 +37,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         self.low = _LEAVING * step.size if step.start.leaving else 0.0
 
     def at(self, place: float) -> Step[Anchor, OnCurve]:
-        """The part of the step up to a place, corrected further than its ends, as places of events hang on it."""
+        """Part of the step up to a place, corrected further than the ends, because places of events depend on it."""
         precision, self.curve.precision = self.curve.precision, _FURTHER * self.curve.precision
         try:
             return super().at(place)
@@ -68,7 +68,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
 
     def near_jacobian(self, place: float) -> Array:
-        """The same, on the cubic through the ends of the step if that is close enough."""
+        """Derivative at a place, by the cubic through the ends of the step if that is close enough."""
         step, start = self.step, self.step.start
         if place in (0.0, step.size):
             return self.jacobian(place)

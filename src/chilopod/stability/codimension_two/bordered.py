@@ -136,7 +136,7 @@ class Spot(ReadOnlyArrays):
         return np.asarray(np.abs(np.linalg.pinv(self.matrix[:-1])) @ self.uncertainty)
 
     def towards(self, sign: float) -> Spot:
-        """The same point, with its tangent multiplied by the sign."""
+        """Point with its tangent multiplied by the sign."""
         tangent = sign * self.tangent
         return replace(self, tangent=tangent, matrix=np.vstack([self.matrix[:-1], tangent]))
 

@@ -126,7 +126,7 @@ def follow2(
 
 
 def over_periods(family2: Family2, periods: int) -> Family2:
-    """The same systems for orbits over several periods, or without their symmetry in time."""
+    """Systems for orbits over several periods, or without their symmetry in time."""
     return lambda p, q: whole_period(family2(p, q), periods)
 
 
@@ -168,7 +168,7 @@ class _Half:
     reason: str = ""
 
     def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
-        """Station at the end of a step, and events within it; the curve of a pair ends where it meets."""
+        """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
         station = self.detector.station(step.end)
         special: tuple[SpecialPoint2, ...] = ()
         for spot, point in self.detector.events(step, self.last.signals, station.signals):

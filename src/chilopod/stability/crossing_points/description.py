@@ -48,7 +48,7 @@ def described(
     kind: Kind | None = None,
     with_normal_form: bool = True,
 ) -> BifurcationPoint:
-    """The bifurcation point at a ``place``: a value of the parameter with its error bound, to which round-off is added.
+    """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added.
 
     The critical multipliers belong to the whole return map; their block is given if spatial symmetries split it, and
     the kind of the point if known. ``formed`` computes the normal form for one critical multiplier or pair.

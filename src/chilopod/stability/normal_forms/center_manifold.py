@@ -117,8 +117,8 @@ def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
 def solve_homological(
     at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
 ) -> ComplexArray:
-    """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both; without a part along the critical direction if
-    the factor is critical (``resonant``: nu, or its conjugate at the resonance 1:3)."""
+    """Solution w of (nu^i conj(nu)^j - A) w = r, both of shape (n,). It has no part along the critical direction if the
+    factor is critical (``resonant``: nu, or its conjugate at the resonance 1:3)."""
     i, j = powers
     n = at.state.size
     factor = at.multiplier**i * at.multiplier.conjugate() ** j

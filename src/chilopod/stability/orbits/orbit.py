@@ -230,7 +230,7 @@ def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> t
 
 
 def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget | None) -> Orbit:
-    """The same orbit over its shortest period, if every instant may be time 0."""
+    """Orbit over its shortest period, if every instant may be time 0."""
     if not is_autonomous(system):
         return orbit
     duration = orbit.period / orbit.image.returns

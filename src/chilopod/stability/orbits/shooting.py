@@ -54,10 +54,10 @@ class Nodes(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Closed(ReadOnlyArrays):
-    """A corrected orbit: its nodes, the sizes of the states, shape (n,), and the return of the last node.
+    """Corrected orbit: nodes, sizes of the states, shape (n,), and return of the last node.
 
     The derivatives of a return, with respect to the state, shape (n, n), and to the parameter, shape (n,), exclude the
-    change of its time: they are products of those between nodes, without the rounding of a whole return.
+    change of its time. They are products of the derivatives between nodes, which avoids the rounding of a whole return.
     """
 
     nodes: Nodes
@@ -342,8 +342,8 @@ class _Equations:
         return max(states, abs(correction.duration) / self.nodes.duration)
 
     def cleared(self) -> _Equations:
-        """The orbit with the negligible states of its first node set to zero, if it remains an orbit: a rest of the
-        guess would count as the size of the orbit."""
+        """The orbit with the negligible states of its first node set to zero, if it remains an orbit. A remainder of
+        the guess would count as the size of the orbit."""
         x = self.nodes.states[0]
         small = (x != 0.0) & (np.abs(x) <= _NOTHING * self._frame.sizes)
         if not small.any():

@@ -45,7 +45,7 @@ def check_system(system: object, field: str = "system", value: object = None) ->
 
 
 def system_of(family: Callable[..., SystemLike], *values: float) -> SystemLike:
-    """The system of a family at values of its parameters; a ChilopodError if there is none."""
+    """System of a family at values of its parameters; raises a ChilopodError if there is none."""
     value = values[0] if len(values) == 1 else values
     with UserCode("family", value):
         system = family(*values)

@@ -43,7 +43,7 @@ class Budget(Deadline):
     allowed
         Number of flows.
     seconds
-        Time from now, s; within its context it also ends a running flow.
+        Time from now, s. Inside a ``with`` block of the budget it also ends a running flow.
     """
 
     def __init__(self, allowed: float, seconds: float = math.inf) -> None:

@@ -44,8 +44,8 @@ class SystemLike(Protocol):
 
     @property
     def symmetry(self) -> Array | None:
-        """A matrix S, shape (n, n), of finite order k, with S f(t, x) = f(t + T/k, S x), so that H = S flow(T/k) is a
-        return map; or None. The order is 2 unless the system is :class:`CyclicallySymmetric`."""
+        """Matrix S, shape (n, n), of finite order k with S f(t, x) = f(t + T/k, S x), or None. H = S flow(T/k) is then
+        a return map. The order is 2 unless the system is :class:`CyclicallySymmetric`."""
         ...
 
     def flow(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array]:

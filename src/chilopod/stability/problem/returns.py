@@ -51,7 +51,7 @@ REPEATED = 10.0
 
 @dataclass(frozen=True)
 class Section(ReadOnlyArrays):
-    """A hyperplane that the orbit of a system without a period of its own crosses once a return along its normal.
+    """Hyperplane that the orbit of a system without a period of its own crosses once in a return, along the normal.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ _FLOWS = "flow", "flow_with_error", "flow_states", "flow_tangents"
 
 
 def whole_period(system: SystemLike, periods: int = 1) -> SystemLike:
-    """The same system for orbits without its symmetry in time and its known orbit, or over several periods."""
+    """System for orbits over several periods, or without its symmetry in time and its known orbit."""
     whole: Any = SimpleNamespace(**{name: getattr(system, name, None) for name in (*_STATED, *_FLOWS)})
     whole.symmetry, whole.period = None, None if system.period is None else periods * system.period
     if is_autonomous(system):

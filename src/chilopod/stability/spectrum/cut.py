@@ -72,7 +72,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap) -> Cut:
 
 
 def turn_in_units(system: SystemLike, units: Array) -> Array:
-    """The symmetry in time in units, shape (n, n); the unit matrix without one."""
+    """Symmetry in time in scaled units, shape (n, n); the unit matrix if there is none."""
     return np.eye(units.size) if system.symmetry is None else system.symmetry * units / units[:, None]
 
 

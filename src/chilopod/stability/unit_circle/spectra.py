@@ -291,7 +291,7 @@ def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _stretches(balanced: Array) -> Array:
-    """Logarithms of det(1 + M^T M)^(1/2), M balanced: positive, analytic, and larger than what it divides."""
+    """Logarithms of det(1 + M^T M)^(1/2), M balanced: a positive, analytic divisor that exceeds its dividend."""
     one = np.broadcast_to(np.eye(balanced.shape[-1]), balanced.shape)
     double = np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]])
     return np.asarray(0.5 * np.linalg.slogdet(double)[1])

@@ -71,8 +71,8 @@ class Fit:
 
     @property
     def objective(self) -> float:
-        """Objective of the search: sum of the squared residuals, and of the constants' distances from the middle of
-        their ranges over a quarter of them."""
+        """Objective of the search: sum of the squared residuals and of the squared penalties, the constants' distances
+        from the middle of their ranges over a quarter of the ranges."""
         return float(np.sum(self.residuals**2) + np.sum(((parts_of(self.constants) - 0.5) / _PRIOR) ** 2))
 
     def as_json(self) -> dict[str, Any]:

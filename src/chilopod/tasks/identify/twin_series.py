@@ -50,8 +50,8 @@ def base_series(
     engine: str = "twin",
     duration: float = DURATION,
 ) -> Series:
-    """Walk a series, or other values of k1, N*mm/deg, from starts near the bends of its data, with a tolerance of the
-    contact solver, in the twin or an edited one, see :class:`chilopod.twin.Edited`, for a duration, s.
+    """Walk a series for a duration, s, from starts near the bends of its data, with a tolerance of the contact solver.
+    ``springs`` replace the values of k1, N*mm/deg; ``engine`` is the twin or a :class:`chilopod.twin.Edited`.
 
     Walks of all springs of the data stop after 36 s if they are far off by then.
     """
