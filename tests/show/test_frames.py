@@ -155,7 +155,7 @@ def test_titles_by_label_or_in_order():
     record = walk(0.0, 0.5).assign_coords(robot=["soft", "stiff"])
     assert scene(record, {"stiff": "B", "soft": "A"}).titles == ("A", "B")
     assert scene(record, ["A", "B"]).titles == ("A", "B")
-    with pytest.raises(ParameterError, match="none for robot 'stiff'"):
+    with pytest.raises(ParameterError, match="must name robot 'stiff' too"):
         scene(record, {"soft": "A"})
     with pytest.raises(ParameterError, match="allowed: 2"):
         scene(record, ["A"])
