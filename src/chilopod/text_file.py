@@ -29,7 +29,9 @@ def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
     except (OSError, ValueError) as error:
         if isinstance(error, ChilopodError):
             raise
-        raise refused(f"cannot be read ({getattr(error, 'strerror', None) or error})", source=source) from None
+        missing = isinstance(error, FileNotFoundError)
+        problem = "no such file" if missing else f"cannot be read ({getattr(error, 'strerror', None) or error})"
+        raise refused(problem, source=source) from None
     if len(content) > _LARGEST:
         raise refused(f"too large for a {kind}", source=source, allowed=f"up to {_LARGEST} bytes")
     if not content.strip():

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from chilopod.cli.progress import progress_bar
 from chilopod.cli.user_code import own_code, own_controller
-from chilopod.errors import ChilopodError
+from chilopod.errors import ChilopodError, ParameterError, UnitError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod import tasks
@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 
 Found = TypeVar("Found", bound="Runs")
 
-_TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1"}
+_TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1", "twin": "engine", "body.modules": "modules"}
 """Options that are called otherwise than the argument of the function that they are for."""
+
+_IN_WORDS = {"Input should be": "must be", "greater than or equal to": "at least", "less than or equal to": "at most"}
+"""Words for those of pydantic, which checks the numbers of options."""
 
 
 def _engines() -> list[str]:
@@ -36,10 +39,15 @@ def _engines() -> list[str]:
     return list(ENGINES)
 
 
-def _strategies() -> list[str]:
-    from chilopod.steering import STRATEGIES
+def strategies(which: str) -> Callable[[], list[tuple[str, str]]]:
+    """Completion of strategies of a mapping of :mod:`chilopod.steering`: their names and sentences."""
 
-    return list(STRATEGIES)
+    def completed() -> list[tuple[str, str]]:
+        from chilopod import steering
+
+        return [(each.name, each.sentence) for each in getattr(steering, which).values()]
+
+    return completed
 
 
 RobotArg = Annotated[
@@ -93,12 +101,7 @@ EngineOption = Annotated[
 ]
 StrategyOption = Annotated[
     str,
-    typer.Option(
-        metavar="pitchfork|hopf|leg-yaw|open-loop",
-        help="Strategy of turning. pitchfork: soft first spring, and legs of module 1 that yaw towards the target; "
-        "hopf: all springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: soft first spring alone.",
-        autocompletion=_strategies,
-    ),
+    typer.Option(help="Strategy of turning; leg yaw is that of module 1.", autocompletion=strategies("STRATEGIES")),
 ]
 ControllerOption = Annotated[
     str | None,
@@ -125,8 +128,46 @@ ClusterOption = Annotated[
 ]
 
 
+class _Group(TyperGroup):
+    """A group that knows the commands of the groups in it: of ``export`` it says ``robot export``."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        try:
+            return super().resolve_command(ctx, args)
+        except Exception as error:
+            named = [
+                f"{name} {args[0]}" for name, own in self.commands.items() if args[0] in vars(own).get("commands", ())
+            ]
+            if named and hasattr(error, "message"):
+                error.message += f" Did you mean {' or '.join(map(repr, named))}?"
+            raise
+
+
 class _Command(TyperCommand):
-    """A command whose mistakes are named as they were typed: ``--duration``, and the text behind it."""
+    """A command whose mistakes are named as they were typed, ``--duration`` and the text behind it, and whose help
+    lists the choices that are registered."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        for option in self.params:
+            if isinstance(option, TyperOption) and option.name == "strategy" and option.metavar is None:
+                choices = option.shell_complete(ctx, "")
+                option.metavar = "|".join(each.value for each in choices)
+                option.help = " ".join([option.help or "", *(f"{each.value}: {each.help}." for each in choices)])
+        super().format_help(ctx, formatter)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            if hasattr(error, "ctx"):
+                error.ctx = error.ctx or ctx
+            wrong = getattr(error.__cause__, "errors", list)()
+            if not (wrong and hasattr(error, "param")):
+                raise
+            problem = wrong[0]["msg"].partition(",")[0]
+            for theirs, ours in _IN_WORDS.items():
+                problem = problem.replace(theirs, ours)
+            raise ParameterError(problem, field=max(error.param.opts, key=len), value=wrong[0]["input"]) from None
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -137,7 +178,7 @@ class _Command(TyperCommand):
 
 
 def _as_typed(error: ChilopodError, ctx: Any) -> None:
-    field, _, part = (error.field or "").partition(" ")
+    field, _, part = (error.field or "").partition(" ") if error.source is None else ("", "", "")
     name = _TYPED_AS.get(field, field)
     for option in ctx.command.params:
         if option.name != name or option.param_type_name != "option" or option.is_flag:
@@ -170,6 +211,7 @@ def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
     app = _App(
         help=help_text,
+        cls=_Group,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         add_completion=completion,
@@ -197,15 +239,15 @@ def walking_on(cluster: str | None) -> Iterator[None]:
         yield
 
 
-def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
-    """Load a robot and apply the overrides of ``--set``."""
-    from chilopod.robot import load_robot
+def read_robot(robot: str | Robot, overrides: Sequence[str] | None) -> Robot:
+    """Load a robot, unless it is one, and apply the overrides of ``--set``."""
+    from chilopod.robot import Robot, load_robot
 
-    described = load_robot(robot)
+    described = robot if isinstance(robot, Robot) else load_robot(robot)
     try:
         return described.set_from_text(overrides or ())
     except ChilopodError as error:
-        error.field = error.field or "--set"
+        error.field = f"--set {error.field or ''}".strip()
         raise
 
 
@@ -260,11 +302,16 @@ class WalkOptions(RobotOptions):
         """Options of every task, with the function that shows its progress."""
         return {"seed": self.seed, "repeats": self.repeats, "folder": self.trials, "progress": progress}
 
-    def spring(self, path: str | None, k1: str) -> float:
-        """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad."""
+    def spring(self, path: str | None, k1: str, *words: str) -> float:
+        """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad; errors name words that it may be."""
+        path = path or "springs.stiffness"
         with reading("k1"):
-            path = path or "springs.stiffness"
-            return self.described.override(path, k1).get(path)
+            try:
+                return self.described.override(path, k1).get(path)
+            except UnitError as error:
+                error.allowed = ", ".join(filter(None, (*words, error.allowed)))
+                error.nearest = error.nearest or nearest_name(k1, words)
+                raise
 
     @contextmanager
     def walking(self, what: str) -> Iterator[Callable[[str], Progress]]:
@@ -346,11 +393,24 @@ def json_text(result: dict[str, Any]) -> str:
     return json.dumps(result, indent=2, allow_nan=False)
 
 
-def free(paths: Iterable[Path], force: bool) -> None:
-    """Make sure, before any work is done for them, that files can be written and replace none without ``--force``."""
+def free(paths: Iterable[Path], force: bool, ending: str = "") -> None:
+    """Make sure, before any work is done for them, that files can be written, that none is replaced without
+    ``--force``, and that no name ends as that of another format; it may have no ending."""
     from chilopod.output import check_files
 
-    check_files(paths, replace=force)
+    files = list(paths)
+    for file in files:
+        if ending and file.suffix.lower() not in ("", ending):
+            raise ParameterError(f"must end with {ending}", source=str(file))
+    check_files(files, replace=force)
+
+
+def written(file: Path, robot: Robot, as_json: bool, **more: str) -> None:
+    """Name the file that a robot was written into, as JSON or as text."""
+    if as_json:
+        print_json({"robot": robot.name, "file": str(file), **more})
+    else:
+        typer.echo(": ".join([f"wrote {file}", *more.values()]))
 
 
 def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:
@@ -374,7 +434,6 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
     """Read the interval of a parameter, in SI units, and refuse one that is reversed or that the robot cannot have."""
     from chilopod import units
     from chilopod.analysis.parameters import check_parameter
-    from chilopod.errors import ParameterError
 
     with reading("parameter"):
         check_parameter(robot, parameter)

@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot, reading
+from chilopod.cli.options import (
+    ForceOption,
+    JsonOption,
+    RobotArg,
+    SetOption,
+    free,
+    new_app,
+    print_json,
+    read_robot,
+    written,
+)
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -46,17 +56,15 @@ def new(
     """Write a new robot file, named after the file, to edit by hand."""
     from chilopod.output import write_atomic
 
+    free([file], force, ".toml")
     robot = read_robot((_WHOLE if twin else _PLANAR) if preset is None else preset, None)
     if twin and robot.twin is None:
         robot = robot.with_twin_of(read_robot(_WHOLE, None))
-    with reading("modules"):
-        robot = robot.set_from_text([f"body.modules={modules}"] if modules is not None else [])
-    robot = robot.set_from_text(overrides or []).with_(name=file.stem)
+    if modules is not None:
+        robot = robot.override("body.modules", modules)
+    robot = read_robot(robot, overrides).with_(name=file.stem)
     write_atomic(file, robot.to_toml(), replace=force)
-    if as_json:
-        print_json({"robot": robot.name, "file": str(file)})
-    else:
-        typer.echo(f"wrote {file}")
+    written(file, robot, as_json)
 
 
 @app.command()
@@ -113,7 +121,7 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
         typer.echo(f"  {remark}")
 
 
-@app.command()
+@app.command(short_help="Write the robot in 3-D for other programs (MJCF, URDF).")
 def export(
     robot: RobotArg,
     out: Annotated[
@@ -130,7 +138,4 @@ def export(
     name, write = format_of(out.suffix)
     described = read_robot(robot, overrides)
     write_atomic(out, write(described), replace=force)
-    if as_json:
-        print_json({"robot": described.name, "file": str(out), "format": name})
-    else:
-        typer.echo(f"wrote {out}: {name}")
+    written(out, described, as_json, format=name)

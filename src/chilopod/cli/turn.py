@@ -57,7 +57,8 @@ def turn(
 
     described = options.described
     goal, chosen = Target.parse(target), strategy_named(strategy)
-    spring = k1 if k1 in ("auto", "law") else options.spring(chosen.springs, k1)
+    words = ("auto", "law")
+    spring = k1 if k1 in words else options.spring(chosen.springs, k1, *words)
     with reading("duration"):
         seconds = None if duration is None else units.parse(duration, "s")
 

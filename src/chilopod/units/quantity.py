@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationErro
 from pydantic_core import CoreSchema, core_schema
 
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
-from chilopod.units.expressions import format, parse
+from chilopod.units.expressions import format, kind_of, parse
 
 # Far outside anything that walks, and far inside what products and quotients of a few quantities need to stay finite.
 _SMALLEST: Final = 1e-12
@@ -168,7 +168,9 @@ def _explained(error: ValidationError, model: type[Description]) -> ChilopodErro
         cause.field = field + inner if inner.startswith("[") or not (field and inner) else f"{field}.{inner}"
         return cause
     if first["type"] == "missing":
-        return ParameterError("is missing", field=field)
+        own, part = quantities(model).get(field), model.model_fields[field].annotation
+        keys = f"a table of {', '.join(part.model_fields)}" if isinstance(part, type(BaseModel)) else None
+        return ParameterError("is missing", field=field, allowed=kind_of(own.si) if own else keys)
     if first["type"] == "extra_forbidden":
         names = list(model.model_fields)
         return ParameterError(
