@@ -26,12 +26,12 @@ def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
         # Some virtual files of the system claim to be regular and block.
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
             content = file.read(_LARGEST + 1) or b""
+    except FileNotFoundError:
+        raise refused("no such file", source=source) from None
     except (OSError, ValueError) as error:
         if isinstance(error, ChilopodError):
             raise
-        missing = isinstance(error, FileNotFoundError)
-        problem = "no such file" if missing else f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise refused(problem, source=source) from None
+        raise refused(f"cannot be read ({getattr(error, 'strerror', None) or error})", source=source) from None
     if len(content) > _LARGEST:
         raise refused(f"too large for a {kind}", source=source, allowed=f"up to {_LARGEST} bytes")
     if not content.strip():

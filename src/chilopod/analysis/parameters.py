@@ -34,8 +34,7 @@ def check_parameter(robot: Robot, parameter: str) -> None:
     try:
         robot.unit_of(parameter)
     except ParameterError as error:
-        if error.allowed == ", ".join(QUANTITIES):
-            error.allowed = ", ".join(read)
+        error.allowed = ", ".join(read) if error.allowed == ", ".join(QUANTITIES) else error.allowed
         raise
     if parameter == "body.modules":
         raise ParameterError("must be a continuous parameter, not a whole number", field="parameter", value=parameter)

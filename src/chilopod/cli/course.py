@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, WalkOptions, reading, strategies, with_options
+from chilopod.cli.options import OutOption, WalkOptions, choices, reading, with_options
 
 if TYPE_CHECKING:
     from chilopod.progress import Progress
@@ -32,10 +32,7 @@ TargetsOption = Annotated[
 ]
 StrategyOption = Annotated[
     str,
-    typer.Option(
-        help="Strategy of turning; in all of them the legs of module 1 yaw towards the target.",
-        autocompletion=strategies("ON_COURSES"),
-    ),
+    typer.Option(help="Strategy of turning, with leg yaw of module 1.", autocompletion=lambda: choices("ON_COURSES")),
 ]
 
 

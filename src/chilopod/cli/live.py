@@ -12,16 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    EngineOption,
-    ForceOption,
-    SetOption,
-    free,
-    read_robot,
-    reading,
-    strategies,
-    with_options,
-)
+from chilopod.cli.options import EngineOption, ForceOption, SetOption, choices, free, read_robot, reading, with_options
 from chilopod.live.wishes import LARGEST_SEED, check_port
 
 if TYPE_CHECKING:
@@ -30,10 +21,7 @@ if TYPE_CHECKING:
 
 StrategyOption = Annotated[
     str,
-    typer.Option(
-        help="Strategy on the way to a target; the page can change it.",
-        autocompletion=strategies("ON_THE_WAY"),
-    ),
+    typer.Option(help="Strategy at the start; the page can change it.", autocompletion=lambda: choices("ON_THE_WAY")),
 ]
 HostOption = Annotated[
     str,

@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from chilopod.cli.progress import progress_bar
 from chilopod.cli.user_code import own_code, own_controller
-from chilopod.errors import ChilopodError, ParameterError, UnitError, nearest_name
+from chilopod.errors import ChilopodError, ParameterError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod import tasks
@@ -39,15 +39,11 @@ def _engines() -> list[str]:
     return list(ENGINES)
 
 
-def strategies(which: str) -> Callable[[], list[tuple[str, str]]]:
-    """Completion of strategies of a mapping of :mod:`chilopod.steering`: their names and sentences."""
+def choices(which: str) -> list[tuple[str, str]]:
+    """Names and sentences of the strategies in a mapping of :mod:`chilopod.steering`, for completion and help."""
+    from chilopod import steering
 
-    def completed() -> list[tuple[str, str]]:
-        from chilopod import steering
-
-        return [(each.name, each.sentence) for each in getattr(steering, which).values()]
-
-    return completed
+    return [(each.name, each.sentence) for each in getattr(steering, which).values()]
 
 
 RobotArg = Annotated[
@@ -99,10 +95,7 @@ EngineOption = Annotated[
         autocompletion=_engines,
     ),
 ]
-StrategyOption = Annotated[
-    str,
-    typer.Option(help="Strategy of turning; leg yaw is that of module 1.", autocompletion=strategies("STRATEGIES")),
-]
+StrategyOption = Annotated[str, typer.Option(help="Strategy of turning.", autocompletion=lambda: choices("STRATEGIES"))]
 ControllerOption = Annotated[
     str | None,
     typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
@@ -132,14 +125,13 @@ class _Group(TyperGroup):
     """A group that knows the commands of the groups in it: of ``export`` it says ``robot export``."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        typed = args[0]
         try:
             return super().resolve_command(ctx, args)
         except Exception as error:
-            named = [
-                f"{name} {args[0]}" for name, own in self.commands.items() if args[0] in vars(own).get("commands", ())
-            ]
-            if named and hasattr(error, "message"):
-                error.message += f" Did you mean {' or '.join(map(repr, named))}?"
+            groups = [name for name, own in self.commands.items() if typed in getattr(own, "commands", ())]
+            if groups and hasattr(error, "message"):
+                error.message += f" Did you mean {' or '.join(f'{name} {typed}' for name in groups)}?"
             raise
 
 
@@ -150,9 +142,9 @@ class _Command(TyperCommand):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         for option in self.params:
             if isinstance(option, TyperOption) and option.name == "strategy" and option.metavar is None:
-                choices = option.shell_complete(ctx, "")
-                option.metavar = "|".join(each.value for each in choices)
-                option.help = " ".join([option.help or "", *(f"{each.value}: {each.help}." for each in choices)])
+                known = option.shell_complete(ctx, "")
+                option.metavar = "|".join(each.value for each in known)
+                option.help = " ".join([option.help or "", *(f"{each.value}: {each.help}." for each in known)])
         super().format_help(ctx, formatter)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -161,13 +153,14 @@ class _Command(TyperCommand):
         except Exception as error:
             if hasattr(error, "ctx"):
                 error.ctx = error.ctx or ctx
-            wrong = getattr(error.__cause__, "errors", list)()
-            if not (wrong and hasattr(error, "param")):
+            cause = error.__cause__
+            if not (cause and hasattr(error, "param") and hasattr(cause, "errors")):
                 raise
-            problem = wrong[0]["msg"].partition(",")[0]
+            wrong = cause.errors()[0]
+            problem = wrong["msg"].partition(",")[0]
             for theirs, ours in _IN_WORDS.items():
                 problem = problem.replace(theirs, ours)
-            raise ParameterError(problem, field=max(error.param.opts, key=len), value=wrong[0]["input"]) from None
+            raise ParameterError(problem, field=max(error.param.opts, key=len), value=wrong["input"]) from None
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -192,12 +185,13 @@ def _as_typed(error: ChilopodError, ctx: Any) -> None:
 
 
 @contextmanager
-def reading(option: str) -> Iterator[None]:
-    """Give errors in this block the name of an option (its name in Python) as their field."""
+def reading(option: str, *words: str) -> Iterator[None]:
+    """Give errors in this block the name of an option (its name in Python) as their field, and words it may be."""
     try:
         yield
     except ChilopodError as error:
-        error.field = option
+        error.field, error.nearest = option, error.nearest or nearest_name(str(error.value), words)
+        error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
         raise
 
 
@@ -304,14 +298,9 @@ class WalkOptions(RobotOptions):
 
     def spring(self, path: str | None, k1: str, *words: str) -> float:
         """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad; errors name words that it may be."""
-        path = path or "springs.stiffness"
-        with reading("k1"):
-            try:
-                return self.described.override(path, k1).get(path)
-            except UnitError as error:
-                error.allowed = ", ".join(filter(None, (*words, error.allowed)))
-                error.nearest = error.nearest or nearest_name(k1, words)
-                raise
+        with reading("k1", *words):
+            path = path or "springs.stiffness"
+            return self.described.override(path, k1).get(path)
 
     @contextmanager
     def walking(self, what: str) -> Iterator[Callable[[str], Progress]]:
@@ -405,8 +394,12 @@ def free(paths: Iterable[Path], force: bool, ending: str = "") -> None:
     check_files(files, replace=force)
 
 
-def written(file: Path, robot: Robot, as_json: bool, **more: str) -> None:
-    """Name the file that a robot was written into, as JSON or as text."""
+def save(file: Path, text: str, robot: Robot, *, force: bool, as_json: bool, ending: str = "", **more: str) -> None:
+    """Write the text of a robot into a file, and name that, as JSON or as text."""
+    from chilopod.output import write_atomic
+
+    free([file], force, ending)
+    write_atomic(file, text, replace=force)
     if as_json:
         print_json({"robot": robot.name, "file": str(file), **more})
     else:

@@ -253,14 +253,9 @@ def twin(
         "identification-twin"
     ),
     force: ForceOption = False,
-    starts: Annotated[
-        int, typer.Option(metavar="N", help="Number of searches, each from another start.", min=1, max=100)
-    ] = 3,
+    starts: Annotated[int, typer.Option(metavar="N", help="Number of searches.", min=1, max=100)] = 3,
     generations: Annotated[
-        int,
-        typer.Option(
-            metavar="N", help="Generations in each search; a generation has ten evaluations.", min=1, max=1000
-        ),
+        int, typer.Option(metavar="N", help="Generations in a search, of ten evaluations each.", min=1, max=1000)
     ] = 14,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.", min=0)] = 1,
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin without the constants that are known.")] = False,

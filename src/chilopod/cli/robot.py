@@ -7,17 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    ForceOption,
-    JsonOption,
-    RobotArg,
-    SetOption,
-    free,
-    new_app,
-    print_json,
-    read_robot,
-    written,
-)
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot, save
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -54,17 +44,13 @@ def new(
     as_json: JsonOption = False,
 ) -> None:
     """Write a new robot file, named after the file, to edit by hand."""
-    from chilopod.output import write_atomic
-
-    free([file], force, ".toml")
     robot = read_robot((_WHOLE if twin else _PLANAR) if preset is None else preset, None)
     if twin and robot.twin is None:
         robot = robot.with_twin_of(read_robot(_WHOLE, None))
     if modules is not None:
         robot = robot.override("body.modules", modules)
     robot = read_robot(robot, overrides).with_(name=file.stem)
-    write_atomic(file, robot.to_toml(), replace=force)
-    written(file, robot, as_json)
+    save(file, robot.to_toml(), robot, force=force, as_json=as_json, ending=".toml")
 
 
 @app.command()
@@ -132,10 +118,8 @@ def export(
     as_json: JsonOption = False,
 ) -> None:
     """Write the three-dimensional model of a robot, which must have a [twin] section, for other programs."""
-    from chilopod.output import write_atomic
     from chilopod.twin.export import format_of
 
     name, write = format_of(out.suffix)
     described = read_robot(robot, overrides)
-    write_atomic(out, write(described), replace=force)
-    written(out, described, as_json, format=name)
+    save(out, write(described), described, force=force, as_json=as_json, format=name)

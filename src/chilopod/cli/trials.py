@@ -22,10 +22,7 @@ BROKEN = 2
 app = new_app("List, check and clean a folder in which trials are kept.")
 
 FolderArg = Annotated[
-    Path,
-    typer.Argument(
-        metavar="FOLDER", help="Folder given to --trials, or the folder trials of a report, such as report/trials."
-    ),
+    Path, typer.Argument(metavar="FOLDER", help="Folder given to --trials, or the folder `trials` of a report.")
 ]
 
 

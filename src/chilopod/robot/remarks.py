@@ -32,7 +32,9 @@ def remarks(robot: Robot) -> list[str]:
     if outside:
         found.append(f"Springs {', '.join(map(str, outside))} begin outside the range of their actuators.")
     found += _out_of_proportion(robot)
-    stale = {path for name in presets() for path in _stale(robot, Robot.load(name))}
+    own = {path: (shown, origin) for path, shown, origin in robot.listed() if path != "body.yaw_inertia"}
+    theirs = [row for name in presets() for row in Robot.load(name).listed() if row[0] in own]
+    stale = {path for path, shown, origin in theirs if own[path][1] == origin and own[path][0] != shown}
     if stale:
         found.append(f"Numbers that are not those of the preset, with its provenance: {', '.join(sorted(stale))}.")
     unexplained = [path for path in robot.parameters() if robot.provenance_of(path) is None]
@@ -63,10 +65,3 @@ def _out_of_proportion(robot: Robot) -> Iterator[str]:
         yield f"{path} = {text[path]} is unusually {'small' if ratio < low else 'large'} for {other} = {text[other]}."
     if odd:
         yield "Are the units right? A number without a unit is SI."
-
-
-def _stale(robot: Robot, preset: Robot) -> list[str]:
-    """Numbers that have the provenance of a preset, and are others than its."""
-    shared = [path for path in preset.parameters() if path in robot.parameters() and path != "body.yaw_inertia"]
-    same = [path for path in shared if robot.provenance_of(path) == preset.provenance_of(path)]
-    return [path for path in same if robot.get(path) != preset.get(path)]

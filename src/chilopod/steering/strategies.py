@@ -58,9 +58,7 @@ class Strategy:
             If the strategy does not accept the spring, or needs one.
         """
         if self.springs is not None and spring is None:
-            raise ParameterError(
-                f"strategy {self.name} needs one stiffness", field="k1", allowed="a stiffness such as 15 N*mm/deg"
-            )
+            raise ParameterError(f"strategy {self.name} needs one stiffness, such as 15 N*mm/deg", field="k1")
         if self.springs is None and spring is not None:
             raise ParameterError(
                 f"must not be given: strategy {self.name} sets its own springs", field="k1", value=spring

@@ -16,8 +16,6 @@ from chilopod.units.expressions import format, kind_of, parse
 # Far outside anything that walks, and far inside what products and quotients of a few quantities need to stay finite.
 _SMALLEST: Final = 1e-12
 _LARGEST: Final = 1e9
-# Messages of pydantic for its own kinds of mistakes, in the words of a robot file.
-_PLAIN_WORDS: Final = {"model_type": "must be a table"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,4 +174,5 @@ def _explained(error: ValidationError, model: type[Description]) -> ChilopodErro
         return ParameterError(
             "unknown key", field=field, allowed=", ".join(names), nearest=nearest_name(str(first["loc"][-1]), names)
         )
-    return ParameterError(_PLAIN_WORDS.get(first["type"], first["msg"]), field=field, value=first["input"])
+    problem = "must be a table" if first["type"] == "model_type" else first["msg"]
+    return ParameterError(problem, field=field, value=first["input"])
