@@ -50,7 +50,10 @@ def test_a_turn_in_three_dimensions_comes_with_a_replay(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["walk", "aoi2022-planar", "--engine", "twin"], "chilopod robot new FILE --twin"),
+        (
+            ["walk", "aoi2022-planar", "--engine", "twin"],
+            "must be given in the robot file for the three-dimensional model",
+        ),
         (["walk", ROBOT, "--engine", "twn"], "did you mean 'twin'?"),
         (["walk", ROBOT, "--engine", "twin", "--set", "twin.hip_height=130 mm"], "cannot reach its path"),
         (["walk", ROBOT, "--engine", "twin", "--set", "twin.link_mass=1 kg"], "must leave mass for the body"),

@@ -171,8 +171,8 @@ class _Command(TyperCommand):
 
 
 def _as_typed(error: ChilopodError, ctx: Any) -> None:
-    field, _, part = (error.field or "").partition(" ") if error.source is None else ("", "", "")
-    name = _TYPED_AS.get(field, field)
+    field, _, part = (error.field or "").partition(" ")
+    name = field if error.source else _TYPED_AS.get(field, field)  # a file has names of its own
     for option in ctx.command.params:
         if option.name != name or option.param_type_name != "option" or option.is_flag:
             continue
