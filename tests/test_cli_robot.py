@@ -163,7 +163,6 @@ def test_check():
         (["robto"], "No such command 'robto'"),
         (["export"], "Did you mean robot export?"),
         (["walk", PRESET, "--seed", "-1"], "error: --seed = '-1': must be at least 0"),
-        (["live", "--port", "http"], "--port = 'http': must be a valid integer"),
         (["branch", "--between", "3"], "(see chilopod branch --help)"),
         (["branch", PRESET, "--parameter", "springs.stiffness[7]", "--between", "3", "4"], "allowed: 0 to 4"),
         (["walk", PRESET, "--out", "walk.csv"], "walk.csv: must end with .nc"),

@@ -382,20 +382,6 @@ def test_missing_robots(name, complaint):
 # -- remarks
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "shown"),
-    [
-        ("legs.half_width", 73.2, "legs.half_width = 73.2 m is unusually large for body.length = 1.35 m."),
-        ("body.length", 1350, "body.mass = 8.5 kg is unusually small for body.length = 1350 m."),
-        ("gait.stance", 310, "gait.stance = 310 s is unusually large for gait.swing = 0.29 s."),
-        ("springs.stiffness", 41, "springs.stiffness[0] = 715.585 N*mm/deg is unusually large for ground.friction"),
-    ],
-)
-def test_numbers_out_of_proportion_are_worth_a_remark(robot, path, value, shown):
-    first, *_, note = remarks(robot.override(path, value))
-    assert (first[: len(shown)], note) == (shown, "Are the units right? A number without a unit is SI.")
-
-
 def test_remarks(robot):
     assert "whole period" in remarks(robot.override("gait.side_phase", "90 deg"))[0]
     assert "no foot of the robot" in remarks(robot.set_from_text(["gait.swing=9 s", "gait.module_phase=0"]))[0]
@@ -403,6 +389,13 @@ def test_remarks(robot):
     assert "reach" in remarks(robot.override("legs.forward_offset", "-1 m"))[0]
     edited = Robot.from_toml(robot.to_toml().replace("8.5 kg", "9 kg", 1))
     assert remarks(edited) == ["Numbers that are not those of the preset, with its provenance: body.mass."]
+    for text, shown in (
+        ("body.length=1350", "body.mass = 8.5 kg is unusually small for body.length = 1350 m."),
+        ("gait.stance=310", "gait.stance = 310 s is unusually large for gait.swing = 0.29 s."),
+        ("springs.stiffness=41", "springs.stiffness[0] = 715.585 N*mm/deg is unusually large for ground.friction = "),
+    ):
+        first, *_, note = remarks(robot.set_from_text([text]))
+        assert (first[: len(shown)], note) == (shown, "Are the units right? A number without a unit is SI.")
     assert "gait.stride" in remarks(robot.with_(provenance={}))[0]
 
 
