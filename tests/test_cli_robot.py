@@ -114,7 +114,6 @@ def test_new_with_a_twin_walks_in_three_dimensions(folder):
     "arguments",
     [
         ["."],
-        ["x.txt"],
         ["x.toml", "--modules", "1"],
         ["x.toml", "--modules", "many"],
         ["x.toml", "--preset", "aoi2023"],

@@ -390,7 +390,6 @@ def test_remarks(robot):
     edited = Robot.from_toml(robot.to_toml().replace("8.5 kg", "9 kg", 1))
     assert remarks(edited) == ["Numbers that are not those of the preset, with its provenance: body.mass."]
     for text, shown in (
-        ("body.length=1350", "body.mass = 8.5 kg is unusually small for body.length = 1350 m."),
         ("gait.stance=310", "gait.stance = 310 s is unusually large for gait.swing = 0.29 s."),
         ("springs.stiffness=41", "springs.stiffness[0] = 715.585 N*mm/deg is unusually large for ground.friction = "),
     ):
