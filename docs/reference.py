@@ -128,6 +128,7 @@ def commands_page() -> str:
     lines = [*_heading("All commands", "="), _COMMANDS_INTRODUCTION]
     for words, command in _commands("chilopod", typer.main.get_command(app)):
         context = typer.Context(command, info_name=words)
+        command.get_help(context)  # completes the choices of its options
         usage = command.get_usage(context).partition(": ")[2]
         lines += ["", *_heading(f"``{words}``", "-"), f".. program:: {words}", "", ".. code-block:: text", ""]
         lines += [f"   {usage}", "", _escaped(inspect.cleandoc(command.help or ""))]

@@ -84,7 +84,7 @@ def test_the_help_has_all_choices(capsys):
         (["--repeats", "99999", "--seed", "1", "--patience", "1e4 s"], "record: would take "),
         (["--set", "springs.adjustable=false"], "springs.adjustable[0] = False: must be true"),
         (["--set", "legs.half_width=0.3 m"], "strategy variable needs a radius law of the first spring"),
-        (["--engine", "twin"], "twin: must be given in the robot file"),
+        (["--engine", "twin"], "--engine = 'twin': the table [twin] must be given in the robot file"),
     ],
 )
 def test_what_cannot_be_walked_is_one_line(capsys, monkeypatch, tmp_path, more, start):

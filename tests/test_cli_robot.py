@@ -151,6 +151,12 @@ def test_check():
     [
         (["robot", "sho", PRESET], "No such command 'sho'"),
         (["robto"], "No such command 'robto'"),
+        (["export"], "Did you mean robot export?"),
+        (["walk", PRESET, "--seed", "-1"], "error: --seed = '-1': must be at least 0"),
+        (["branch", "--between", "3"], "(see chilopod branch --help)"),
+        (["branch", PRESET, "--parameter", "springs.stiffness[7]", "--between", "3", "4"], "allowed: 0 to 4"),
+        (["walk", PRESET, "--out", "walk.csv"], "walk.csv: must end with .nc"),
+        (["turn", PRESET, "--target", "0 deg, 1 m", "--k1", "autoo"], "did you mean 'auto'?"),
         (["robot", "show"], "Missing argument"),
         (["robot", "show", PRESET, "extra"], "extra"),
         (["robot", "show", PRESET, "--jsn"], "--jsn"),

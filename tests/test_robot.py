@@ -387,6 +387,14 @@ def test_remarks(robot):
     assert "no foot of the robot" in remarks(robot.set_from_text(["gait.swing=9 s", "gait.module_phase=0"]))[0]
     assert "a module has no foot" in remarks(robot.override("gait.swing", "0.4 s"))[0]
     assert "reach" in remarks(robot.override("legs.forward_offset", "-1 m"))[0]
+    edited = Robot.from_toml(robot.to_toml().replace("8.5 kg", "9 kg", 1))
+    assert remarks(edited) == ["Numbers that are not those of the preset, with its provenance: body.mass."]
+    for text, shown in (
+        ("gait.stance=310", "gait.stance = 310 s is unusually large for gait.swing = 0.29 s."),
+        ("springs.stiffness=41", "springs.stiffness[0] = 715.585 N*mm/deg is unusually large for ground.friction = "),
+    ):
+        first, *_, note = remarks(robot.set_from_text([text]))
+        assert (first[: len(shown)], note) == (shown, "Are the units right? A number without a unit is SI.")
     assert "gait.stride" in remarks(robot.with_(provenance={}))[0]
 
 

@@ -26,6 +26,8 @@ def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
         # Some virtual files of the system claim to be regular and block.
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
             content = file.read(_LARGEST + 1) or b""
+    except FileNotFoundError:
+        raise refused("no such file", source=source) from None
     except (OSError, ValueError) as error:
         if isinstance(error, ChilopodError):
             raise

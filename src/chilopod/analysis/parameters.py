@@ -5,6 +5,7 @@ from __future__ import annotations
 from chilopod import units
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
+from chilopod.robot.parameters import QUANTITIES
 
 K1 = "springs.stiffness[0]"
 ALL = "springs.stiffness"
@@ -33,7 +34,7 @@ def check_parameter(robot: Robot, parameter: str) -> None:
     try:
         robot.unit_of(parameter)
     except ParameterError as error:
-        error.allowed = error.allowed and ", ".join(read)
+        error.allowed = ", ".join(read) if error.allowed == ", ".join(QUANTITIES) else error.allowed
         raise
     if parameter == "body.modules":
         raise ParameterError("must be a continuous parameter, not a whole number", field="parameter", value=parameter)

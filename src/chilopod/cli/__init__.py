@@ -38,7 +38,7 @@ app.command("live", short_help="Watch a robot walk in the browser, and change it
 app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(play.play)
 app.add_typer(reproduce.identify_app, name="identify")
 app.add_typer(trials.app, name="trials")
-app.command("doctor", short_help="Check that all is here that chilopod needs, and mend it.")(doctor.doctor)
+app.command("doctor", short_help="Check the installation, and print what mends it.")(doctor.doctor)
 
 
 @app.callback(invoke_without_command=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, WalkOptions, reading, with_options
+from chilopod.cli.options import OutOption, WalkOptions, choices, reading, with_options
 
 if TYPE_CHECKING:
     from chilopod.progress import Progress
@@ -18,12 +18,6 @@ def _courses() -> list[str]:
     from chilopod.steering import COURSES
 
     return [*COURSES, "random:"]
-
-
-def _strategies() -> list[str]:
-    from chilopod.steering import ON_COURSES
-
-    return list(ON_COURSES)
 
 
 TargetsOption = Annotated[
@@ -38,13 +32,7 @@ TargetsOption = Annotated[
 ]
 StrategyOption = Annotated[
     str,
-    typer.Option(
-        metavar="variable|pitchfork|hopf|leg-yaw|actuated",
-        help="Strategy of turning. variable: first spring set anew in every gait cycle; pitchfork: soft first "
-        "spring, the same all the way; hopf: all springs alike and soft; leg-yaw: springs as they are; actuated: "
-        "torques at all joints. In all of them the legs of module 1 yaw towards the target.",
-        autocompletion=_strategies,
-    ),
+    typer.Option(help="Strategy of turning, with leg yaw of module 1.", autocompletion=lambda: choices("ON_COURSES")),
 ]
 
 

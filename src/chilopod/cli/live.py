@@ -12,26 +12,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import EngineOption, ForceOption, SetOption, free, read_robot, reading, with_options
+from chilopod.cli.options import EngineOption, ForceOption, SetOption, choices, free, read_robot, reading, with_options
 from chilopod.live.wishes import LARGEST_SEED, check_port
 
 if TYPE_CHECKING:
     from chilopod.live import Live
 
 
-def _strategies() -> list[str]:
-    from chilopod.steering import ON_THE_WAY
-
-    return list(ON_THE_WAY)
-
-
 StrategyOption = Annotated[
     str,
-    typer.Option(
-        metavar="variable|leg-yaw|actuated",
-        help="Strategy on the way to a target; the page can change it.",
-        autocompletion=_strategies,
-    ),
+    typer.Option(help="Strategy at the start; the page can change it.", autocompletion=lambda: choices("ON_THE_WAY")),
 ]
 HostOption = Annotated[
     str,

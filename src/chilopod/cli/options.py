@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from chilopod.cli.progress import progress_bar
 from chilopod.cli.user_code import own_code, own_controller
-from chilopod.errors import ChilopodError
+from chilopod.errors import ChilopodError, ParameterError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod import tasks
@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 
 Found = TypeVar("Found", bound="Runs")
 
-_TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1"}
+_TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1", "twin": "engine", "body.modules": "modules"}
 """Options that are called otherwise than the argument of the function that they are for."""
+
+_IN_WORDS = {"Input should be": "must be", "greater than or equal to": "at least", "less than or equal to": "at most"}
+"""Words for those of pydantic, which checks the numbers of options."""
 
 
 def _engines() -> list[str]:
@@ -36,10 +39,11 @@ def _engines() -> list[str]:
     return list(ENGINES)
 
 
-def _strategies() -> list[str]:
-    from chilopod.steering import STRATEGIES
+def choices(which: str) -> list[tuple[str, str]]:
+    """Names and sentences of the strategies in a mapping of :mod:`chilopod.steering`, for completion and help."""
+    from chilopod import steering
 
-    return list(STRATEGIES)
+    return [(each.name, each.sentence) for each in getattr(steering, which).values()]
 
 
 RobotArg = Annotated[
@@ -91,15 +95,7 @@ EngineOption = Annotated[
         autocompletion=_engines,
     ),
 ]
-StrategyOption = Annotated[
-    str,
-    typer.Option(
-        metavar="pitchfork|hopf|leg-yaw|open-loop",
-        help="Strategy of turning. pitchfork: soft first spring, and legs of module 1 that yaw towards the target; "
-        "hopf: all springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: soft first spring alone.",
-        autocompletion=_strategies,
-    ),
-]
+StrategyOption = Annotated[str, typer.Option(help="Strategy of turning.", autocompletion=lambda: choices("STRATEGIES"))]
 ControllerOption = Annotated[
     str | None,
     typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
@@ -125,8 +121,46 @@ ClusterOption = Annotated[
 ]
 
 
+class _Group(TyperGroup):
+    """A group that knows the commands of the groups in it: of ``export`` it says ``robot export``."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        typed = args[0]
+        try:
+            return super().resolve_command(ctx, args)
+        except Exception as error:
+            groups = [name for name, own in self.commands.items() if typed in getattr(own, "commands", ())]
+            if groups and hasattr(error, "message"):
+                error.message += f" Did you mean {' or '.join(f'{name} {typed}' for name in groups)}?"
+            raise
+
+
 class _Command(TyperCommand):
-    """A command whose mistakes are named as they were typed: ``--duration``, and the text behind it."""
+    """A command whose mistakes are named as they were typed, ``--duration`` and the text behind it, and whose help
+    lists the choices that are registered."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        for option in self.params:
+            if isinstance(option, TyperOption) and option.name == "strategy" and option.metavar is None:
+                known = option.shell_complete(ctx, "")
+                option.metavar = "|".join(each.value for each in known)
+                option.help = " ".join([option.help or "", *(f"{each.value}: {each.help}." for each in known)])
+        super().format_help(ctx, formatter)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            if hasattr(error, "ctx"):
+                error.ctx = error.ctx or ctx
+            cause = error.__cause__
+            if not (cause and hasattr(error, "param") and hasattr(cause, "errors")):
+                raise
+            wrong = cause.errors()[0]
+            problem = wrong["msg"].partition(",")[0]
+            for theirs, ours in _IN_WORDS.items():
+                problem = problem.replace(theirs, ours)
+            raise ParameterError(problem, field=max(error.param.opts, key=len), value=wrong["input"]) from None
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -138,7 +172,7 @@ class _Command(TyperCommand):
 
 def _as_typed(error: ChilopodError, ctx: Any) -> None:
     field, _, part = (error.field or "").partition(" ")
-    name = _TYPED_AS.get(field, field)
+    name = field if error.source else _TYPED_AS.get(field, field)  # a file has names of its own
     for option in ctx.command.params:
         if option.name != name or option.param_type_name != "option" or option.is_flag:
             continue
@@ -151,12 +185,13 @@ def _as_typed(error: ChilopodError, ctx: Any) -> None:
 
 
 @contextmanager
-def reading(option: str) -> Iterator[None]:
-    """Give errors in this block the name of an option (its name in Python) as their field."""
+def reading(option: str, *words: str) -> Iterator[None]:
+    """Give errors in this block the name of an option (its name in Python) as their field, and words it may be."""
     try:
         yield
     except ChilopodError as error:
-        error.field = option
+        error.field, error.nearest = option, error.nearest or nearest_name(str(error.value), words)
+        error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
         raise
 
 
@@ -170,6 +205,7 @@ def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
     app = _App(
         help=help_text,
+        cls=_Group,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         add_completion=completion,
@@ -197,15 +233,15 @@ def walking_on(cluster: str | None) -> Iterator[None]:
         yield
 
 
-def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
-    """Load a robot and apply the overrides of ``--set``."""
-    from chilopod.robot import load_robot
+def read_robot(robot: str | Robot, overrides: Sequence[str] | None) -> Robot:
+    """Load a robot, unless it is one, and apply the overrides of ``--set``."""
+    from chilopod.robot import Robot, load_robot
 
-    described = load_robot(robot)
+    described = robot if isinstance(robot, Robot) else load_robot(robot)
     try:
         return described.set_from_text(overrides or ())
     except ChilopodError as error:
-        error.field = error.field or "--set"
+        error.field = f"--set {error.field or ''}".strip()
         raise
 
 
@@ -260,9 +296,9 @@ class WalkOptions(RobotOptions):
         """Options of every task, with the function that shows its progress."""
         return {"seed": self.seed, "repeats": self.repeats, "folder": self.trials, "progress": progress}
 
-    def spring(self, path: str | None, k1: str) -> float:
-        """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad."""
-        with reading("k1"):
+    def spring(self, path: str | None, k1: str, *words: str) -> float:
+        """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad; errors name words that it may be."""
+        with reading("k1", *words):
             path = path or "springs.stiffness"
             return self.described.override(path, k1).get(path)
 
@@ -346,11 +382,28 @@ def json_text(result: dict[str, Any]) -> str:
     return json.dumps(result, indent=2, allow_nan=False)
 
 
-def free(paths: Iterable[Path], force: bool) -> None:
-    """Make sure, before any work is done for them, that files can be written and replace none without ``--force``."""
+def free(paths: Iterable[Path], force: bool, ending: str = "") -> None:
+    """Make sure, before any work is done for them, that files can be written, that none is replaced without
+    ``--force``, and that no name ends as that of another format; it may have no ending."""
     from chilopod.output import check_files
 
-    check_files(paths, replace=force)
+    files = list(paths)
+    for file in files:
+        if ending and file.suffix.lower() not in ("", ending):
+            raise ParameterError(f"must end with {ending}", source=str(file))
+    check_files(files, replace=force)
+
+
+def save(file: Path, text: str, robot: Robot, *, force: bool, as_json: bool, ending: str = "", **more: str) -> None:
+    """Write the text of a robot into a file, and name that, as JSON or as text."""
+    from chilopod.output import write_atomic
+
+    free([file], force, ending)
+    write_atomic(file, text, replace=force)
+    if as_json:
+        print_json({"robot": robot.name, "file": str(file), **more})
+    else:
+        typer.echo(": ".join([f"wrote {file}", *more.values()]))
 
 
 def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:
@@ -374,7 +427,6 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
     """Read the interval of a parameter, in SI units, and refuse one that is reversed or that the robot cannot have."""
     from chilopod import units
     from chilopod.analysis.parameters import check_parameter
-    from chilopod.errors import ParameterError
 
     with reading("parameter"):
         check_parameter(robot, parameter)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import ForceOption, JsonOption, SetOption, free, print_json, read_robot
+from chilopod.cli.options import ForceOption, JsonOption, SetOption, free, read_robot, save
 from chilopod.cli.progress import progress_bar
 
 
@@ -30,17 +30,12 @@ def play(
 
     Example: chilopod play aoi2022-planar --out play.html
     """
-    from chilopod.output import write_atomic
     from chilopod.show.play import play as page
 
     described = read_robot(robot, overrides)
-    free([out], force)
+    free([out], force, ".html")
     with progress_bar("play") as show:
         html = page(described, lambda done, words: show("branch of curved walks", done, words))
-    write_atomic(out, html, replace=force)
-    if as_json:
-        print_json({"robot": described.name, "file": str(out)})
-    else:
-        typer.echo(f"wrote {out}")
+    save(out, html, described, force=force, as_json=as_json)
     if browser:
         webbrowser.open(out.resolve().as_uri())

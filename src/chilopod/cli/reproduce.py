@@ -27,6 +27,7 @@ from chilopod.cli.options import (
     with_options,
 )
 from chilopod.cli.progress import progress_bar
+from chilopod.errors import ParameterError
 from chilopod.paper.registry import REGISTRY, chosen
 
 if TYPE_CHECKING:
@@ -52,10 +53,10 @@ OnlyOption = Annotated[
     ),
 ]
 ReportOption = Annotated[
-    Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
+    Path, typer.Option("--out", metavar="FOLDER", help="Folder of the report; an existing report is continued.")
 ]
 TinyOption = Annotated[
-    bool, typer.Option("--tiny", help="Hardly anything of every section: to see that all works, not what it finds.")
+    bool, typer.Option("--tiny", help="Smallest size of every section, to test that all run; the results mean nothing.")
 ]
 AllOption = Annotated[bool, typer.Option("--all", help="Every study beyond the paper, with all trials: an hour.")]
 QuickOption = Annotated[bool, typer.Option("--quick", help="The paper's main experiments: three minutes.")]
@@ -84,12 +85,10 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
 
     By default it has the paper's own experiments and one headline of every chapter beyond them, which takes ten
     minutes; the first line says how long it takes here. The page is there at once and fills in. Trials are kept in the
-    folder, so a run that was stopped goes on where it was. It takes no robot and no --set: the numbers beside which it
-    puts its own are those of the paper's robot.
+    folder, so a run that was stopped goes on where it was. It takes no robot and no --set, because the paper's
+    numbers hold for its own robot only.
     """
     if options.overrides:
-        from chilopod.errors import ParameterError
-
         problem = "must not be given, because the paper's numbers are those of its own robot"
         allowed = "no --set; stability, bifurcation, branch, walk and turn take any robot"
         raise ParameterError(problem, field="--set", value=options.overrides[0], allowed=allowed)
@@ -193,7 +192,7 @@ def planar(
     overrides: SetOption = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path("identification"),
     force: ForceOption = False,
-    points: Annotated[int, typer.Option(metavar="N", help="Points of the profile.", min=3, max=200)] = 25,
+    points: Annotated[int, typer.Option(metavar="N", help="Number of points of the profile.", min=3, max=200)] = 25,
     data: Annotated[
         Path | None,
         typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
@@ -201,7 +200,7 @@ def planar(
     template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Friction, half-width and forward offset of the feet from the critical k1 and its mode, and how sure they are.
+    """Friction, half-width and forward offset of the feet from the critical k1 and its mode, with their uncertainty.
 
     Writes the profile over the forward offset as a figure and as data, and the robot with the best constants. The
     data are the numbers that the paper prints, or your own.
@@ -211,6 +210,8 @@ def planar(
     from chilopod.tasks.identify import TEMPLATE, CriticalMode, identify_planar
 
     if template:
+        if data is not None:
+            raise ParameterError("must not be given with --template", field="--data", value=str(data))
         typer.echo(TEMPLATE, nl=False)
         return
     described = read_robot(robot, overrides)
@@ -252,15 +253,15 @@ def twin(
         "identification-twin"
     ),
     force: ForceOption = False,
-    starts: Annotated[int, typer.Option(metavar="N", help="Searches, from different places.", min=1, max=100)] = 3,
+    starts: Annotated[int, typer.Option(metavar="N", help="Number of searches.", min=1, max=100)] = 3,
     generations: Annotated[
-        int, typer.Option(metavar="N", help="Of ten evaluations each, in every search.", min=1, max=1000)
+        int, typer.Option(metavar="N", help="Generations in a search, of ten evaluations each.", min=1, max=1000)
     ] = 14,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of the search.", min=0)] = 1,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.", min=0)] = 1,
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin without the constants that are known.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Constants of the three-dimensional robot from the paper's base series of walks, and how sure they are.
+    """Constants of the three-dimensional robot from the paper's base series of walks, with their uncertainty.
 
     Half an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
     was, and with --force one that has ended goes on with more. The preset aoi2022 is what this finds by default.

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot, reading
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot, save
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -44,19 +44,13 @@ def new(
     as_json: JsonOption = False,
 ) -> None:
     """Write a new robot file, named after the file, to edit by hand."""
-    from chilopod.output import write_atomic
-
     robot = read_robot((_WHOLE if twin else _PLANAR) if preset is None else preset, None)
     if twin and robot.twin is None:
         robot = robot.with_twin_of(read_robot(_WHOLE, None))
-    with reading("modules"):
-        robot = robot.set_from_text([f"body.modules={modules}"] if modules is not None else [])
-    robot = robot.set_from_text(overrides or []).with_(name=file.stem)
-    write_atomic(file, robot.to_toml(), replace=force)
-    if as_json:
-        print_json({"robot": robot.name, "file": str(file)})
-    else:
-        typer.echo(f"wrote {file}")
+    if modules is not None:
+        robot = robot.override("body.modules", modules)
+    robot = read_robot(robot, overrides).with_(name=file.stem)
+    save(file, robot.to_toml(), robot, force=force, as_json=as_json, ending=".toml")
 
 
 @app.command()
@@ -113,7 +107,7 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
         typer.echo(f"  {remark}")
 
 
-@app.command()
+@app.command(short_help="Write the robot in 3-D for other programs (MJCF, URDF).")
 def export(
     robot: RobotArg,
     out: Annotated[
@@ -124,13 +118,8 @@ def export(
     as_json: JsonOption = False,
 ) -> None:
     """Write the three-dimensional model of a robot, which must have a [twin] section, for other programs."""
-    from chilopod.output import write_atomic
     from chilopod.twin.export import format_of
 
     name, write = format_of(out.suffix)
     described = read_robot(robot, overrides)
-    write_atomic(out, write(described), replace=force)
-    if as_json:
-        print_json({"robot": described.name, "file": str(out), "format": name})
-    else:
-        typer.echo(f"wrote {out}: {name}")
+    save(out, write(described), described, force=force, as_json=as_json, format=name)

@@ -22,10 +22,7 @@ BROKEN = 2
 app = new_app("List, check and clean a folder in which trials are kept.")
 
 FolderArg = Annotated[
-    Path,
-    typer.Argument(
-        metavar="FOLDER", help="Folder that --trials named; of a report its folder trials, such as report/trials."
-    ),
+    Path, typer.Argument(metavar="FOLDER", help="Folder given to --trials, or the folder `trials` of a report.")
 ]
 
 
@@ -107,7 +104,7 @@ def _cells(row: Group) -> tuple[str, ...]:
     return row.robot, row.engine, f"{row.duration:g} s", target, controller, *numbers, size
 
 
-@app.command()
+@app.command(short_help="Check that every trial in a folder is whole.")
 def check(folder: FolderArg, as_json: JsonOption = False) -> None:
     """Check that every trial in a folder is whole: its checksum, and that its name belongs to its content.
 
@@ -138,7 +135,7 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
         raise typer.Exit(BROKEN)
 
 
-@app.command()
+@app.command(short_help="Remove damaged and unfinished files from a folder.")
 def clean(
     folder: FolderArg,
     old: Annotated[bool, typer.Option("--old", help="Remove trials of other versions too.")] = False,

@@ -57,7 +57,7 @@ def turn(
 
     described = options.described
     goal, chosen = Target.parse(target), strategy_named(strategy)
-    spring = k1 if k1 in ("auto", "law") else options.spring(chosen.springs, k1)
+    spring = k1 if k1 in ("auto", "law") else options.spring(chosen.springs, k1, "auto", "law")
     with reading("duration"):
         seconds = None if duration is None else units.parse(duration, "s")
 

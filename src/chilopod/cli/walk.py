@@ -48,7 +48,7 @@ def walk(
         seconds = units.parse(duration, "s")
     with reading("initial_joints"):
         angles = joint_angles(initial_joints)
-    free([out] if out else [], options.force)
+    free([out] if out else [], options.force, ".nc")
     from chilopod.record import RATE
     from chilopod.tasks import ends
     from chilopod.trials import Trial

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from chilopod.engine import Command
 from chilopod.engine.arguments import as_array
-from chilopod.errors import ParameterError
+from chilopod.errors import ParameterError, nearest_name
 from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.steering.leg_yaw import SIDES, LegYawController
@@ -58,7 +58,8 @@ class Actions:
         the axis to that spring. Raises ParameterError if a spring has no actuator, or an empty range.
         """
         if springs not in SPRINGS:
-            raise ParameterError(f"must be {' or '.join(SPRINGS)}", field="springs", value=springs)
+            nearest = nearest_name(str(springs), SPRINGS)
+            raise ParameterError(f"must be {' or '.join(SPRINGS)}", field="springs", value=springs, nearest=nearest)
         own = robot.springs
         if own.adjustable is None:
             every = springs == "all"

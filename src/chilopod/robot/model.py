@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
@@ -19,7 +19,7 @@ from chilopod.robot.files import Table, described, parsed, read_table, to_toml
 from chilopod.robot.inertia import module_yaw_inertia
 from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
 from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
-from chilopod.units import Description, Flag, quantities
+from chilopod.units import Description, Flag, Quantity, quantities
 
 _OVERRIDDEN: Final = "set by override"
 _DERIVED: Final = "body.yaw_inertia"  # the one optional number that has a value where none is given
@@ -207,24 +207,14 @@ class Robot(Description):
         stay. The provenance of a changed parameter becomes a note that it was overridden. ParameterError if `value` is
         out of range.
         """
-        place = self._locate(path)
-        try:
-            return self._replaced(path, place, place.quantity.check(value))
-        except ParameterError as error:
-            error.field = path
-            raise
+        return self._changed(path, lambda quantity: quantity.check(value))
 
     def override(self, path: str, value: object) -> Self:
         """Return this robot with one parameter changed: a number in SI units or text with its unit.
 
         Like `with_value`; also raises `UnitError` if the text is not a quantity or has another dimension.
         """
-        place = self._locate(path)
-        try:
-            return self._replaced(path, place, place.quantity.read(value))
-        except ChilopodError as error:
-            error.field = path
-            raise
+        return self._changed(path, lambda quantity: quantity.read(value))
 
     def set_from_text(self, assignments: Iterable[str]) -> Self:
         """Return this robot with overrides such as ``springs.stiffness[0]=12 N*mm/deg`` made in the order given."""
@@ -301,6 +291,14 @@ class Robot(Description):
         if place.index is not None and place.index >= self.body.modules - 1:
             raise ParameterError("must be the index of a spring", field=path, allowed=f"0 to {self.body.modules - 2}")
         return place
+
+    def _changed(self, path: str, read: Callable[[Quantity], float]) -> Self:
+        place = self._locate(path)
+        try:
+            return self._replaced(path, place, read(place.quantity))
+        except ChilopodError as error:
+            error.field = path
+            raise
 
     def _replaced(self, path: str, place: Place, value: float) -> Self:
         # Every field is checked on its own and the counts keep, so little needs validating again.

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
+from chilopod.robot.files import presets
 from chilopod.robot.model import Robot
 
 
@@ -29,7 +31,37 @@ def remarks(robot: Robot) -> list[str]:
     ]
     if outside:
         found.append(f"Springs {', '.join(map(str, outside))} begin outside the range of their actuators.")
+    found += _out_of_proportion(robot)
+    own = {path: (shown, origin) for path, shown, origin in robot.listed() if path != "body.yaw_inertia"}
+    theirs = [row for name in presets() for row in Robot.load(name).listed() if row[0] in own]
+    stale = {path for path, shown, origin in theirs if own[path][1] == origin and own[path][0] != shown}
+    if stale:
+        found.append(f"Numbers that are not those of the preset, with its provenance: {', '.join(sorted(stale))}.")
     unexplained = [path for path in robot.parameters() if robot.provenance_of(path) is None]
     if unexplained:
         found.append(f"Numbers without provenance: {', '.join(unexplained)}.")
     return found
+
+
+def _out_of_proportion(robot: Robot) -> Iterator[str]:
+    """Numbers far from others, mostly of a wrong unit. Ratios fit chains of 2 to 1000 modules, long or short."""
+    body, gait, springs, module = robot.body, robot.gait, robot.springs.stiffness, robot.module_length
+    soft, stiff = (f"springs.stiffness[{springs.index(each)}]" for each in (min(springs), max(springs)))
+    drag = robot.ground.friction * gait.speed * gait.duty * module  # N*m
+    feet = ("legs.half_width", "legs.forward_offset")
+    lengths = (*feet, "twin.hip_height", "twin.body_width", "twin.body_height") if robot.twin else feet
+    pairs = [
+        ("body.mass", "body.length", body.mass / (body.length**2 * module), 0.05, 5000.0),  # kg/m^3
+        *((path, "body.length", abs(robot.get(path)) / body.length, 0.0, 0.5) for path in lengths),
+        ("gait.stride", "body.length", gait.stride / body.length, 1e-3 / body.modules, 1.0),
+        ("gait.stance", "gait.swing", gait.stance / gait.swing, 0.02, 50.0),
+        ("gait.stride", "gait.stance", gait.speed / module, 0.005, 500.0),  # 1/s
+        (soft, "ground.friction", min(springs) / drag, 0.01, math.inf),
+        (stiff, "ground.friction", max(springs) / drag, 0.0, body.modules),
+    ]
+    text = {path: shown for path, shown, _ in robot.listed()}
+    odd = [each for each in pairs if not each[3] <= each[2] <= each[4]]
+    for path, other, ratio, low, _ in odd:
+        yield f"{path} = {text[path]} is unusually {'small' if ratio < low else 'large'} for {other} = {text[other]}."
+    if odd:
+        yield "Are the units right? A number without a unit is SI."

@@ -58,7 +58,7 @@ class Strategy:
             If the strategy does not accept the spring, or needs one.
         """
         if self.springs is not None and spring is None:
-            raise ParameterError(f"strategy {self.name} needs one stiffness", field="k1", allowed="a stiffness")
+            raise ParameterError(f"strategy {self.name} needs one stiffness, such as 15 N*mm/deg", field="k1")
         if self.springs is None and spring is not None:
             raise ParameterError(
                 f"must not be given: strategy {self.name} sets its own springs", field="k1", value=spring
@@ -188,5 +188,7 @@ def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Str
     """
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
-        raise ParameterError("must be a strategy", field="strategy", value=name, allowed=allowed, nearest=nearest)
+        others = [task for task, own in (("turn", STRATEGIES), ("course", ON_COURSES)) if name in own]
+        problem = f"must be a strategy{' of this task; it is one of chilopod ' if others else ''}{' and '.join(others)}"
+        raise ParameterError(problem, field="strategy", value=name, allowed=allowed, nearest=nearest)
     return among[name]

@@ -100,7 +100,7 @@ def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:
     """Return the format of a suffix, such as ``.urdf``; ParameterError for another suffix."""
     if suffix.lower() not in FORMATS:
         allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
-        raise ParameterError("must be the suffix of a format", field="out", value=suffix, allowed=allowed)
+        raise ParameterError(f"must end with {allowed}", field="out", value=suffix)
     return FORMATS[suffix.lower()]
 
 

@@ -64,7 +64,7 @@ def check_reach(robot: Robot) -> None:
 def twin_of(robot: Robot) -> Twin:
     """The table [twin] of the robot; ParameterError if it is missing."""
     if robot.twin is None:
-        problem = "must be given in the robot file for the three-dimensional model"
-        allowed = "the keys of [twin] in the robot file; the preset aoi2022 has them"
+        problem = "the table [twin] must be given in the robot file for the three-dimensional model"
+        allowed = "the preset aoi2022, or a file of `chilopod robot new FILE --twin`"
         raise ParameterError(problem, field="twin", allowed=allowed)
     return robot.twin

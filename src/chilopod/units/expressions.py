@@ -162,7 +162,7 @@ def parse(value: object, si_unit: str) -> float:
         The double nearest to the quantity in SI units; UnitError if `value` is neither, its unit is unknown or of
         another dimension, or it is not finite.
     """
-    kind = _kind(unit(si_unit).dimension)
+    kind = kind_of(si_unit)
     if isinstance(value, Real) and not isinstance(value, bool):
         try:
             number = float(value)
@@ -191,7 +191,7 @@ def parse(value: object, si_unit: str) -> float:
                 nearest = None
             raise UnitError(error.problem, value=value, allowed=kind, nearest=nearest) from None
         if given.dimension != unit(si_unit).dimension:
-            raise UnitError(f"is {_kind(given.dimension, example=False)}", value=value, allowed=kind)
+            raise UnitError(f"is {kind_of(unit_text).partition(' such as ')[0]}", value=value, allowed=kind)
         size = given.size
     number = _nearest_double(Fraction(digits) * size)
     if not math.isfinite(number):
@@ -262,10 +262,11 @@ def _named(name: str, text: str) -> Unit:
     raise UnitError(f"unknown unit {name!r}", value=text, nearest=nearest_name(name, known))
 
 
-def _kind(dimension: tuple[int, int, int, int], example: bool = True) -> str:
-    kind = _KINDS.get(dimension)
-    if kind is not None:
-        return kind if example else kind.partition(" such as ")[0]
+def kind_of(unit_text: str) -> str:
+    """Words for the quantities of a unit, such as ``a length such as m or cm``."""
+    dimension = unit(unit_text).dimension
+    if dimension in _KINDS:
+        return _KINDS[dimension]
     names = zip(("m", "kg", "s", "rad"), dimension, strict=True)
     powers = (name if power == 1 else f"{name}^{power}" for name, power in names if power)
     return f"of dimension {'*'.join(powers)}"

@@ -11,13 +11,11 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationErro
 from pydantic_core import CoreSchema, core_schema
 
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
-from chilopod.units.expressions import format, parse
+from chilopod.units.expressions import format, kind_of, parse
 
 # Far outside anything that walks, and far inside what products and quotients of a few quantities need to stay finite.
 _SMALLEST: Final = 1e-12
 _LARGEST: Final = 1e9
-# Messages of pydantic for its own kinds of mistakes, in the words of a robot file.
-_PLAIN_WORDS: Final = {"model_type": "must be a table"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,10 +166,13 @@ def _explained(error: ValidationError, model: type[Description]) -> ChilopodErro
         cause.field = field + inner if inner.startswith("[") or not (field and inner) else f"{field}.{inner}"
         return cause
     if first["type"] == "missing":
-        return ParameterError("is missing", field=field)
+        own, part = quantities(model).get(field), model.model_fields[field].annotation
+        keys = f"a table of {', '.join(part.model_fields)}" if isinstance(part, type(BaseModel)) else None
+        return ParameterError("is missing", field=field, allowed=kind_of(own.si) if own else keys)
     if first["type"] == "extra_forbidden":
         names = list(model.model_fields)
         return ParameterError(
             "unknown key", field=field, allowed=", ".join(names), nearest=nearest_name(str(first["loc"][-1]), names)
         )
-    return ParameterError(_PLAIN_WORDS.get(first["type"], first["msg"]), field=field, value=first["input"])
+    problem = "must be a table" if first["type"] == "model_type" else first["msg"]
+    return ParameterError(problem, field=field, value=first["input"])

@@ -60,8 +60,9 @@ class CriticalMode(Description):
     @model_validator(mode="after")
     def _is_a_critical_mode(self) -> Self:
         if not (len(self.between) == 2 and self.between[0] < self.k1 < self.between[1]):
-            shown = [units.format(each, _STIFFNESS.display) for each in self.between]
-            raise ParameterError("must hold k1", field="between", value=shown, allowed="two rising springs")
+            k1, *shown = (units.format(each, _STIFFNESS.display, digits=6) for each in (self.k1, *self.between))
+            problem = f"must be two rising springs with k1 = {k1} between them"
+            raise ParameterError(problem, field="between", value=shown, allowed="text with a unit; bare numbers are SI")
         mode = np.array(self.components)
         if abs(np.linalg.norm(mode) - 1.0) > _UNIT:
             raise ParameterError(

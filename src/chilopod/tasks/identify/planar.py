@@ -164,10 +164,10 @@ class Identification(Summary):
 
 def residuals(robot: Robot, data: CriticalMode) -> Array:
     """Computed numbers less the data, over their tolerance, shape (N,)."""
-    count = len(data.components) + 1
-    if robot.body.modules != count:
-        problem = f"must be {count}, the number of modules in the mode of the data"
-        raise AnalysisError(problem, field="body.modules", value=robot.body.modules)
+    count = robot.body.modules
+    if len(data.components) != count - 1:
+        problem = f"must be {count - 1} numbers, one for each joint of {robot.name}"
+        raise AnalysisError(problem, field="data components", value=data.components)
     try:
         points = bifurcations(robot, K1, (data.between[0], data.between[1]), normal_form=False)
     except AnalysisError:
