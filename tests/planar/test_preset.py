@@ -36,7 +36,7 @@ def test_the_paper_s_pitchfork():
     point = only(points(PRESET))
     printed = critical_mode_data()
     assert point.kind is Kind.PITCHFORK
-    assert point.value / UNIT == pytest.approx(printed.k1, abs=printed.k1_tolerance)
+    assert point.value == pytest.approx(printed.k1, abs=printed.k1_tolerance)
     assert point.frequency == 0.0
     assert point.criticality is Criticality.SUPERCRITICAL
     assert point.multiplier == pytest.approx(-1.0, abs=1e-10)

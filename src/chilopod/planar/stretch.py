@@ -372,7 +372,7 @@ def carry(
     else:
         fits = walk_alone(*what)
     if not fits:
-        raise ParameterError("must fit the modules and walks, see carry()", field="states", value=states.shape)
+        raise ParameterError("must fit the number of modules and walks, see carry()", field="states", value=states.shape)
 
 
 def _work(rows: Any, pieces: Pieces, step: Any) -> float:
