@@ -56,7 +56,7 @@ class RobotFiles:
         if kind is Kind.ENDED and "--json" in command:
             found = strict_json(ending.out)
             if command[1] == "show":
-                compare(tomllib.loads(content.decode()), found["parameters"])
+                compare(tomllib.loads(content.decode("utf-8-sig")), found["parameters"])
         return Outcome(kind, ending.err.strip()[-200:])
 
 

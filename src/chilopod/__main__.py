@@ -17,8 +17,8 @@ def main() -> int:
 def _run() -> int:
     from chilopod import process
 
+    stdout = process.hold_streams()  # before anything is opened that could take the place of a closed stream
     process.answer_interrupts()
-    stdout = process.hold_streams()
     # Figures go into files, so a window backend is neither needed nor used.
     os.environ["MPLBACKEND"] = "agg"
     # Numba would go on without a variable that it cannot read, after many lines about it.

@@ -29,26 +29,32 @@ def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
     With ``replace`` existing regular files may be replaced.
     """
     files = [Path(path) for path in paths]
+    folders: set[Path] = set()
     for path in files:
         try:
             _check_names(path)
             _check_replaceable(path, replace)
+            if path.parent not in folders:
+                _check_folder(path.parent)
         except (OSError, ValueError) as error:
             raise _refused(path, error) from None
-    for folder in dict.fromkeys(path.parent for path in files):
-        check_folder(folder)
+        folders.add(path.parent)
 
 
 def check_folder(path: str | Path) -> Path:
     """Check that a folder can be written into, or can be created; nothing is created."""
     path = Path(path)
     try:
-        _check_names(path)
-        with tempfile.TemporaryFile(dir=_nearest(path)):
-            pass
+        _check_folder(path)
     except (OSError, ValueError) as error:
         raise _refused(path, error) from None
     return path
+
+
+def _check_folder(path: Path) -> None:
+    _check_names(path)
+    with tempfile.TemporaryFile(dir=_nearest(path)):
+        pass
 
 
 def check_room(path: Path, needed: float) -> None:

@@ -124,7 +124,6 @@ def _computed(
     context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, options.out / "trials")
     found, stopped = Found(context), None
     said = plan(sections, size, options.only is not None or options.paper)
-    typer.echo(said, err=options.as_json)
 
     def add(now: Found, section: Section[Any]) -> None:
         nonlocal found
@@ -137,6 +136,7 @@ def _computed(
             progress_bar("reproduce") as progress,
             Report(sections, context, options.out, progress, said) as report,
         ):
+            typer.echo(said, err=options.as_json)
             typer.echo(f"The page is {report.page.resolve()}", err=options.as_json)
             computed.reproduce(sections, context, progress, add)
     except OutputError as error:

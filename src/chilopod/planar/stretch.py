@@ -372,7 +372,8 @@ def carry(
     else:
         fits = walk_alone(*what)
     if not fits:
-        raise ParameterError("must fit the number of modules and walks, see carry()", field="states", value=states.shape)
+        problem = "must fit the number of modules and walks, see carry()"
+        raise ParameterError(problem, field="states", value=states.shape)
 
 
 def _work(rows: Any, pieces: Pieces, step: Any) -> float:
