@@ -86,12 +86,12 @@ def _python(code, **variables):
     return subprocess.run(command, env={**kept, **variables}, capture_output=True, text=True, timeout=60, check=False)
 
 
-def test_a_wish_not_to_compile_is_refused_in_one_line():
-    done = _python(
-        "from chilopod.cli import main; raise SystemExit(main(['stability', 'aoi2022-planar']))", NUMBA_DISABLE_JIT="1"
-    )
+@pytest.mark.parametrize(("name", "value", "shown"), [("DISABLE_JIT", "1", "1"), ("CPU_NAME", "nosuch", "'nosuch'")])
+def test_code_that_cannot_be_compiled_is_refused_in_one_line(name, value, shown):
+    code = "from chilopod.cli import main; raise SystemExit(main(['stability', 'aoi2022-planar']))"
+    done = _python(code, **{f"NUMBA_{name}": value})
     assert done.returncode == 2
-    assert done.stderr.startswith("error: NUMBA_DISABLE_JIT = 1: ")
+    assert done.stderr.startswith(f"error: NUMBA_{name} = {shown}: ")
     assert done.stderr.count("\n") == 1
 
 

@@ -117,6 +117,12 @@ def test_an_interrupt_that_nobody_can_raise_is_not_forgotten(answering):
         sys.unraisablehook(SimpleNamespace(exc_type=KeyboardInterrupt))
 
 
+def test_a_result_without_stdin_and_stdout_is_not_silently_lost():
+    command = f"{sys.executable} -m chilopod --version <&- >&-"
+    ended = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (2, "error: stdout cannot be written (Bad file descriptor)\n")
+
+
 def test_what_cannot_be_written_is_lost_and_said_once():
     reading, writing = os.pipe()
     os.close(reading)

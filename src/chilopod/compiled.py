@@ -15,12 +15,17 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
-from chilopod.numba_internals import keep
+from chilopod.numba_internals import is_processor, keep
 
 if numba.config.DISABLE_JIT:
     # As plain Python the compiled functions would take hours, and their overloads do not run.
     raise ParameterError(
         "must be 0: chilopod needs the compiler of Numba", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
+    )
+
+if (_cpu := numba.config.CPU_NAME) not in (None, "host") and not is_processor(_cpu):
+    raise ParameterError(
+        "must be a processor of LLVM", field="NUMBA_CPU_NAME", value=_cpu, allowed="generic, host, a name, or unset"
     )
 
 _LAYERS = {
