@@ -42,7 +42,7 @@ class SavedTrials:
         after = snapshot(place.root)
         # Whatever is in the folder may have been moved aside; what is temporary may not stay.
         kind = judged(ending, {}, after, named=[*names, "kept"], interrupted=place.interrupted.exists(), stays=False)
-        if kind is Kind.REFUSED:
+        if kind in (Kind.REFUSED, Kind.STOPPED):  # compiling may take longer than the patience
             return Outcome(kind, ending.err.strip()[-200:])
         if ending.out != study.ending.out:
             raise FoundFault(Kind.WRONG, "another result")
