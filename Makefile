@@ -13,10 +13,10 @@ LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
 BENCH := $(VENV)/.bench-installed
-# Test processes at once, one more than cores: some tests wait for a browser, a cluster, or the clock. Each has one
-# thread for linear algebra, as more would stand in each other's way. Threads of numba that have nothing to do sleep:
-# by default they wait actively, and take the other processes' time.
-JOBS ?= 3
+# Test processes at once, each with one thread for linear algebra, as more would stand in each other's way; a third
+# process costs more (it compiles everything once more) than it saves. Threads of numba that have nothing to do sleep: by
+# default they wait actively, and take the other processes' time.
+JOBS ?= 2
 ALONGSIDE := OPENBLAS_NUM_THREADS=1 OMP_WAIT_POLICY=passive
 
 # Makes .venv with the first suitable Python, unless a working one is there.

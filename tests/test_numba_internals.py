@@ -22,7 +22,7 @@ INTERNALS = {
     "numba.core": {"numba_internals.py": ("cgutils", "event")},
     "llvmlite": {"numba_internals.py": ("ir",), "processor.py": ("binding",)},
     "mujoco.batch": {"twin/scanner.py": ("Batch",), "twin/walk.py": ("Batch",)},
-    "typer.core": {"cli/options.py": ("TyperCommand",)},
+    "typer.core": {"cli/options.py": ("TyperCommand", "TyperGroup", "TyperOption")},
 }
 """Of each module of others, the files of ours that may import from it, and what."""
 METHODS = {
@@ -34,7 +34,8 @@ METHODS = {
     "distributed:LocalCluster": ("sync", "close"),
     "distributed:Nanny": ("close",),
     "mujoco.batch:Batch": (),
-    "typer.core:TyperCommand": ("invoke",),
+    "typer.core:TyperCommand": ("invoke", "parse_args", "format_help"),
+    "typer.core:TyperGroup": ("resolve_command",),
 }
 """Of what they have, what is called or replaced."""
 ARGUMENTS = {
