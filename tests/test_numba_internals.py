@@ -20,7 +20,7 @@ INTERNALS = {
     "numba.core.typeconv": {"numba_internals.py": ("Conversion",)},
     "numba.core.typing": {"numba_internals.py": ("signature",)},
     "numba.core": {"numba_internals.py": ("cgutils", "event")},
-    "llvmlite": {"numba_internals.py": ("ir",), "processor.py": ("binding",)},
+    "llvmlite": {"numba_internals.py": ("binding", "ir"), "processor.py": ("binding",)},
     "mujoco.batch": {"twin/scanner.py": ("Batch",), "twin/walk.py": ("Batch",)},
     "typer.core": {"cli/options.py": ("TyperCommand", "TyperGroup", "TyperOption")},
 }

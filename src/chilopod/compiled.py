@@ -15,8 +15,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
-from chilopod.numba_internals import keep
-from chilopod.processor import is_processor
+from chilopod.numba_internals import is_processor, keep
 
 if numba.config.DISABLE_JIT:
     # As plain Python the compiled functions would take hours, and their overloads do not run.

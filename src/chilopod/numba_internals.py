@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import os
 import shutil
 import time
 from contextlib import suppress
 from multiprocessing import parent_process
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import numba
-from llvmlite import ir
+from llvmlite import binding, ir
 from numba.core import cgutils, event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.typeconv import Conversion
@@ -23,7 +25,7 @@ from numba.core.typing import signature
 
 from chilopod import sources
 
-__all__ = ["COMPILING", "Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
+__all__ = ["COMPILING", "Conversion", "cgutils", "ir", "is_processor", "keep", "pointer_to", "signature"]
 
 ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "twin")
 """Subpackages without compiled code, which no compiled code reaches: their changes need no new compilation."""
@@ -47,6 +49,20 @@ def keep(dispatcher: Any) -> bool:
     except RuntimeError:
         return False
     return True
+
+
+def is_processor(name: str) -> bool:
+    """True if LLVM knows a processor of that name; LLVM itself only complains on stderr, at every function."""
+    binding.initialize_native_target()
+    with TemporaryFile() as complaints:
+        stderr = os.dup(2)
+        os.dup2(complaints.fileno(), 2)
+        try:
+            binding.Target.from_default_triple().create_target_machine(cpu=name)
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+        return complaints.seek(0, os.SEEK_END) == 0
 
 
 def pointer_to(kind: Any, builder: Any, place: Any) -> Any:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import platform
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryFile
 
 _CORENAME = [f"{front}openblas_get_corename{end}" for front in ("scipy_", "") for end in ("64_", "")]
 
@@ -28,22 +26,6 @@ def compiled_for() -> str:
     from numba import config
 
     return str(config.CPU_NAME or binding.get_host_cpu_name())
-
-
-def is_processor(name: str) -> bool:
-    """True if LLVM knows a processor of that name; LLVM itself only complains on stderr, at every function."""
-    from llvmlite import binding
-
-    binding.initialize_native_target()
-    with TemporaryFile() as complaints:
-        stderr = os.dup(2)
-        os.dup2(complaints.fileno(), 2)
-        try:
-            binding.Target.from_default_triple().create_target_machine(cpu=name)
-        finally:
-            os.dup2(stderr, 2)
-            os.close(stderr)
-        return complaints.seek(0, os.SEEK_END) == 0
 
 
 def blas_kernels(package: str) -> str:
