@@ -22,7 +22,7 @@ INTERNALS = {
     "numba.core": {"numba_internals.py": ("cgutils", "event")},
     "llvmlite": {"numba_internals.py": ("binding", "ir"), "processor.py": ("binding",)},
     "mujoco.batch": {"twin/scanner.py": ("Batch",), "twin/walk.py": ("Batch",)},
-    "typer.core": {"cli/options.py": ("TyperCommand", "TyperGroup", "TyperOption")},
+    "typer.core": {"cli/commands.py": ("TyperCommand", "TyperGroup", "TyperOption")},
 }
 """Of each module of others, the files of ours that may import from it, and what."""
 METHODS = {

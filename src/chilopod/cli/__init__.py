@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 from chilopod.cli import branch, course, doctor, live, play, reproduce, robot, stability, trials, turn, walk
-from chilopod.cli.options import new_app
+from chilopod.cli.commands import new_app
 from chilopod.errors import ChilopodError, ParameterError, briefly, one_line
 from chilopod.process import INTERRUPTED
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from chilopod.cli.progress import progress_bar
 from chilopod.cli.user_code import own_code, own_controller
@@ -25,12 +24,6 @@ if TYPE_CHECKING:
     from chilopod.tasks.runs import Runs
 
 Found = TypeVar("Found", bound="Runs")
-
-_TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1", "twin": "engine", "body.modules": "modules"}
-"""Options that are called otherwise than the argument of the function that they are for."""
-
-_IN_WORDS = {"Input should be": "must be", "greater than or equal to": "at least", "less than or equal to": "at most"}
-"""Words for those of pydantic, which checks the numbers of options."""
 
 
 def _engines() -> list[str]:
@@ -121,69 +114,6 @@ ClusterOption = Annotated[
 ]
 
 
-class _Group(TyperGroup):
-    """A group that knows the commands of the groups in it: of ``export`` it says ``robot export``."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        typed = args[0]
-        try:
-            return super().resolve_command(ctx, args)
-        except Exception as error:
-            groups = [name for name, own in self.commands.items() if typed in getattr(own, "commands", ())]
-            if groups and hasattr(error, "message"):
-                error.message += f" Did you mean {' or '.join(f'{name} {typed}' for name in groups)}?"
-            raise
-
-
-class _Command(TyperCommand):
-    """A command whose mistakes are named as they were typed, ``--duration`` and the text behind it, and whose help
-    lists the choices that are registered."""
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        for option in self.params:
-            if isinstance(option, TyperOption) and option.name == "strategy" and option.metavar is None:
-                known = option.shell_complete(ctx, "")
-                option.metavar = "|".join(each.value for each in known)
-                option.help = " ".join([option.help or "", *(f"{each.value}: {each.help}." for each in known)])
-        super().format_help(ctx, formatter)
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        try:
-            return super().parse_args(ctx, args)
-        except Exception as error:
-            if hasattr(error, "ctx"):
-                error.ctx = error.ctx or ctx
-            cause = error.__cause__
-            if not (cause and hasattr(error, "param") and hasattr(cause, "errors")):
-                raise
-            wrong = cause.errors()[0]
-            problem = wrong["msg"].partition(",")[0]
-            for theirs, ours in _IN_WORDS.items():
-                problem = problem.replace(theirs, ours)
-            raise ParameterError(problem, field=max(error.param.opts, key=len), value=wrong["input"]) from None
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except ChilopodError as error:
-            _as_typed(error, ctx)
-            raise
-
-
-def _as_typed(error: ChilopodError, ctx: Any) -> None:
-    field, _, part = (error.field or "").partition(" ")
-    name = field if error.source else _TYPED_AS.get(field, field)  # a file has names of its own
-    for option in ctx.command.params:
-        if option.name != name or option.param_type_name != "option" or option.is_flag:
-            continue
-        error.field = f"{max(option.opts, key=len)} {part}".strip()
-        typed = ctx.params[name]
-        if not part and ctx.get_parameter_source(name).name == "COMMANDLINE":
-            error.value = " ".join(typed) if isinstance(typed, tuple | list) else typed
-        if isinstance(error.value, Path):
-            error.value = str(error.value)
-
-
 @contextmanager
 def reading(option: str, *words: str) -> Iterator[None]:
     """Give errors in this block the name of an option (its name in Python) as their field, and words it may be."""
@@ -193,31 +123,6 @@ def reading(option: str, *words: str) -> Iterator[None]:
         error.field, error.nearest = option, error.nearest or nearest_name(str(error.value), words)
         error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
         raise
-
-
-class _App(typer.Typer):
-    def command(self, name: str | None = None, **settings: Any) -> Any:
-        return super().command(name, cls=_Command, **settings)
-
-
-def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
-    """An empty group of commands with the settings all groups share; only the outermost can complete commands."""
-    # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
-    app = _App(
-        help=help_text,
-        cls=_Group,
-        rich_markup_mode=None,
-        pretty_exceptions_enable=False,
-        add_completion=completion,
-        no_args_is_help=False,
-    )
-
-    @app.callback(invoke_without_command=True)
-    def group(ctx: typer.Context) -> None:
-        if ctx.invoked_subcommand is None:
-            typer.echo(ctx.get_help())
-
-    return app
 
 
 @contextmanager

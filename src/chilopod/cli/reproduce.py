@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chilopod.cli.commands import new_app
 from chilopod.cli.options import (
     ClusterOption,
     ForceOption,
@@ -20,7 +21,6 @@ from chilopod.cli.options import (
     deliver,
     free,
     json_text,
-    new_app,
     print_json,
     read_robot,
     walking_on,

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot, save
+from chilopod.cli.commands import new_app
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, print_json, read_robot, save
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import JsonOption, new_app, print_json
+from chilopod.cli.commands import new_app
+from chilopod.cli.options import JsonOption, print_json
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from chilopod.cli import main
 from chilopod.errors import OutputError
 from chilopod.paper import registry
 from chilopod.paper.page import Report, write_report
-from chilopod.paper.page.page import Film, State, page
+from chilopod.paper.page.page import Drawings, Film, State, page
 from chilopod.paper.section import Context, Found, Section, reproduce
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.show.panel import Panel
@@ -129,7 +129,7 @@ def test_new_sections_are_put_in_and_the_readers_place_stays(browser, tmp_path):
 
 
 def test_a_page_whose_computation_was_killed_says_so(browser, tmp_path):
-    html = page(Found(CONTEXT), [ONE], [], [], {}, [ONE], "aoi2022-planar", State.RUNNING)
+    html = page(Found(CONTEXT), [ONE], Drawings(waiting=[ONE]), "aoi2022-planar", State.RUNNING)
     (tmp_path / "index.html").write_text(re.sub('data-written="[^"]*"', 'data-written="1e9"', html), encoding="utf-8")
     browser.open(tmp_path / "index.html")
     assert browser.run(THERE % "document.querySelector('#status .failed')")

@@ -6,7 +6,7 @@ import pytest
 
 from chilopod.errors import OutputError
 from chilopod.paper.page import check_report
-from chilopod.paper.page.page import State, page
+from chilopod.paper.page.page import Drawings, State, page
 from chilopod.paper.section import Context, Found, Size
 from chilopod.paper.straight.sections import MODE, UNIFORM
 
@@ -14,7 +14,7 @@ from chilopod.paper.straight.sections import MODE, UNIFORM
 def written(folder, sections, size):
     found = Found(Context(size=size), {section: None for section in sections})
     folder.mkdir(exist_ok=True)
-    html = page(Found(found.context), [], [], [], {}, [], "aoi2022-planar", State.STOPPED)
+    html = page(Found(found.context), [], Drawings(), "aoi2022-planar", State.STOPPED)
     names = " ".join([size.name, *(section.name for section in sections)])
     (folder / "index.html").write_text(html.replace(f'"{size.name}"', f'"{names}"'), encoding="utf-8")
     return folder

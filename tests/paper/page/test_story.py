@@ -10,7 +10,7 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.paper import statements
 from chilopod.paper.page.headline import pitchfork
-from chilopod.paper.page.page import Film, Shown, page
+from chilopod.paper.page.page import Drawings, Film, Shown, page
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found, Size
 from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Row, Statement, Verdict
@@ -24,7 +24,7 @@ def test_verdicts_are_counted_and_each_count_leads_to_its_rows():
     lines = [OfTwin(twin, Result("5"), each) for each in (Verdict.WITHIN, Verdict.OUTSIDE, Verdict.NOT_DETERMINED)]
     lines += [Row("k", "1", Result("2"), "here", each) for each in (Verdict.AGREES, Verdict.NOT_PRINTED)]
     lines.append(OfPlanar(statements.ONSET, Result("12 N*mm/deg")))
-    html = page(Found(Context(size=Size.QUICK), rows={WALKS: lines}), [WALKS], [], [], {}, [], "aoi2022-planar")
+    html = page(Found(Context(size=Size.QUICK), rows={WALKS: lines}), [WALKS], Drawings(), "aoi2022-planar")
     found = Page(html)
     strip = re.findall(r'data-look="(\w+)"><b>(\d)</b> ([a-z ]+)</a>', html)
     assert strip == [
@@ -67,8 +67,8 @@ def test_a_page_begins_with_the_robot_in_three_dimensions_if_it_is_there():
         ([planar, stills], ("img", "movies/robot.png", None)),
         ([planar, both], ("video", "movies/robot.mp4", "movies/robot-poster.png")),
     ):
-        html = page(Found(), [WALKS], [], [Shown(WALKS, [], films)], {}, [], "aoi2022-planar")
+        html = page(Found(), [WALKS], Drawings(shown=[Shown(WALKS, [], films)]), "aoi2022-planar")
         header = html[html.index("<header>") : html.index("<nav")]
         (shown,) = [(tag, a.get("src"), a.get("poster")) for tag, a in Page(header).tags if tag in ("video", "img")]
         assert shown == first
-    assert "<video" not in page(Found(), [WALKS], [], [], {}, [], "aoi2022-planar")
+    assert "<video" not in page(Found(), [WALKS], Drawings(), "aoi2022-planar")

@@ -8,7 +8,7 @@ import time
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
@@ -79,6 +79,18 @@ class Shown:
     films: Sequence[Film]
 
 
+@dataclass(frozen=True)
+class Drawings:
+    """Drawings of a report so far: first figure of the page, figures of the robot itself, which open the first chapter,
+    and those of the sections; sections that failed, with the reason, and sections that wait."""
+
+    headline: Drawn | None = None
+    opening: Sequence[Drawn] = ()
+    shown: Sequence[Shown] = ()
+    failures: Mapping[Section[Any], Exception] = field(default_factory=dict)
+    waiting: Collection[Section[Any]] = ()
+
+
 class State(Enum):
     """State of a report: still computed, complete, or stopped early."""
 
@@ -90,20 +102,15 @@ class State(Enum):
 def page(
     found: Found,
     sections: Sequence[Section[Any]],
-    opening: Sequence[Drawn],
-    shown: Sequence[Shown],
-    failures: Mapping[Section[Any], Exception],
-    waiting: Collection[Section[Any]],
+    drawings: Drawings,
     robot_file: str,
     state: State = State.DONE,
     plan: str = "",
-    headline: Drawn | None = None,
 ) -> str:
     """The page as HTML, which loads new results while the report is running.
 
-    It begins with the figure ``headline``. Figures of the robot itself open the first chapter. Figures and films drawn
-    so far stand in their chapters, those with a letter first. Other sections have failed, or wait. ``robot_file`` is
-    the name of the robot in commands: a preset, or the path of a file.
+    Figures and films stand in their chapters, those with a letter first. ``robot_file`` is the name of the robot in
+    commands: a preset, or the path of a file.
     """
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
@@ -112,7 +119,7 @@ def page(
     template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
     tables = {chapter: [_row(row) for row in rows] for chapter, rows in found.planar_rows().items()}
     # Nothing is left out before all has been tried.
-    robot_rows = [_row(replace(row, absent="") if waiting else row) for row in found.robot_rows()]
+    robot_rows = [_row(replace(row, absent="") if drawings.waiting else row) for row in found.robot_rows()]
     looks = Counter(row["look"] for rows in (*tables.values(), robot_rows) for row in rows)
     return template.render(
         title=_TITLE,
@@ -126,11 +133,11 @@ def page(
         count=len(sections),
         summary=summary(found),
         counted=[(look, word, looks[look]) for look, word in _COUNTED.items() if looks[look]],
-        headline=headline,
-        first=_first([film for each in shown for film in each.films]),
+        headline=drawings.headline,
+        first=_first([film for each in drawings.shown for film in each.films]),
         tables=tables,
         robot_rows=robot_rows,
-        chapters=_chapters(sections, opening, shown, failures, waiting),
+        chapters=_chapters(sections, drawings),
         robot=f'"{robot_file}"' if " " in robot_file else robot_file,
         soft=10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}"),
         robots=_robots(found),
@@ -149,16 +156,11 @@ def _first(films: Sequence[Film]) -> Film | None:
     )
 
 
-def _chapters(
-    sections: Sequence[Section[Any]],
-    opening: Sequence[Drawn],
-    shown: Sequence[Shown],
-    failures: Mapping[Section[Any], Exception],
-    waiting: Collection[Section[Any]],
-) -> list[dict[str, Any]]:
+def _chapters(sections: Sequence[Section[Any]], drawings: Drawings) -> list[dict[str, Any]]:
     chapters: list[dict[str, Any]] = []
+    failures = drawings.failures
     for number, title in enumerate(dict.fromkeys(section.chapter for section in sections), 1):
-        here = [each for each in shown if each.section.chapter == title]
+        here = [each for each in drawings.shown if each.section.chapter == title]
         figures = [drawn for each in here for drawn in each.figures]
         planned = [section for section in sections if section.chapter == title]
         chapters.append(
@@ -167,12 +169,12 @@ def _chapters(
                 "anchor": f"chapter-{number}",
                 "figures": sorted(figures, key=lambda drawn: drawn.panel.letter),
                 "films": [film for each in here for film in each.films],
-                "coming": [each.sentence for each in planned if each in waiting],
+                "coming": [each.sentence for each in planned if each in drawings.waiting],
                 "failed": {each.sentence: in_words(failures[each]) for each in planned if each in failures},
             }
         )
     for first in chapters[:1]:
-        first["figures"][:0] = opening
+        first["figures"][:0] = drawings.opening
     return chapters
 
 

@@ -17,7 +17,7 @@ from chilopod.errors import OutputError
 from chilopod.output import check_files, check_folder, write_atomic
 from chilopod.paper.curved.sections import CURVED
 from chilopod.paper.page.headline import pitchfork
-from chilopod.paper.page.page import Drawn, Film, Shown, State, page
+from chilopod.paper.page.page import Drawings, Drawn, Film, Shown, State, page
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size
 from chilopod.paper.straight import schematic
@@ -185,8 +185,8 @@ class Report:
         shown = [self._shown[each] for each in self._sections if each in self._shown]
         waiting = [section for section in self._sections if section not in self._found]
         waiting += [section for section, _ in self._films]
-        told = (self.failures, waiting, name, state, self._plan, self._headline)
-        html = page(self._found, self._sections, self._opening, shown, *told)
+        drawings = Drawings(self._headline, self._opening, shown, self.failures, waiting)
+        html = page(self._found, self._sections, drawings, name, state, self._plan)
         self._written += 1
         write_atomic(self.page, html)  # first: what is beside it is known by it to be ours
         write_atomic(robot_file, context.robot.to_toml())
