@@ -48,13 +48,13 @@ def add_measures(data: xr.Dataset, period: float) -> None:
     found = np.empty((len(_UNITS), *data.goal_end.shape))
     for robot, (begin, end) in enumerate(zip(data.goal_begin.values, data.goal_end.values, strict=True)):
         # The time that other robots of its batch walked on does not count.
-        moving, told = ((slice(counts[name][robot]), robot) for name in ("time", "event"))
+        moving, commanded = ((slice(counts[name][robot]), robot) for name in ("time", "event"))
         times = samples[moving[0]]
         sums = (
             _path(times, place[moving], period),
             _effort(times, yaw[moving]),
             _spring_work(times, angles[moving], springs[moving]),
-            _drive_work(commands[told[0]], seen[told], torques[told]),
+            _drive_work(commands[commanded[0]], seen[commanded], torques[commanded]),
         )
         found[:, robot] = [np.interp(end, *so_far) - np.interp(begin, *so_far) for so_far in sums]
     for (name, unit), values in zip(_UNITS.items(), found, strict=True):
