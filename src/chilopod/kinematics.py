@@ -8,9 +8,9 @@ those of the axes that headings are measured from: the floor's, or those of modu
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 def module_headings(heading: ArrayLike, joint_angles: ArrayLike) -> Array:

@@ -8,15 +8,14 @@ from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod import memory
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 RATE = 100.0
 """Default sampling rate of records, Hz."""

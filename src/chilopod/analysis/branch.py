@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import stability, units
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family, interval_text
 from chilopod.engine import Status
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, unsealed
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.stretch import MOST_BENT
@@ -27,8 +27,6 @@ from chilopod.robot import Robot
 from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, proceed, switch
 from chilopod.stability.branches.branch import LONGEST
 from chilopod.stability.spectrum.errors import VERDICTS
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
 """Tolerance of the nonlinear flow along a branch; orbits are accurate to 1e-10 (the tests compare 1e-9 with 1e-14)."""

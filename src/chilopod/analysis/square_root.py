@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
 from chilopod.errors import AnalysisError, ParameterError
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 RESAMPLED = 1000
 """Default number of bootstrap samples."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chilopod import stability, units
 from chilopod.analysis.parameters import K1, check_parameter, stiffness
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays, read_only
+from chilopod.frozen import ComplexArray, ReadOnlyArrays, read_only
 from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
@@ -23,7 +23,6 @@ from chilopod.stability.spectrum.errors import VERDICTS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ComplexArray = NDArray[np.complex128]
 
 _FEWEST_PARTS = 8
 _A_PART = 5e-6  # s, of one state

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import check_parameter
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Array
 from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
@@ -23,7 +23,6 @@ from chilopod.stability.shown import bounded, mark
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 Box = tuple[tuple[float, float], tuple[float, float]]
 

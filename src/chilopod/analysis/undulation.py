@@ -19,15 +19,13 @@ from chilopod import units
 from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import first_loss
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Array, ComplexArray
 from chilopod.planar.along import FollowedModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Criticality, Kind
 from chilopod.stability.problem.returns import return_map, whole_period
 from chilopod.stability.spectrum.eigenvalues import spectrum
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 DISTANCES = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 """Default distances 1 - k/k* of the springs."""

@@ -22,13 +22,13 @@ from chilopod.engine.contract import Command
 from chilopod.engine.ramps import Ramps
 from chilopod.engine.saved import part
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 SINCE, FROM, SLOPE, UNTIL, GOAL, RAMPING, SETTLING = range(7)
 """Rows of :attr:`Actuators.profile`: time of the command (s), start of the ramp (N*m/rad), its slope (N*m/rad/s), its

@@ -7,20 +7,20 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.engine.actuators import Actuators
 from chilopod.engine.arguments import as_number, as_seeds, rows_of
 from chilopod.engine.contract import Observation, Traits, Walk
 from chilopod.engine.saved import pack, part, read_back, unpack
 from chilopod.engine.targets import Targets
+from chilopod.frozen import Array
 from chilopod.record import Recording, add_outcome, check_size
 from chilopod.robot import Robot
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 _Kind = TypeVar("_Kind", bound="BatchWalk")
 
 

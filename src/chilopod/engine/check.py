@@ -10,8 +10,9 @@ import numpy as np
 
 from chilopod.engine.check_referee import BREAKS, aims, halts, places, restarts, states
 from chilopod.engine.check_trial import END, TIMES, Broken, Trial, expect, expect_near, expect_refused, expect_same
-from chilopod.engine.contract import Array, Command, Engine, Observation, Status, Traits, Walk, missing_parts
+from chilopod.engine.contract import Command, Engine, Observation, Status, Traits, Walk, missing_parts
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array
 from chilopod.record import MOTION, QUANTITIES
 from chilopod.robot import Robot
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from chilopod.engine.check_trial import END, Trial, expect, expect_near, expect_refused, expect_same
-from chilopod.engine.contract import Array, Command, Observation, Status, Walk
+from chilopod.engine.contract import Command, Observation, Status, Walk
+from chilopod.frozen import Array
 from chilopod.record import Recording
 
 BREAKS = 0.6

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chilopod.engine.contract import Array, Command, Engine, Walk
+from chilopod.engine.contract import Command, Engine, Walk
 from chilopod.errors import ChilopodError
+from chilopod.frozen import Array
 from chilopod.record import Recording
 from chilopod.robot import Robot
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.frozen import Array
 from chilopod.gait import Gait
 from chilopod.labels import Labelled
 from chilopod.record import Recording
@@ -21,8 +22,6 @@ from chilopod.robot import Robot
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Array = NDArray[np.float64]
 
 
 class Status(Labelled):

@@ -9,8 +9,9 @@ from functools import partial
 from importlib import import_module
 from typing import Any, Final
 
-from chilopod.engine.contract import Array, Controller, Engine, Traits, Walk, missing_parts
+from chilopod.engine.contract import Controller, Engine, Traits, Walk, missing_parts
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words, nearest_name
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 
 _MODULES: Final[Mapping[str, str]] = {"planar": "chilopod.planar", "twin": "chilopod.twin"}

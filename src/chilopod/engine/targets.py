@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine.arguments import as_array
 from chilopod.errors import ParameterError
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 class Targets:

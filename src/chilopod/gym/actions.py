@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from chilopod.engine import Command
 from chilopod.engine.arguments import as_array
 from chilopod.errors import ParameterError, nearest_name
-from chilopod.record import Array
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.steering.leg_yaw import SIDES, LegYawController
 

@@ -12,13 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.gym.episodes import Episodes, Moment
 from chilopod.show.scene.aims import Aim
 from chilopod.show.scene.film import PIXEL, FilmPanel
 from chilopod.show.scene.frames import BodyFrames, Floor, Outcome, Scene, bodies
 from chilopod.steering import ARRIVAL_RADIUS
-
-Array = NDArray[np.float64]
 
 SIZE: Final = 480
 """Height and width of a picture, pixels."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.engine import Observation
+from chilopod.frozen import Array
 from chilopod.gym.actions import Actions
-from chilopod.record import Array
 
 _MOST_BENT = 0.5 * np.pi  # rad, of a joint of a robot that walks
 

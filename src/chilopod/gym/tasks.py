@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.flows.arguments import checked_count
-from chilopod.record import Array
+from chilopod.frozen import Array
 from chilopod.steering import Course, Goal, Judged, Target, random_course
 from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
 

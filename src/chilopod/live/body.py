@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.kinematics import from_modules
 from chilopod.live.state import Seen
 from chilopod.show.scene.frames import bodies
 from chilopod.show.scene.outline import SLIMNESS
 
-Array = NDArray[np.float64]
 KINDS = ("box", "rod", "ball", "pin")
 """A cube with sides of 1; a cylinder along z and a ball, both of radius 1 and the cylinder of height 1; and the
 cylinders of the yaw joints, front to rear."""

@@ -6,15 +6,13 @@ from collections.abc import Mapping
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.live.body import Placed
 from chilopod.live.state import Seen
 from chilopod.robot import Robot
 from chilopod.show.scene.outline_3d import drawn, yaw_joint
 from chilopod.twin.model import compiled, without_springs
-
-Array = NDArray[np.float64]
 
 _KINDS = {"box": "box", "capsule": "rod", "cylinder": "rod", "sphere": "ball"}
 

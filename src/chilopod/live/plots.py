@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser import uplot
 
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.frozen import Array
 from chilopod.live.state import Seen
 from chilopod.live.theory import Theory
 from chilopod.live.words import radius_of
 from chilopod.show.style import BLUE, CURVES, GREY, VERMILLION
-
-Array = NDArray[np.float64]
 
 _SPAN = 40.0  # s that are shown
 _POINTS = 160

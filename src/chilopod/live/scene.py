@@ -15,12 +15,11 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.live.body import KINDS, Placed
 from chilopod.live.state import Seen
 from chilopod.show.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION
 from chilopod.steering import ARRIVAL_RADIUS
-
-Array = NDArray[np.float64]
 
 WORLD = "/world"
 _FLOOR_LINES = 9  # each way

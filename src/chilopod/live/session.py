@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import ALL
 from chilopod.engine import Command, Controller, Status, Walk, engine_named, steer
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
+from chilopod.frozen import Array
 from chilopod.live import wishes
 from chilopod.live.sliders import sliders_of
 from chilopod.live.state import Seen, Settings, as_finite, as_seed, as_within, but_springs
@@ -31,8 +31,6 @@ from chilopod.steering import (
 )
 from chilopod.steering.target import FARTHEST
 from chilopod.trials import Disturbance
-
-Array = NDArray[np.float64]
 
 LOOKS = 6
 """Number of samples in a gait cycle, for means over the cycle."""

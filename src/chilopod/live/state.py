@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.engine import Status
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.live.wishes import LARGEST_SEED
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

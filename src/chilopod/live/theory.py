@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from chilopod.analysis.parameters import K1
 from chilopod.engine import Status, engine_named
 from chilopod.errors import ChilopodError
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
-
-Array = NDArray[np.float64]
 
 _BETWEEN = (1.0 / 20.0, 3.0)  # of the stiffest spring: as for the radius law
 _NICE = 5

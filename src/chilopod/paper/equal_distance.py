@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from chilopod.frozen import Array
 from chilopod.paper.measures import counted, fitted, point_of
-from chilopod.paper.scatter import Array, drawn_anew, mean_and_error
+from chilopod.paper.scatter import drawn_anew, mean_and_error
 
 DRAWN = 200
 """Number of bootstrap samples for the standard errors."""

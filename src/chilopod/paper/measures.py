@@ -14,7 +14,8 @@ from chilopod import trials
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import RESAMPLED, SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
-from chilopod.paper.scatter import Array, drawn_anew, mean_and_error
+from chilopod.frozen import Array
+from chilopod.paper.scatter import drawn_anew, mean_and_error
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import in_settled_curve, is_curved

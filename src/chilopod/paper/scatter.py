@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 Answer = bool | None
 """True, False, or None if the scatter leaves it undecided."""

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.analysis.square_root import SquareRootFit
+from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.printed import Band
-from chilopod.paper.scatter import Array, means
+from chilopod.paper.scatter import means
 from chilopod.show import style
 from chilopod.show.words import SPRING_UNIT, k, typeset
 

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import qr
 
 from chilopod.errors import ParameterError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.integrate import COMPLEX_STEP
 from chilopod.planar.drift import Drift
 from chilopod.planar.energy import foot_powers, foot_slip
 from chilopod.planar.model import PlanarModel, carry
-
-Array = NDArray[np.float64]
 
 NODES = 16
 """Gauss-Legendre nodes in every interval between two switches: after each one, motion settles within milliseconds."""

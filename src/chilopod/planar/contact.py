@@ -16,14 +16,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.compiled import njit
+from chilopod.frozen import Array
 
 if TYPE_CHECKING:
     from chilopod.gait import Schedule
 
-Array = NDArray[np.float64]
 
 C_SUM, C_X, C_Y, C_PP, C_EX, C_EY, C_PD, C_PXE = range(8)
 MOMENTS = 8

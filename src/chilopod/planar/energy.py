@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chilopod.frozen import Array
 from chilopod.kinematics import (
     directions,
     foot_places,
@@ -23,8 +24,6 @@ from chilopod.kinematics import (
 
 if TYPE_CHECKING:
     from chilopod.planar.model import PlanarModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

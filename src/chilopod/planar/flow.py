@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from chilopod.compiled import copy_into, parallel_njit
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.integrate import integrator
 from chilopod.planar.contact import MOMENTS
 from chilopod.planar.dynamics import SCRATCH, rhs
@@ -23,7 +24,6 @@ from chilopod.planar.dynamics import SCRATCH, rhs
 if TYPE_CHECKING:
     from chilopod.gait import Gait
 
-Array = NDArray[np.float64]
 
 _integrate = integrator(rhs)
 

@@ -21,15 +21,13 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.planar.contact import C_PP
 from chilopod.planar.series import PANEL, ROWS, series_term
-
-Array = NDArray[np.float64]
 
 TRUNCATION = 1e-17
 """Relative size of the last Taylor term that is kept: an order of magnitude below round-off."""

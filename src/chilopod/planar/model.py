@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import ReadOnlyArrays, read_only
+from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.integrate import COMPLEX_STEP
 from chilopod.planar import linear
 from chilopod.planar.contact import contact_moments
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from chilopod.gait import Gait, Schedule
     from chilopod.robot import Robot
 
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-13
 """Default tolerance of the nonlinear flow, relative to max(1, |x|), per step."""

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.planar.energy import foot_slip, front_velocity
 from chilopod.planar.model import PlanarModel
 from chilopod.record import walk_record
-
-Array = NDArray[np.float64]
 
 
 def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Array) -> xr.Dataset:

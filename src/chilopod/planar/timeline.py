@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from chilopod.compiled import njit
 from chilopod.engine.arguments import BEGINNING
+from chilopod.frozen import Array
 from chilopod.gait import Schedule
-
-Array = NDArray[np.float64]
 
 _SAME_INSTANT = 1e-10  # s, within which a sample is taken at a switch
 

@@ -13,6 +13,7 @@ from chilopod.engine import Command, Observation, Status, Traits, one_thread
 from chilopod.engine.arguments import as_marks, as_robot, as_robots, check_time, check_wishes, rows_anew, standing
 from chilopod.engine.batch import BatchWalk, Beginning, begin, resumed
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.planar import stretch
 from chilopod.planar.model import PlanarModel
 from chilopod.planar.record import foot_forces, planar_record
@@ -20,8 +21,6 @@ from chilopod.planar.step_count import check_steps
 from chilopod.planar.timeline import Timeline
 from chilopod.record import Recording, Samples, bearing_and_distance, check_size, in_range
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Default of :func:`start`: a minute of walking is then accurate to 1e-6 m."""

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array, numbers
 from chilopod.flows.balance import numerical_balance
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.normal_forms.extrapolation import radii, series
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality
@@ -33,9 +33,6 @@ from chilopod.stability.problem.capabilities import (
 )
 from chilopod.stability.problem.returns import section_at
 from chilopod.stability.spectrum.errors import SAFETY, disturbed, eigenvalue_errors
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
 ROUNDING = 16.0 * _EPSILON

@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.deadline import Deadline
+from chilopod.frozen import Array
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.crossing_points.place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
@@ -35,8 +36,6 @@ from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event
-
-Array = NDArray[np.float64]
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
 _EPSILON = float(np.finfo(float).eps)

@@ -12,8 +12,9 @@ import numpy as np
 from chilopod import units
 from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError, UnitError, nearest_name
+from chilopod.frozen import Array
 from chilopod.kinematics import directions
-from chilopod.record import Array, in_range
+from chilopod.record import in_range
 from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
 from chilopod.text_file import read_text
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.labels import Labelled
-from chilopod.record import Array
 from chilopod.steering.target import ARRIVAL_RADIUS
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod.record import Array
+from chilopod.frozen import Array
 
 _SAME_INSTANT = 1e-9  # s
 _NONE = np.zeros(0)

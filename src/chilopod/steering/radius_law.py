@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from chilopod import units
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import ReadOnlyArrays
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, ReadOnlyArrays
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.engine import Command, Controller, Observation, Status, Walk, event_times
+from chilopod.frozen import Array
 from chilopod.gait import Gait
 from chilopod.labels import Labelled
-from chilopod.record import Array, bearing_and_distance
+from chilopod.record import bearing_and_distance
 from chilopod.steering.course import Course
 from chilopod.steering.shortest import shortest_path
 from chilopod.steering.target import ARRIVAL_RADIUS

@@ -8,12 +8,10 @@ INRIA report 2295, 1994).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
-
-Array = NDArray[np.float64]
 
 _FULL = 2.0 * np.pi
 _DIRECTIONS = 64  # on the rim of the disc, at first

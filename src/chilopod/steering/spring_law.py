@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.engine import Command, Event, Observation
 from chilopod.errors import ParameterError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.gait import Gait
 from chilopod.robot import Robot
 from chilopod.steering.leg_yaw import SIDES, LegYawController
 from chilopod.steering.radius_law import RadiusLaw
 from chilopod.steering.target import ARRIVAL_RADIUS
-
-Array = NDArray[np.float64]
 
 _AHEAD = 2.0  # modules
 

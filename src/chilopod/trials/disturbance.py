@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from chilopod.engine import Engine
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 _SLICK = 1e-3
 """Remaining friction of a foot without grip, as a factor."""

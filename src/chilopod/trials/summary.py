@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from chilopod.engine import Status
-from chilopod.record import Array
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 
 AVERAGED = 5.0

@@ -7,15 +7,11 @@ from dataclasses import replace
 from types import CodeType
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.twin.model import Edit
 from chilopod.twin.start import common, initial_states, resume, start, traits
 from chilopod.twin.walk import TwinWalk
-
-Array = NDArray[np.float64]
 
 
 class Edited:

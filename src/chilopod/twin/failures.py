@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.engine import Status
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 _FASTEST = 100.0  # m/s and rad/s: a robot that moves faster than that has blown up
 _FARTHEST = 1e6  # m and rad, likewise

@@ -8,12 +8,11 @@ forward, the knee's swings the lower link forward of the upper one; it is negati
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.robot import Robot, Twin
-
-Array = NDArray[np.float64]
 
 
 def tip_path(robot: Robot, phase: ArrayLike) -> Array:

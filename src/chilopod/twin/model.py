@@ -18,17 +18,14 @@ from functools import lru_cache
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.frozen import read_only
+from chilopod.frozen import Array, read_only
 from chilopod.ground import GRAVITY
 from chilopod.robot import Robot, Springs, Twin
 from chilopod.robot.inertia import body_inertia, body_mass, link_inertia, yaw_inertia_range
 from chilopod.twin.legs import check_reach, servo_targets, twin_of
 from chilopod.twin.step import with_step
-
-Array = NDArray[np.float64]
 
 Edit = Callable[[mujoco.MjSpec, Robot], None]
 """Function that changes a robot's description for MuJoCo in place, before it is compiled."""

@@ -13,10 +13,9 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.robot import Twin
 from chilopod.twin.model import POLE_GROUP, scanner_place
-
-Array = NDArray[np.float64]
 
 _SAME_INSTANT = 1e-9  # scans
 _GROUPS = np.array([group == POLE_GROUP for group in range(6)], dtype=np.uint8)

@@ -7,19 +7,18 @@ from functools import partial
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.engine import Traits
 from chilopod.engine.arguments import as_number, as_robot, as_robots, check_wishes, standing
 from chilopod.engine.batch import begin, resumed
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.record import Recording, in_range
 from chilopod.robot import Robot
 from chilopod.twin.legs import twin_of
 from chilopod.twin.model import Edit, compiled, without_springs
 from chilopod.twin.walk import TOLERANCE, TwinWalk, state_size
-
-Array = NDArray[np.float64]
 
 traits = Traits(
     name="twin",

@@ -20,11 +20,9 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.robot import Twin
-
-Array = NDArray[np.float64]
 
 _IMPEDANCE = np.array([0.9, 0.95])
 """Impedance of a contact at first touch and deep: MuJoCo's defaults."""

@@ -19,14 +19,13 @@ from chilopod.engine.arguments import as_array, as_marks, as_seeds, check_time, 
 from chilopod.engine.batch import BatchWalk, Beginning
 from chilopod.engine.saved import part
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.record import Recording, Samples, check_size, walk_record
 from chilopod.twin.failures import failures
 from chilopod.twin.legs import servo_targets
 from chilopod.twin.model import AWAY, SIDES, Edit, TwinModel, compiled, silence, without_springs
 from chilopod.twin.samples import Sampling
 from chilopod.twin.scanner import Scanner, rotation
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-8
 """Default tolerance of the contact solver, MuJoCo's own."""

@@ -11,11 +11,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chilopod.frozen import Array
 from chilopod.paper.courses.robust import USUAL, Robust
 from chilopod.paper.courses.rows import decisions, percent
 from chilopod.paper.courses.statistics import Interval
 from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, verdicts
-from chilopod.paper.scatter import Array
 from chilopod.paper.shapes import finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel

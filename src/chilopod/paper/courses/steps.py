@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from chilopod.engine import Observation
-from chilopod.paper.scatter import Array
+from chilopod.frozen import Array
 from chilopod.steering import ARRIVAL_RADIUS, SpringLaw
 
 _ALL_THE_WAY = 1e9  # m: to the target, however far

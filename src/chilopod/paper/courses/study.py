@@ -14,7 +14,7 @@ import xarray as xr
 
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
-from chilopod.paper.scatter import Array
+from chilopod.frozen import Array
 from chilopod.paper.section import Context, Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot

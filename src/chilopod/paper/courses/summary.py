@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from chilopod.frozen import Array
 from chilopod.paper.courses.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson
-from chilopod.paper.scatter import Answer, Array
+from chilopod.paper.scatter import Answer
 from chilopod.steering import ON_COURSES, VARIABLE
 
 # Words for yes, undecided and no.

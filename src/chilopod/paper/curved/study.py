@@ -14,10 +14,11 @@ import xarray as xr
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
+from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.curved.trials import EXAMPLES, SPRINGS, curved_trials, off_branch, on_branch, variant_trials
 from chilopod.paper.measures import example_walks
-from chilopod.paper.scatter import Array, Difference, means, spread_difference
+from chilopod.paper.scatter import Difference, means, spread_difference
 from chilopod.paper.section import Context
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot

@@ -21,9 +21,9 @@ from chilopod import stability
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.engine import Status
+from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.measures import SEEDS, Folder, by_spring, spring_walks
-from chilopod.paper.scatter import Array
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot

@@ -9,10 +9,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chilopod.frozen import Array
 from chilopod.paper import printed, shapes
 from chilopod.paper.curved.study import CurvedStudy
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.scatter import Array
 from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel

@@ -23,9 +23,9 @@ from numpy.typing import ArrayLike
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.analysis.straight_walk import pitchfork
+from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.measures import Folder, cycle_means, fitted, point_of, spring_walks
-from chilopod.paper.scatter import Array
 from chilopod.paper.section import Context, Size
 from chilopod.paper.statements import PLANAR_LIMIT
 from chilopod.paper.table import OfPlanar, OfTwin, Result, of_twin

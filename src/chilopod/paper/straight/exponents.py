@@ -9,14 +9,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
+from chilopod.frozen import Array, ComplexArray
 from chilopod.paper.shapes import finish
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, minus, number, spring
-
-Array = NDArray[np.float64]
 
 _WIDE = style.Layout("AA;BC", 7.4, heights=(1.15, 1.0))
 _NARROW = style.Layout("A;B;C", 10.6)
@@ -98,7 +96,7 @@ def _joined(data: xr.Dataset) -> tuple[Array, Array, Array]:
     return np.exp(np.concatenate(at)), table.real, table.imag
 
 
-def _between(start: NDArray[np.complex128], end: NDArray[np.complex128]) -> tuple[Array, NDArray[np.complex128]]:
+def _between(start: ComplexArray, end: ComplexArray) -> tuple[Array, ComplexArray]:
     """Parts of the way from one value of the sweep to the next, and the exponents there.
 
     Where a complex pair becomes two real exponents or the other way round, the mean of the two and the square of half

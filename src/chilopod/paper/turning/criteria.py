@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 
 from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.frozen import Array
 from chilopod.paper.printed import CRITERION_NAMES, Band
-from chilopod.paper.scatter import SURE, Answer, Array, Difference, difference, every
+from chilopod.paper.scatter import SURE, Answer, Difference, difference, every
 from chilopod.paper.turning.trials import CRITERIA, TurningTask
 from chilopod.steering import LegYawController
 

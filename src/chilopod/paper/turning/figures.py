@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
+from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.printed import CRITERION_NAMES
-from chilopod.paper.scatter import Array
 from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, legend_below, over_compliance
 from chilopod.paper.statements import listed
 from chilopod.paper.turning.criteria import SCALES, all_lower, in_words, minima, saturation, softest_minima

@@ -15,9 +15,9 @@ import xarray as xr
 
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
+from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.measures import Folder, over_springs
-from chilopod.paper.scatter import Array
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Outcome, Target, earliest_arrival, evaluate

@@ -10,13 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
 from chilopod.tasks.identify import Identification
-
-Array = NDArray[np.float64]
 
 _WIDE = style.Layout("ABC;DEF", 6.2)
 _NARROW = style.Layout("A;B;C;D;E;F", 17.0)

@@ -22,13 +22,12 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from chilopod.errors import OutputError, ParameterError
+from chilopod.frozen import Array
 from chilopod.show import style
 from chilopod.show.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.show.scene.frames import Outcome, Scene, scene
 from chilopod.show.scene.outline import SLIMNESS
 from chilopod.show.style import SCENE as COLORS
-
-Array = NDArray[np.float64]
 
 _SMALLEST, LARGEST = 240, 4096
 _SLOWEST, FASTEST = 0.01, 1000.0  # s of a walk in one of a film

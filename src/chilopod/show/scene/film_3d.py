@@ -15,9 +15,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.show import style
 from chilopod.show.scene.aims import places_of
 from chilopod.show.scene.encoder import encoded
@@ -25,8 +26,6 @@ from chilopod.show.scene.film import APART, GAP, LARGEST, PIXEL, FilmPanel, Stag
 from chilopod.show.scene.frames import Scene, scene
 from chilopod.show.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
-
-Array = NDArray[np.float64]
 
 _TALL: Final = 0.15  # m above the floor that pictures leave room for, more than any robot's back
 _BESIDE: Final = 0.1  # m to the side of the middle of the body, likewise

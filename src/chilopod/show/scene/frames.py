@@ -20,13 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Status
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
 from chilopod.robot import Robot
 from chilopod.show.scene.aims import Aim, aims_of, places_of
 from chilopod.show.words import round_down
 from chilopod.steering import ARRIVAL_RADIUS
-
-Array = NDArray[np.float64]
 
 # Phases such as 0.62/0.31 miss their integer by round-off; a foot nearer than this (in cycles) to a switch has made it.
 _SAME_PHASE: Final = 1e-9

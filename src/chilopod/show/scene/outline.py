@@ -8,12 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
 from matplotlib.transforms import Affine2D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chilopod.frozen import Array
 from chilopod.kinematics import directions, module_centres, module_headings
 from chilopod.show import style
-
-Array = NDArray[np.float64]
 
 SLIMNESS = 0.36
 """Width of a drawn module over its length; the robot file has none."""

@@ -8,15 +8,13 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.show.scene.frames import Scene
 from chilopod.show.scene.outline_3d import drawn, yaw_joint
 from chilopod.show.scene.packing import LARGEST, encoded, packed
 from chilopod.twin.model import TwinModel, compiled
-
-Array = NDArray[np.float64]
 
 FINE: Final = 10
 """Thin grid lines from one grid line to the next."""

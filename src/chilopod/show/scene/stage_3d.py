@@ -16,13 +16,13 @@ from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.style import SCENE as COLORS
 from chilopod.twin.legs import twin_of
 from chilopod.twin.model import AWAY, POLE_GROUP, SIDES, build, scanner_place
 
-Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
 TILE: Final = 0.5

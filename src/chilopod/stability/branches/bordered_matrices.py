@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array
 from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.mirrored import symmetric_states
-
-Array = NDArray[np.float64]
 
 _UNCERTAIN = 1e-6  # singular value that counts as zero: the error of a difference
 

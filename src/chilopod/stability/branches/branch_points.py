@@ -6,16 +6,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.spectrum.errors import stable_within
 from chilopod.stability.tracing.step import Before
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

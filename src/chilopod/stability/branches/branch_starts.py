@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.deadline import Deadline
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
 from chilopod.stability.branches.curve import Curve
@@ -30,8 +30,6 @@ from chilopod.stability.problem.capabilities import (
 )
 from chilopod.stability.problem.returns import Section, returned_states, whole_period
 from chilopod.stability.problem.scales import sizes
-
-Array = NDArray[np.float64]
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""

@@ -11,10 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import read_only
+from chilopod.frozen import Array, ComplexArray, read_only
 from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.family_returns import FamilyReturns
@@ -27,9 +26,6 @@ from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 PRECISION = 1e-12
 """Default precision of orbits, relative to the sizes of the states; the accuracy of the flow limits it."""

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array
 from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, UserCode
 from chilopod.stability.problem.capabilities import Family, FlowsEach, SystemLike, returns_per_period
@@ -22,8 +22,6 @@ from chilopod.stability.problem.returns import (
     section_at,
     whole_period,
 )
-
-Array = NDArray[np.float64]
 
 _PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
 _STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink

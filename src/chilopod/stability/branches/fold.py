@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import ChilopodError
+from chilopod.frozen import Array
 from chilopod.stability.branches.branch import Branch, follow, proceed
 from chilopod.stability.branches.branch_points import BranchPoint
 from chilopod.stability.branches.branch_starts import begin
@@ -16,8 +16,6 @@ from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import Family, SystemLike, returns_per_period
 from chilopod.stability.problem.returns import ReturnMap, return_map, section_at
 from chilopod.stability.tracing.ending import Ending
-
-Array = NDArray[np.float64]
 
 _STEPS = 40
 _FLOWS = 2000  # budget of a step

@@ -16,10 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, special_point
@@ -35,9 +35,6 @@ from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.interpolation import DEGREE, PLACES, interpolated
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, distances, factors
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
 _BUDGET = 400  # corrected orbits within one step

@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.within import SAME_ORBIT, Within
@@ -24,8 +24,6 @@ from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event
-
-Array = NDArray[np.float64]
 
 _CRITICAL = 1e-5  # distance from the circle within which a multiplier is critical at a located point
 _AROUND = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]) / 40.0  # places round a turn, relative to the step

@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.orbit_blocks import Blocks, orbit_blocks
@@ -16,8 +16,6 @@ from chilopod.stability.tracing.equations import Plane
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.tracing.tolerances import AWAY
 from chilopod.stability.tracing.tracer import Parts
-
-Array = NDArray[np.float64]
 
 SAME_ORBIT = 1e-6
 """Distance between states of one orbit, relative to the sizes of the states."""

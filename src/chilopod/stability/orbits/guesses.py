@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
+from chilopod.frozen import Array
 from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
 from chilopod.stability.problem.capabilities import (
     Autonomous,
@@ -21,8 +21,6 @@ from chilopod.stability.problem.capabilities import (
 )
 from chilopod.stability.problem.returns import carried, return_duration, returned_states
 from chilopod.stability.problem.scales import sizes
-
-Array = NDArray[np.float64]
 
 _OF_GUESS = 16  # nodes of a guess that is a whole orbit
 _FEWEST_ROWS = 5

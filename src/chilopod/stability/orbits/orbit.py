@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array, positive
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.deadline import Deadline
-from chilopod.frozen import ReadOnlyArrays, in_one_line
+from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, shot
@@ -45,8 +45,6 @@ from chilopod.stability.problem.returns import (
 from chilopod.stability.problem.scales import sizes
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.mirrored import symmetric_states
-
-Array = NDArray[np.float64]
 
 _RESTS = 1e-8  # motion, relative to the sizes at the guess, that counts as rest
 _RETURNED = 1e-12  # relative residual of a known orbit that is exact

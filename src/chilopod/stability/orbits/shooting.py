@@ -15,16 +15,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.convergence import NODES, RETURN
 from chilopod.stability.problem.budget import Budget, SpentError
 from chilopod.stability.problem.capabilities import Autonomous, SystemLike, checked_flow, is_autonomous
 from chilopod.stability.problem.returns import Section, carried, crossing, section_at
-
-Array = NDArray[np.float64]
 
 _EVALUATIONS, FEW_ROUNDS = 60, 12  # largest numbers of damped corrections, and of those on a curve, with near points
 _LONGEST = 4.0  # longest return, relative to the guess

@@ -15,14 +15,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol, Self, TypeGuard, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import numbers
 from chilopod.flows.implicit.flow import Stretched
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array
 
 
 @runtime_checkable

@@ -7,13 +7,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import LARGEST, checked_count, numbers
+from chilopod.frozen import Array
 from chilopod.stability.problem.system import PeriodicSystem
-
-Array = NDArray[np.float64]
 
 _SHAKE = 2.0**-52
 _OWN = 10.0  # factor on the difference of two independent errors for a bound on either

@@ -16,12 +16,12 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import numbers
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.problem.capabilities import (
     Autonomous,
     FlowsMany,
@@ -34,8 +34,6 @@ from chilopod.stability.problem.capabilities import (
     returns_per_period,
 )
 from chilopod.stability.problem.scales import sizes
-
-Array = NDArray[np.float64]
 
 _APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from which the crossing is corrected
 _FARTHEST = 0.8  # delay, in returns, that makes it another crossing

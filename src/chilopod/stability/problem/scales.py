@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.frozen import Array
 from chilopod.stability.problem.capabilities import SystemLike, checked_flow, given_scale
-
-Array = NDArray[np.float64]
 
 _PART = 1.0 / 16.0  # part of a return
 _SWEEPS = 3

@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import LARGEST, checked_count, finite_array, positive
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.implicit.flow import Stretched
-from chilopod.frozen import ReadOnlyArrays
-
-Array = NDArray[np.float64]
+from chilopod.frozen import Array, ReadOnlyArrays
 
 Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""

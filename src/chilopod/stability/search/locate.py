@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.frozen import Array
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.crossing_points.description import Formed, described
 from chilopod.stability.crossing_points.place import Course, past_singular, place_error
@@ -30,8 +31,6 @@ from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
-
-Array = NDArray[np.float64]
 
 _DESCRIBING = 400  # budget of return maps for the orbits beside a point
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of followed ones

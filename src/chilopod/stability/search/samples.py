@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError, in_words
+from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.problem.arguments import system_of
@@ -19,7 +20,6 @@ from chilopod.stability.problem.capabilities import Family, SystemLike, is_auton
 from chilopod.stability.problem.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.problem.scales import sizes
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 FIRST_STEPS = 8

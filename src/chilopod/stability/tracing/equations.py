@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array
 from chilopod.stability.problem.budget import Budget
 from chilopod.stability.tracing import tolerances
 from chilopod.stability.tracing.step import A, Guess, S, Step
 
-Array = NDArray[np.float64]
 R = TypeVar("R")
 
 

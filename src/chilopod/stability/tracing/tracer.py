@@ -12,16 +12,15 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ChilopodError
+from chilopod.frozen import Array
 from chilopod.stability.tracing import tolerances
 from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane, R
 from chilopod.stability.tracing.step import A, Guess, S, Step, predicted
 
-Array = NDArray[np.float64]
 F = TypeVar("F")
 
 

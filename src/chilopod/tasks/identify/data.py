@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Annotated, Final, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from chilopod import units
 from chilopod.errors import ParameterError
+from chilopod.frozen import Array
 from chilopod.robot.files import read_file
 from chilopod.units import Description, Quantity
-
-Array = NDArray[np.float64]
 
 _STIFFNESS: Final = Quantity("N*m/rad", "N*mm/deg")
 _UNIT: Final = 0.1  # that rounding may leave of the norm of a mode

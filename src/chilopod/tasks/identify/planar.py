@@ -23,9 +23,9 @@ from chilopod import units
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Array
 from chilopod.notebook import Summary, axes_for
 from chilopod.progress import Progress, silent
-from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.tasks.identify.data import CriticalMode

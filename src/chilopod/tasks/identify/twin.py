@@ -28,10 +28,9 @@ from chilopod import units
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.engine import engine_named
 from chilopod.errors import ChilopodError
-from chilopod.frozen import Short
+from chilopod.frozen import Array, Short
 from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
-from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.twin_constants import FREE, parts_of, values_at, with_constants

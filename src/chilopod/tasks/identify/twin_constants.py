@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chilopod.record import Array
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 
 

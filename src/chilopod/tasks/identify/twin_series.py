@@ -12,7 +12,8 @@ from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.engine import Walk, engine_named
 from chilopod.errors import AnalysisError
-from chilopod.record import Array, Recording
+from chilopod.frozen import Array
+from chilopod.record import Recording
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.twin.walk import TOLERANCE
