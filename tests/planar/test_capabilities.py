@@ -6,7 +6,6 @@ from chilopod.planar import PlanarModel
 from chilopod.planar.along import FollowedModel
 from chilopod.robot import load_robot
 from chilopod.stability import (
-    FlowsEach,
     FlowsMany,
     FlowsStates,
     FlowsWithError,
@@ -24,12 +23,9 @@ spatially_symmetric: SpatiallySymmetric = MODEL
 flows_with_error: FlowsWithError = MODEL
 flows_states: FlowsStates = MODEL
 flows_many: FlowsMany = MODEL
-flows_each: FlowsEach = FOLLOWED
 
 
 def test_the_models_have_the_capabilities_they_declare() -> None:
     for model in (MODEL, FOLLOWED):
         for capability in (SystemLike, KnowsOrbit, SpatiallySymmetric, FlowsWithError, FlowsStates, FlowsMany):
             assert isinstance(model, capability), capability.__name__
-    assert isinstance(FOLLOWED, FlowsEach)
-    assert not isinstance(MODEL, FlowsEach)

@@ -8,7 +8,6 @@ import pytest
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability import (
-    FlowsEach,
     FlowsMany,
     FlowsStates,
     FlowsWithError,
@@ -87,10 +86,10 @@ def test_optional_attributes_are_used():
 
 def test_a_capability_that_is_none_is_missing():
     class Without(Own):
-        flow_with_error = flow_states = flow_many = can_flow_with = flow_each = None
+        flow_with_error = flow_states = flow_many = can_flow_with = None
         spatial_symmetry = orbit = None
 
-    protocols = (FlowsEach, FlowsMany, FlowsStates, FlowsWithError)
+    protocols = (FlowsMany, FlowsStates, FlowsWithError)
     plain = PeriodicSystem(2, 2 * pi, Own().flow)
     for system in (Own(), Without(), plain, whole_period(Without())):
         assert not any(isinstance(system, protocol) for protocol in protocols)

@@ -232,14 +232,34 @@ def follow(
     low, high = _checked(between, points, longest)
     options: dict[str, object] = {"closely": closely, "precision": precision, "budget": budget, "progress": progress}
     check_arguments(family=family, step=step, symmetric=symmetric, **options)
+    if isinstance(start, BifurcationPoint):
+        said = "is a bifurcation point"
+        raise ParameterError(said, field="start", value=start.kind.label, allowed="a start from `switch`")
     allowed = Budget(budget, seconds)
     curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=allowed)
     with allowed:
-        anchor = _anchored(family, curve, start, low, step)
+        if not isinstance(start, Start | BranchPoint):
+            start = begin(family, low, start, symmetric=symmetric)
+        branch, anchor = opened(curve, start, step)
+        return followed(curve, branch, anchor, longest, points, closely, progress)
+
+
+def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branch, Anchor]:
+    """The branch at its first point, and the anchor there; the curve gets the sizes of its states."""
+    if not curve.between[0] <= start.value <= curve.between[1]:
+        raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
+    if isinstance(start, Start):
+        curve.periods = start.periods
+    curve.sizes = branch_sizes(curve, start)
+    if isinstance(start, Start):
+        anchor = anchored(curve, start, step)
+    else:
+        units = curve.units(start.orbit.size)
+        tangent = start.tangent * (1.0 if start.units is None else start.units) / units
+        anchor = curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()
-    branch = Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, symmetric, remarks=remarks)
-    return _followed(curve, branch, anchor, points, longest, closely, progress)
+    return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor
 
 
 def proceed(
@@ -292,8 +312,9 @@ def proceed(
     leaving = last.special is not None
     # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = branch.step if leaving else 0.0
-    anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
-    return _followed(curve, branch, anchor, points, longest, closely, progress)
+    with allowed:
+        anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
+        return followed(curve, branch, anchor, longest, points, closely, progress)
 
 
 def _checked(between: tuple[float, float], points: int | None, longest: float) -> tuple[float, float]:
@@ -304,35 +325,24 @@ def _checked(between: tuple[float, float], points: int | None, longest: float) -
     return low, high
 
 
-def _anchored(
-    family: Family, curve: Curve, start: Start | BranchPoint | Orbit | ArrayLike, low: float, step: float
-) -> Anchor:
-    """Anchor of the first step; the curve gets the sizes of its states."""
-    if isinstance(start, BifurcationPoint):
-        said = "is a bifurcation point"
-        raise ParameterError(said, field="start", value=start.kind.label, allowed="a start from `switch`")
-    if not isinstance(start, Start | BranchPoint):
-        start = begin(family, low, start, symmetric=curve.symmetric)
-    if not curve.between[0] <= start.value <= curve.between[1]:
-        raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
-    if isinstance(start, Start):
-        curve.periods = start.periods
-        curve.sizes = branch_sizes(curve, start)
-        return anchored(curve, start, step)
-    curve.sizes = branch_sizes(curve, start)
-    units = curve.units(start.orbit.size)
-    tangent = start.tangent * (1.0 if start.units is None else start.units) / units
-    return curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
-
-
-def _followed(
-    curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
+def followed(
+    curve: Curve,
+    branch: Branch,
+    anchor: Anchor,
+    longest: float,
+    points: int | None,
+    closely: bool,
+    progress: Progress = _silent,
+    until: Kind | None = None,
 ) -> Branch:
+    """A branch with the points that follow an anchor; it also ends past a special point of the kind ``until``."""
     curve.first = branch.points[0]
     found, remarks = list(branch.points), list(branch.remarks)
 
     def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:
-        return (inspect(curve, step, closely), step.end.last), ending
+        within = inspect(curve, step, closely)
+        reached = until is not None and any(point.special is until for point in within.points)
+        return (within, step.end.last), Ending.ENOUGH_POINTS if reached else ending
 
     def keep(looked: tuple[Found, BranchPoint], count: int) -> None:
         within, end = looked
@@ -340,7 +350,6 @@ def _followed(
         remarks.extend(within.remarks)
         progress(count, end)
 
-    with curve.budget:
-        ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
+    ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)

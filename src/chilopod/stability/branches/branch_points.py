@@ -89,12 +89,11 @@ class Anchor(ReadOnlyArrays):
 
 
 class Returned(NamedTuple):
-    """A state and the value of the parameter, the return of the state, and that at a neighbouring value if known."""
+    """A state, the value of the parameter, and the return of the state."""
 
     x: Array
     value: float
     mapped: Array
-    beside: Array | None
 
 
 class OnCurve(NamedTuple):

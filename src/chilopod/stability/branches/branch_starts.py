@@ -288,7 +288,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
             break
     else:  # linear: the orbit's change over the interval
         n = x.size
-        derivative = curve.parameter_derivative(x, value, section)
+        derivative = curve.by_parameter(x, value, section)
         slope = np.linalg.lstsq(np.eye(n) - image.jacobian * base / base[:, None], derivative / base)[0]
         return base * max(1.0, float(np.abs(slope).max()))
     for _ in range(_HALVINGS):
@@ -307,7 +307,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     """
     section = curve.section_at(start.orbit, start.value, start.period)
     image = curve.image(start.orbit, start.value, section, with_error=True)
-    derivative = curve.parameter_derivative(start.orbit, start.value, section)
+    derivative = curve.by_parameter(start.orbit, start.value, section)
     n = start.orbit.size
     units = curve.units(n)
     matrix = curve.matrix(image.jacobian, derivative, np.zeros(n + 1))[:-1]

@@ -118,9 +118,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         x = anchor.last.orbit + sizes * moved[:-1]
         if space is not None:
             x = sizes * (space @ (x / sizes))
-        mapped, beside = self.mapped(x, value, anchor.section)
+        mapped = self.mapped(x, value, anchor.section)
         residual = (mapped - x) / sizes
-        return Returned(x, value, mapped, beside), residual if space is None else space @ residual
+        return Returned(x, value, mapped), residual if space is None else space @ residual
 
     def off(self, found: Returned, residual: Array, move: Array) -> float:
         """Largest residual, relative to the orbit unless that is small."""
@@ -141,7 +141,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         if not anchor.leaving:
             return None
         jacobian = self.image(found.x, found.value, anchor.section).jacobian
-        derivative = self.difference(found.x, found.value, anchor.section, found.mapped, found.beside)
+        derivative = self.by_parameter(found.x, found.value, anchor.section, found.mapped)
         return within_space(anchor.space, self.matrix(jacobian, derivative, row))
 
     def step(self, anchor: Anchor, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Anchor, OnCurve]:
@@ -159,12 +159,12 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
                     image = replace(image, error=self.image(x, value, timed.section, with_error=True).error)
         else:
             timed, solved = self._solved(anchor, timed, guess, plane, count)
-            (x, value, mapped, beside), moved, corrections = solved.found, solved.moved, solved.corrections
+            (x, value, mapped), moved, corrections = solved.found, solved.moved, solved.corrections
             # The residual shows one direction.
             off = _CLEAR * float(np.linalg.norm(solved.inverse @ solved.residual))
             weakest = float(np.linalg.norm(solved.inverse, 2))
             image = self.image(x, value, timed.section, bounded)
-            derivative = self.difference(x, value, timed.section, mapped, beside)
+            derivative = self.by_parameter(x, value, timed.section, mapped)
         matrix = self.matrix(image.jacobian, derivative, last.tangent)
         tangent = null_vector(within_space(space, matrix))
         if not tangent @ last.tangent >= SHARPEST_TURN:
@@ -351,5 +351,5 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         x = last.orbit + ahead * last.tangent[:-1] * self.units(last.orbit.size)[:-1]
         # Equal to the end of a step, to the bit.
         jacobian = self.image(x, last.value, section, with_error=True).jacobian
-        derivative = self.parameter_derivative(x, last.value, section)
+        derivative = self.by_parameter(x, last.value, section)
         return self.matrix(jacobian, derivative, last.tangent)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TypeGuard
 
 import numpy as np
 
@@ -12,7 +10,7 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, UserCode
-from chilopod.stability.problem.capabilities import Family, FlowsEach, SystemLike, returns_per_period
+from chilopod.stability.problem.capabilities import Family, SystemLike, returns_per_period
 from chilopod.stability.problem.returns import (
     ReturnMap,
     Section,
@@ -31,11 +29,8 @@ _KEPT = 8  # cached systems: making one may cost more than a flow
 
 class FamilyReturns:
     """Return maps of the systems of a family, with the scale of the parameter and the sizes of the states along a curve
-    (None: their own units), for orbits over a number of periods, or with the systems' symmetry in time.
-
-    Where systems flow each (see :class:`chilopod.stability.FlowsEach`), the derivative with respect to the
-    parameter costs almost nothing on two cores. The family is called for values of the interval only.
-    """
+    (None: their own units), for orbits over a number of periods, or with the systems' symmetry in time. The family is
+    called for values of the interval only."""
 
     def __init__(
         self,
@@ -56,30 +51,22 @@ class FamilyReturns:
         self.symmetric = symmetric
         self.budget = Budget(math.inf) if budget is None else budget
         self.steepness = 1.0  # steepness of the return map over the parameter, in units
-        self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
-        self._each: dict[type, bool] = {}
+        self._known: dict[float, SystemLike] = {}
         self._dimension = 0
 
     def system(self, value: float) -> SystemLike:
         """System under study, over the periods of the orbits."""
-        return self._systems(value)[1]
-
-    def _systems(self, value: float) -> tuple[SystemLike, SystemLike]:
-        """The family's system and the system under study."""
-        known = self._known.get(value)
-        if known is None:
+        if value not in self._known:
             own = system_of(self._family, value)
             self._dimension = self._dimension or own.dimension
             if own.dimension != self._dimension:
-                raise AnalysisError(
-                    "changes its dimension", field="family", value=value, allowed=f"{self._dimension} states"
-                )
-            whole = self.symmetric or (own.symmetry is None and self.periods == 1)
-            known = own, own if whole else whole_period(own, self.periods)
+                allowed = f"{self._dimension} states"
+                raise AnalysisError("changes its dimension", field="family", value=value, allowed=allowed)
             if len(self._known) >= _KEPT:
                 self._known.clear()
-            self._known[value] = known
-        return known
+            whole = self.symmetric or (own.symmetry is None and self.periods == 1)
+            self._known[value] = own if whole else whole_period(own, self.periods)
+        return self._known[value]
 
     def units(self, count: int) -> Array:
         """Sizes of the states and scale of the parameter, shape (n+1,)."""
@@ -100,29 +87,11 @@ class FamilyReturns:
         duration = None if period is None else period / returns_per_period(system)
         return section_at(system, x, self.sizes, duration)
 
-    def parameter_derivative(self, x: Array, value: float, section: Section | None = None) -> Array:
-        """dH/dp at a state, per scale, shape (n,)."""
-        mapped, beside = self.mapped(x, value, section)
-        return self.difference(x, value, section, mapped, beside)
-
-    def mapped(self, x: Array, value: float, section: Section | None) -> tuple[Array, Array | None]:
-        """H at a state, and at a neighbouring value of the parameter if that is free."""
+    def mapped(self, x: Array, value: float, section: Section | None) -> Array:
+        """H at a state."""
         self.budget.take()
-        own, system = self._systems(value)
         with UserCode("flow", value):
-            period = own.period
-            if section is None and period is not None and not self.symmetric and self.periods == 1:
-                beside = (
-                    self._systems(value + self._parameter_step(value, self.steepness))[0]
-                    if self._flows_each(own)
-                    else own
-                )
-                same = beside.period == period
-                if self._flows_each(own) and self._flows_each(beside):
-                    both: Sequence[FlowsEach] = [own, beside]
-                    mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, period)
-                    return (mapped, moved) if same else (mapped, None)
-            return returned_states(system, x[None], section)[0], None
+            return np.asarray(returned_states(self.system(value), x[None], section)[0])
 
     def noise(self, x: Array, value: float, section: Section | None) -> float:
         """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
@@ -131,29 +100,23 @@ class FamilyReturns:
             other = in_parts(system, x, image.period / image.returns)
         return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
-    def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
-        """True if a system implements ``FlowsEach``; cached for each class, as the test is slower than some flows."""
-        kind = type(system)
-        if kind not in self._each:
-            self._each[kind] = isinstance(system, FlowsEach)
-        return self._each[kind]
-
     def _parameter_step(self, value: float, steepness: float) -> float:
         """A small exact change of the parameter that stays within the interval."""
         step = _PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP)
         step = max(step, 8.0 * float(np.spacing(abs(value))))
         return (value + step) - value if value + step <= self.between[1] else (value - step) - value
 
-    def difference(self, x: Array, value: float, section: Section | None, mapped: Array, beside: Array | None) -> Array:
-        """dH/dp per scale, shape (n,), from H at a state, and at a neighbouring value if known.
+    def by_parameter(self, x: Array, value: float, section: Section | None, mapped: Array | None = None) -> Array:
+        """dH/dp at a state, per scale, shape (n,), from H there if it is known.
 
         The parabola through a third value is needed near branch points, where the matrix of a curve is nearly singular.
         """
         units, steepness = self.units(x.size)[:-1], self.steepness
+        mapped = self.mapped(x, value, section) if mapped is None else mapped
         for last in (*[False] * _RETRIES, True):
             step = self._parameter_step(value, steepness)
             try:
-                beside = self._returned(x, value + step, section) if beside is None else beside
+                beside = self.mapped(x, value + step, section)
             except AnalysisError:
                 if last:
                     raise
@@ -164,15 +127,10 @@ class FamilyReturns:
             # A return that magnifies needs a smaller step of the parameter.
             if last or not 2.0 * max(_STEEP, steepness) < found < np.inf:
                 break
-            steepness, beside = found, None
+            steepness = found
         other = (value - step) - value if self.between[0] <= value - step <= self.between[1] else 2.0 * step
         try:
-            second = (self._returned(x, value + other, section) - mapped) / (other / self.scale)
+            second = (self.mapped(x, value + other, section) - mapped) / (other / self.scale)
         except AnalysisError:  # an edge of the systems' domain
             return difference
         return (difference * other - second * step) / (other - step)
-
-    def _returned(self, x: Array, value: float, section: Section | None) -> Array:
-        self.budget.take()
-        with UserCode("flow", value):
-            return np.asarray(returned_states(self.system(value), x[None], section)[0])

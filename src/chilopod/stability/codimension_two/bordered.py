@@ -101,6 +101,7 @@ class Evaluated(ReadOnlyArrays):
 
     place: Place  # place, and the return map there
     image: ReturnMap
+    frame: Frame
     jacobian: Array  # Jacobian of the return map in units of the frame, shape (n, n)
     error: Array  # bounds on the errors of its entries
     residual: Array  # left sides of the equations, shape (m + k,)
@@ -108,27 +109,26 @@ class Evaluated(ReadOnlyArrays):
     left: Array
     reach: float  # norm of the inverse of the bordered matrix
 
+    @property
+    def shift(self) -> Array | None:
+        """Bounds on the errors of the coordinates, shape (m + k + 1,); None if not computed."""
+        return None
+
 
 @dataclass(frozen=True)
-class Spot(ReadOnlyArrays):
-    """A point of a curve from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
+class Spot(Evaluated):
+    """A point of a curve from which steps start, with the equations there in a frame adapted to it: see
+    :class:`chilopod.stability.tracing.step.Anchor`."""
 
-    at: Evaluated  # equations there, in a frame adapted to this point
-    frame: Frame
     matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
     tangent: Array  # unit tangent, shape (m + k + 1,)
     uncertainty: Array  # bounds on the errors of the left sides of the equations, shape (m + k,)
     before: Before | None = None  # previous point in coordinates of this one
 
     @property
-    def place(self) -> Place:
-        """Place of the point."""
-        return self.at.place
-
-    @property
     def values(self) -> Array:
         """Values of both parameters, shape (2,)."""
-        return self.at.place.values
+        return self.place.values
 
     @property
     def shift(self) -> Array:
@@ -192,11 +192,11 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         place, image = self._mapped(place, section, True)
         own = self._framed(system, place, image, np.maximum(frame.size, np.abs(place.state)), frame)
         at = self._equations(place, image, own)
-        matrix = self._derivative(at, own)
+        matrix = self._derivative(at)
         tangent = np.linalg.svd(matrix)[2][-1]
         if before is not None:
             tangent = tangent * np.sign(tangent @ own.carried(before, frame))
-        return Spot(at, own, np.vstack([matrix, tangent]), tangent, self._uncertainty(at, own))
+        return Spot(**vars(at), matrix=np.vstack([matrix, tangent]), tangent=tangent, uncertainty=self._uncertainty(at))
 
     def parameters(self, anchor: Spot) -> tuple[slice, Array]:
         """Indices of the parameters among the coordinates, and their units."""
@@ -239,7 +239,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _onto(self, spot: Spot, direction: Array) -> Array:
         """A direction with its state projected along the motion onto the section of a spot, if it has one."""
-        image, frame = spot.at.image, spot.frame
+        image, frame = spot.image, spot.frame
         if image.velocity is None or image.normal is None or not frame.basis.size:
             return direction
         m = frame.basis.shape[1]
@@ -320,10 +320,12 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         k = right.shape[1]
         orbit = frame.basis.T @ ((image.state - place.state) / frame.size)
         residual = np.concatenate([orbit, frame.mixture @ inverse[-k:, -k:].ravel()])
-        return Evaluated(place, image, jacobian, error, residual, right, left, float(np.linalg.norm(inverse, 2)))
+        reach = float(np.linalg.norm(inverse, 2))
+        return Evaluated(place, image, frame, jacobian, error, residual, right, left, reach)
 
-    def _derivative(self, at: Evaluated, frame: Frame) -> Array:
+    def _derivative(self, at: Evaluated) -> Array:
         """Derivative of the equations with respect to the coordinates, exact or by differences."""
+        frame = at.frame
         m, k = frame.basis.shape[1], at.right.shape[1]
         columns = []
         for j in range(m + 2):
@@ -337,8 +339,9 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         matrix[:m, :m] = frame.basis.T @ (at.jacobian @ frame.basis - frame.basis)
         return matrix
 
-    def _uncertainty(self, at: Evaluated, frame: Frame) -> Array:
-        error = wrong = at.error
+    def _uncertainty(self, at: Evaluated) -> Array:
+        frame, error = at.frame, at.error
+        wrong = error
         if not self.target:
             own = np.abs(at.jacobian)
             wrong = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error

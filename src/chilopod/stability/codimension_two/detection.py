@@ -6,10 +6,11 @@ Meijer, SIAM J. Sci. Comput. 26, 2005.
 
 from __future__ import annotations
 
-import contextlib
 import enum
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Frame, Spot
+from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Spot
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates
@@ -32,7 +33,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event
 
 _SAFETY = 1.5
 _BESIDE = 1e-3  # step of the differences of a test function, relative to the curve's step
-_NEARER = (-0.1, 0.1, -0.01, 0.01, -0.001, 0.001)  # distances, in steps, from a place without a test function
+_AROUND = 0.001, 0.01, 0.1  # distances, in steps, from a place without a test function
 _POLE = 0.1  # value at a sign change, relative to those at the ends of a step, above which it is a pole
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
@@ -61,17 +62,15 @@ _COSINES = {
 }
 
 
-class _NoValue(AnalysisError):
-    """A test function is undefined at a place."""
+Test = Callable[[float], tuple[float, float]]
+"""A test function and its error at a distance along a step; NaN where undefined."""
 
 
 @dataclass(frozen=True)
 class Critical(ReadOnlyArrays):
     """A place of a curve with its multipliers."""
 
-    at: Evaluated  # equations there and their frame
-    frame: Frame
-    shift: Array | None  # errors of the coordinates, if the image has error bounds; else None
+    at: Evaluated
     spectrum: Spectrum  # all multipliers of the return map
     others: NDArray[np.intp]  # indices of the multipliers that are not critical, shape (others,)
     multiplier: complex  # critical multiplier: +1, -1, or on the unit circle with positive imaginary part
@@ -80,14 +79,14 @@ class Critical(ReadOnlyArrays):
     overlap: float  # overlap of the two, each a unit vector in the frame: 0 for a double multiplier, NaN for a pair
 
 
-def critical(target: int, at: Evaluated, frame: Frame, shift: Array | None = None) -> Critical:
+def critical(target: int, at: Evaluated) -> Critical:
     """A place of a curve, with the critical multipliers separated from the others."""
     spec = spectrum(at.image)
     if target:
         own = [int(np.abs(spec.values - target).argmin())]
-        v, w = at.right[:, 0], at.left[:, 0]
+        v, w, size = at.right[:, 0], at.left[:, 0], at.frame.size
         overlap = float(w @ v / (np.linalg.norm(w) * np.linalg.norm(v)))
-        nu, mode, left = complex(target), (frame.size * v).astype(np.complex128), (w / frame.size).astype(np.complex128)
+        nu, mode, left = complex(target), (size * v).astype(np.complex128), (w / size).astype(np.complex128)
         mode /= np.linalg.norm(mode)
         with np.errstate(divide="ignore", invalid="ignore"):
             left /= left @ mode
@@ -102,14 +101,12 @@ def critical(target: int, at: Evaluated, frame: Frame, shift: Array | None = Non
         turn = np.abs(mode).max() / mode[np.abs(mode).argmax()]
         mode, left = mode * turn, left * turn
     others = np.delete(np.arange(spec.values.size), own)
-    return Critical(at, frame, shift, spec, others, nu, mode, left, overlap)
+    return Critical(at, spec, others, nu, mode, left, overlap)
 
 
-@dataclass(frozen=True)
-class Station:
-    """A spot of a curve with the point there, and the test functions."""
+class Station(NamedTuple):
+    """A point of a curve, and the test functions there."""
 
-    spot: Spot
     point: Point2
     signals: Signals
 
@@ -123,12 +120,12 @@ class Detector:
         self._signals: tuple[Signal, ...] = (*form, *((Own.DOUBLE,) if curve.target else _COSINES), *Event)
 
     def station(self, spot: Spot) -> Station:
-        """A spot with the point there, and the test functions."""
-        here = critical(self._curve.target, spot.at, spot.frame, spot.shift)
+        """The point at a spot, and the test functions."""
+        here = critical(self._curve.target, spot)
         form = self.form(here) if self._coefficients and abs(spot.place.cosine) < 1.0 else None
         signals = {signal: self._measured(signal, here, form) for signal in self._signals}
         bound = across(spot) + 4.0 * _EPSILON * np.abs(spot.values)
-        return Station(spot, _point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
+        return Station(_point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
 
     def events(self, step: Step[Spot, Evaluated], before: Signals, after: Signals) -> list[tuple[Spot, SpecialPoint2]]:
         """Points of codimension two within a step, in order."""
@@ -139,30 +136,24 @@ class Detector:
                 continue
             # A function that vanishes along the whole curve changes its sign as well.
             if any(abs(value) > _RESOLVED * error for value, error in (before[signal], after[signal])):
-                found += self._located(signal, parts)
-        return [(spot, point) for _, spot, point in sorted(found, key=lambda each: each[0])]
+                found.append(self._located(signal, parts))
+        known = [each for each in found if each is not None]
+        return [(spot, point) for _, spot, point in sorted(known, key=lambda each: each[0])]
 
     def form(self, here: Critical) -> NormalForm:
         """The normal form at a place."""
-        orbit_error = error = 0.0
-        if here.shift is not None:
-            frame, m = here.frame, here.frame.basis.shape[1]
-            orbit_error = float(np.abs(here.left) @ (frame.size * (np.abs(frame.basis) @ here.shift[:m])))
-            error = float(here.at.error.max())
-        return normal_form(
-            *self.sampled(here),
-            uncertainty=error / float(np.linalg.norm(here.at.jacobian)),
-            scale=here.frame.size,
-            orbit_error=orbit_error,
-        )
+        at, shift, orbit_error = here.at, here.at.shift, 0.0
+        if shift is not None:
+            state = at.frame.size * (np.abs(at.frame.basis) @ shift[: at.frame.parameters.start])
+            orbit_error = float(np.abs(here.left) @ state)
+        error = 0.0 if shift is None else float(at.error.max() / np.linalg.norm(at.jacobian))
+        return normal_form(*self.sampled(here), uncertainty=error, scale=at.frame.size, orbit_error=orbit_error)
 
     def sampled(self, here: Critical) -> tuple[ReturnedStates, CriticalOrbit]:
         """Return map and critical orbit of a normal form."""
-        at, section = here.at, here.frame.section
-        system = self._curve.system(at.place.values)
-        orbit = CriticalOrbit(
-            at.place.state, at.image.jacobian, here.multiplier, here.mode, here.left, at.image.returns
-        )
+        place, image, section = here.at.place, here.at.image, here.at.frame.section
+        system = self._curve.system(place.values)
+        orbit = CriticalOrbit(place.state, image.jacobian, here.multiplier, here.mode, here.left, image.returns)
         return lambda states: returned_states(system, states, section), orbit
 
     def fifth(self, here: Critical, *forms: NormalForm) -> Quintic | None:
@@ -181,7 +172,8 @@ class Detector:
     def _measured(self, signal: Signal, here: Critical, form: NormalForm | None = None) -> tuple[float, float]:
         """A test function and its error, which needs an image with error bounds, and errors of the coordinates."""
         if isinstance(signal, CodimensionTwo):
-            return here.at.place.cosine - _COSINES[signal], 0.0 if here.shift is None else float(here.shift[-1])
+            shift = here.at.shift
+            return here.at.place.cosine - _COSINES[signal], 0.0 if shift is None else float(shift[-1])
         if signal is Own.DOUBLE:
             return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.at.error))
         if signal is Own.COEFFICIENT:
@@ -200,41 +192,37 @@ class Detector:
 
     def _located(
         self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
-    ) -> list[tuple[float, Spot, SpecialPoint2]]:
-        """Points where a test function vanishes within a step, with their distances along the step."""
+    ) -> tuple[float, Spot, SpecialPoint2] | None:
+        """Point where a test function vanishes within a step, with its distance along the step."""
         curve, start, length = self._curve, parts.step.start, parts.step.size
-        seen: dict[float, tuple[float, float]] = {}
 
-        def test(place: float) -> float:
-            if place not in seen:
-                seen[place] = self._measured(signal, critical(curve.target, parts.at(place).found, start.frame))
-            if np.isnan(seen[place][0]):
-                raise _NoValue("the test function does not exist", field="special")
-            return seen[place][0]
+        @functools.cache
+        def test(place: float) -> tuple[float, float]:
+            return self._measured(signal, critical(curve.target, parts.at(place).found))
 
-        zero = _zero(test, seen, length)
+        zero = _zero(test, length)
         if zero is None:
-            return []
+            return None
         root, beside, unsure = zero
         spot = curve.spot(parts.at(root).found.place, start.frame, start.tangent)
-        here = critical(curve.target, spot.at, spot.frame, spot.shift)
+        here = critical(curve.target, spot)
         value, error = self._measured(signal, here)
         if np.isnan(value):
-            value, error = 0.0, max(error for _, error in seen.values() if not np.isnan(error))
-        if not unsure and abs(value) > _POLE * max(abs(test(0.0)), abs(test(length))):
-            return []
+            value, error = 0.0, max(test(root - beside)[1], test(root + beside)[1])
+        if not unsure and abs(value) > _POLE * max(abs(test(0.0)[0]), abs(test(length)[0])):
+            return None
         kind = self._named(signal, here)
         along = _along(test, parts, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
         bound = off + along + 4.0 * _EPSILON * np.abs(spot.values)
         if kind is None or not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
-            return []
+            return None
         point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
         if signal is Own.COEFFICIENT:
-            slope = abs(test(root + beside) - test(root - beside)) / 2.0
-            there = critical(curve.target, parts.at(root + beside).found, start.frame)
+            slope = abs(test(root + beside)[0] - test(root - beside)[0]) / 2.0
+            there = critical(curve.target, parts.at(root + beside).found)
             point = self._with_next_term(point, here, there, _SAFETY * (abs(value) + error + unsure) / slope)
-        return [(root, spot, point)]
+        return root, spot, point
 
     def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
         """A point with its next coefficient, whose error includes its change over the error of the place."""
@@ -271,7 +259,7 @@ class Detector:
         if sign == target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier
         mode = here.spectrum.right[:, here.others[int(np.abs(nu - sign).argmin())]]
-        if reverses(self._curve.system(here.at.place.values), mode, here.frame.size):
+        if reverses(self._curve.system(here.at.place.values), mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
         if sign < 0:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns == 2 else Kind.PERIOD_DOUBLING)
@@ -287,35 +275,26 @@ def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.
     )
 
 
-def _zero(
-    test: Callable[[float], float], seen: dict[float, tuple[float, float]], length: float
-) -> tuple[float, float, float] | None:
-    """Zero of a test function within a step, distance to the nearest place where it is known, and its largest value
-    there; None without a zero. ``seen``: its values and errors, NaN where undefined."""
+def _zero(test: Test, length: float) -> tuple[float, float, float] | None:
+    """Zero of a test function within a step, distance to places where it is known, and its largest value there if it is
+    undefined at the zero; None without a zero."""
 
     def resolved(place: float) -> float:
-        value = test(place)
-        # An image without bounds has no error.
-        return 0.0 if abs(value) <= seen[place][1] < np.inf else value
+        value, error = test(place)
+        # A coefficient of zero may be undefined; an image without bounds has no error.
+        return 0.0 if np.isnan(value) or abs(value) <= error < np.inf else value
 
-    try:
-        if test(0.0) * test(length) > 0.0:
-            return None
-        root = brentq(resolved, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False)
-        return float(root), _BESIDE * length, 0.0
-    except _NoValue:
-        # A coefficient of zero may be harder to compute than those beside it, which then bracket it.
-        (gap,) = (place for place, (value, _) in seen.items() if np.isnan(value))
-    for share in _NEARER:
-        if 0.0 < gap + share * length < length:
-            with contextlib.suppress(_NoValue):
-                test(gap + share * length)
-    known = {place: value for place, (value, _) in seen.items() if not np.isnan(value)}
-    if not known.keys() >= {0.0, length}:
+    if not test(0.0)[0] * test(length)[0] <= 0.0:
         return None
-    low = max(place for place, value in known.items() if value * known[0.0] > 0.0)
-    high = min(place for place in known if place > low)
-    return 0.5 * (low + high), 0.5 * (high - low), max(abs(known[low]), abs(known[high]))
+    root = float(brentq(resolved, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False))
+    if not np.isnan(test(root)[0]):
+        return root, _BESIDE * length, 0.0
+    for share in _AROUND:
+        low, high = max(root - share * length, 0.0), min(root + share * length, length)
+        before, after = test(low)[0], test(high)[0]
+        if before * after < 0.0:
+            return 0.5 * (low + high), 0.5 * (high - low), max(abs(before), abs(after))
+    return None
 
 
 def across(spot: Spot) -> Array:
@@ -330,12 +309,10 @@ def across(spot: Spot) -> Array:
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))
 
 
-def _along(
-    test: Callable[[float], float], parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float
-) -> Array:
+def _along(test: Test, parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float) -> Array:
     """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
     try:
-        slope = abs(test(root + h) - test(root - h)) / (2.0 * h)
+        slope = abs(test(root + h)[0] - test(root - h)[0]) / (2.0 * h)
         low, middle, high = (parts.at(root + s).found.place.values for s in (-h, 0.0, h))
     except AnalysisError:
         return np.full(2, np.inf)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.frozen import Array
+from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, across, critical
@@ -74,9 +74,8 @@ def switch2(
     """
     box = checked_box(between)
     if not isinstance(point, SpecialPoint2):
-        raise ParameterError(
-            "must be a point of codimension two", field="point", value=point, allowed="one of `curve.special`"
-        )
+        said, allowed = "must be a point of codimension two", "one of the `special` points of a curve from `follow2`"
+        raise ParameterError(said, field="point", value=in_one_line(point), allowed=allowed)
     kind = _CURVES.get(point.kind)
     if kind is None:
         why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, from which no curve can be followed")
@@ -126,8 +125,8 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
     equations.box = box + 2.0 * _FARTHEST * equations.widths[:, None] * [-1.0, 1.0]
     spot = equations.begin(Place(point.orbit, point.values, 0.0))
     detector = Detector(equations, kind, True)
-    here = critical(target, spot.at, spot.frame)
-    beside = [critical(target, equations.along(spot, size), spot.frame) for size in (-_BESIDE, _BESIDE)]
+    here = critical(target, spot)
+    beside = [critical(target, equations.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
     low, high = forms = [detector.form(each) for each in beside]
     if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
         raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
@@ -136,7 +135,7 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
         raise AnalysisError("no coefficient of fifth order was found", field="point")
     if abs(fifth.coefficient) <= fifth.error:
         raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
-    returns = spot.at.image.returns
+    returns = spot.image.returns
     times = returns if target > 0 or returns % 2 == 0 else 2 * returns
     slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)
     return _Unfolding(equations, spot, detector.sampled(here)[1], fifth, slope, _across(spot, target), times)
@@ -145,7 +144,7 @@ def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, b
 def _across(spot: Spot, target: int) -> Array:
     """``response`` of an unfolding, by the shortest way; g changes by -(w . v) times the change of the multiplier."""
     m = spot.frame.basis.shape[1]
-    matrix, overlap = spot.matrix, float(spot.at.left[:, 0] @ spot.at.right[:, 0])
+    matrix, overlap = spot.matrix, float(spot.left[:, 0] @ spot.right[:, 0])
     orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])
     modulus = -target / overlap * (matrix[m, m:] + matrix[m, :m] @ orbit)
     along = modulus / float(modulus @ modulus)
@@ -174,13 +173,8 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         inside = (folds.box[:, 0] <= values) & (values <= folds.box[:, 1])
         if off <= _NEAR and missed <= _NEAR * way and inside.all():
             outward = np.concatenate([place.state - before.state, place.values - before.values])
-            mode, bound, period = (
-                critical(1, found.at, found.frame).mode,
-                float(across(found)[0]),
-                found.at.image.period,
-            )
-            fold = BifurcationPoint(
-                Kind.FOLD, float(values[0]), bound, found.place.state, mode, 1.0 + 0j, 0.0, period=period
-            )
+            value, bound, state = float(values[0]), float(across(found)[0]), found.place.state
+            mode, period = critical(1, found).mode, found.image.period
+            fold = BifurcationPoint(Kind.FOLD, value, bound, state, mode, 1.0 + 0j, 0.0, period=period)
             return Start2(fold, float(values[1]), outward, periods)
     raise AnalysisError("no curve of folds was found where one is predicted to leave", field="point") from cause

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import finite_array
+from chilopod.frozen import in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, Station
@@ -93,7 +94,8 @@ def follow2(
         outward, periods, second = start.outward, start.periods, start.second
         family2, start = over_periods(family2, periods), start.point
     if not isinstance(start, BifurcationPoint):
-        raise ParameterError("must be a located point", field="start", value=start, allowed="a point from `locate`")
+        allowed = "a BifurcationPoint from `locate`, or a start from `switch2`"
+        raise ParameterError("must be a located point", field="start", value=in_one_line(start), allowed=allowed)
     if second is None:
         raise ParameterError("must be given", field="second", allowed="the value of q at the start")
     values = np.array([start.value, finite_array(second, (), "second")], dtype=np.float64)
@@ -109,20 +111,29 @@ def follow2(
 
         def half(sign: float) -> _Half:
             curve.first = spot = first.towards(sign)
-            found = _Half(curve, detector, replace(origin, spot=spot), progress)
+            found = _Half(curve, detector, origin, progress)
             found.ending, found.reason, _ = trace(curve, spot, (step, longest), points, found.look, found.keep)
             return found
 
-        nothing = _Half(curve, detector, origin, progress)
         if outward is not None:
             beside = Place(first.place.state + outward[:-2], first.place.values + outward[-2:], 0.0)
-            along = float(first.frame.between(first.place, beside) @ first.tangent)
-            return replace(_joined(start.kind, origin, nothing, half(math.copysign(1.0, along))), periods=periods)
-        upward = float(np.sign(first.tangent[first.frame.parameters][1]) or 1.0)
-        ahead = half(-upward if rising is False else upward)
-        if ahead.ending is Ending.CLOSED:
-            return _joined(start.kind, origin, replace(nothing, ending=Ending.CLOSED), ahead)
-        return _joined(start.kind, origin, half(-upward) if rising is None else nothing, ahead)
+            ahead = float(first.frame.between(first.place, beside) @ first.tangent)
+        else:
+            ahead = float(first.tangent[first.frame.parameters][1]) * (-1.0 if rising is False else 1.0)
+        after = half(math.copysign(1.0, ahead))
+        before = _Half(curve, detector, origin, progress)
+        if after.ending is Ending.CLOSED:
+            before.ending = Ending.CLOSED
+        elif outward is None and rising is None:
+            before = half(math.copysign(1.0, -ahead))
+    return Curve2(
+        start.kind,
+        (*reversed(before.points), origin.point, *after.points),
+        (*reversed(before.special), *after.special),
+        (before.ending, after.ending),
+        (before.reason, after.reason),
+        periods,
+    )
 
 
 def over_periods(family2: Family2, periods: int) -> Family2:
@@ -135,8 +146,11 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     system = system_of(family2, start.value, second)
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
-    if start.kind is Kind.KREIN_COLLISION:
-        raise ParameterError("is a Krein collision, which is not followed", field="start", value=start.value)
+    if start.kind in (Kind.KREIN_COLLISION, Kind.HOPF):
+        said = f"is of the kind {start.kind.label}, which is not followed"
+        raise ParameterError(
+            said, field="start", value=start.value, allowed="a point on a periodic orbit, of another kind"
+        )
     known = knows_orbit(system) and start.kind is not Kind.FOLD
     if start.kind is Kind.NEIMARK_SACKER:
         return 0, known
@@ -185,13 +199,3 @@ class _Half:
             self.points.append(station.point)
             self.last = station
             self.progress(count, station.point)
-
-
-def _joined(kind: Kind, origin: Station, before: _Half, after: _Half) -> Curve2:
-    return Curve2(
-        kind,
-        (*reversed(before.points), origin.point, *after.points),
-        (*reversed(before.special), *after.special),
-        (before.ending, after.ending),
-        (before.reason, after.reason),
-    )

@@ -150,15 +150,6 @@ class FlowsTangents(SystemLike, Protocol):
 
 
 @runtime_checkable
-class FlowsEach(Protocol):
-    """Systems that carry each state by another system, for derivatives by a parameter at almost no cost."""
-
-    def flow_each(self, systems: Sequence[Self], states: Array, t0: float, t1: float, /) -> Array:
-        """States at t1, each carried by the system in its place, shape (systems, n) as at t0, without derivatives."""
-        ...
-
-
-@runtime_checkable
 class FlowsMany(KnowsOrbit, Protocol):
     """Systems that compute derivatives along the known orbits of many systems of their class together, for sweeps."""
 

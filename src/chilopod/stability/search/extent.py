@@ -9,13 +9,14 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.stability.branches.fold import Fold, find_fold
 from chilopod.stability.crossing_points.place import Sample
+from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import SystemLike
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.samples import FIRST_STEPS, NEAR_FOLD, Samples
 
 _BEFORE = 1e-6  # distance from a fold at which the search for crossings ends, relative to the interval
 _TRIES = 2  # starts of curves round a fold
-_SYSTEMS = 2  # made on each, for every orbit of the budget
+_FLOWS = 2  # flows of each, for every orbit of the budget
 _CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
 _COMES, _FARTHER = 1e-5, 100.0  # distance from a fold, relative to the interval, and factor of a second one
 _MERGING = 1e-4  # distance from a meeting of orbits, relative to the interval, at which multipliers are uncertain
@@ -81,8 +82,8 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
     off = np.array([each.off_plus_one for each in [sample, *others]])
     clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
     for each in [[sample, *others][i] for i in clear[:_TRIES]]:
-        systems = _SYSTEMS * samples.orbits
-        fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising, systems=systems)
+        budget = Budget(_FLOWS * samples.orbits, samples.budget.remaining)
+        fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising, budget)
         # Close to it a step may land on another curve with another fold.
         if (
             fold is not None
