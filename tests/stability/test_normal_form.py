@@ -180,10 +180,7 @@ def test_strong_resonances_claim_no_verdict(k):
     )
     assert (form.status, form.resonance) == (NormalFormStatus.STRONG_RESONANCE, k)
     assert criticality(form) is Criticality.NOT_COMPUTED
-    assert abs(form.resonant - d * np.sqrt(2) ** (k - 2)) <= form.resonant_error < 1e-6
-    assert abs(form.cubic - 2 * c.real) <= form.cubic_error < 1e-6
-    if k == 4:
-        assert form.ratio == pytest.approx(-1j * nu * c / abs(d), rel=1e-6)
+    assert np.isnan(form.cubic)
 
 
 @pytest.mark.parametrize(("k", "sign"), [(1, 1.0), (2, -1.0)])

@@ -22,7 +22,6 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array
-from chilopod.stability.branches.fold import Fold
 from chilopod.stability.crossing_points.place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
@@ -30,6 +29,7 @@ from chilopod.stability.problem.arguments import check_arguments, checked_interv
 from chilopod.stability.problem.budget import SpentError, UserCode
 from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.problem.system import PeriodicSystem
+from chilopod.stability.search.extent import Fold
 from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block

@@ -12,7 +12,7 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 _UNCERTAIN = 1e-6  # singular value that counts as zero: the error of a difference
 
 
-def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
+def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None) -> Array | None:
     """Projection onto the states with the spatial symmetries of an orbit, and of the ``mode`` of a leaving branch if
     given, in units of the states' ``sizes``, shape (n, n); None without symmetries.
 

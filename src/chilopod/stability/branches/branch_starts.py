@@ -108,10 +108,10 @@ def begin(
         Value of the parameter.
     orbit
         State on the orbit or near it, shape (n,), which is corrected. Not needed if the system knows its orbit.
-        rising
+    rising
         True to start towards rising parameters.
-        periods, symmetric
-        Arguments of :func:`chilopod.stability.follow`.
+    periods, symmetric
+        Number of the systems' periods in one period of the orbit, and True for one with the systems' symmetry in time.
     seconds
         Time, s, after which the search for the orbit ends.
 
@@ -184,9 +184,6 @@ def switch(
     ParameterError
         If no branch that can be followed leaves the point, or it is not a special point.
     """
-    if seconds != math.inf:
-        with Deadline(seconds):
-            return switch(family, point, periods=periods)
     check_arguments(family=family, **({} if periods is None else {"periods": periods}))
     old, known = None, None
     if isinstance(point, BranchPoint):
@@ -200,11 +197,12 @@ def switch(
     if kind in _LEFT_BY_NONE:
         raise ParameterError(_LEFT_BY_NONE[kind], field="point", value=point.value)
     if kind is Kind.HOPF:
-        value, cycle, outward = hopf_cycle(family, point)
+        with Deadline(seconds):
+            value, cycle, outward = hopf_cycle(family, point)
         return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
     modes = point.mode.real[None] if point.modes is None else point.modes.real.T
     period = None
-    with UserCode("family", point.value):
+    with Deadline(seconds), UserCode("family", point.value):
         system = system_of(family, point.value)
         own = np.nan if system.period is None else point.period / system.period
         known = known or (max(1, round(own)) if np.isfinite(own) else 1)
@@ -306,11 +304,9 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
         If the direction of the branch is not unique there.
     """
     section = curve.section_at(start.orbit, start.value, start.period)
-    image = curve.image(start.orbit, start.value, section, with_error=True)
-    derivative = curve.by_parameter(start.orbit, start.value, section)
-    n = start.orbit.size
-    units = curve.units(n)
-    matrix = curve.matrix(image.jacobian, derivative, np.zeros(n + 1))[:-1]
+    units = curve.units(start.orbit.size)
+    image, matrix = curve.matrix_at(start.orbit, start.value, section, np.zeros(units.size), True)
+    matrix = matrix[:-1]
     if not np.isfinite(matrix).all():
         said = "the flow is not finite at neighbouring values of the parameter"
         raise AnalysisError(said, field="start", allowed="another value")
@@ -325,16 +321,14 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     else:
         tangent = np.append(start.mode / units[:-1], 0.0)
         tangent /= np.linalg.norm(tangent)
-    known = image if start.mode is not None else bounded(curve.system(start.value), start.orbit, image).image
+    leaving = start.mode is not None
+    known = image if leaving else bounded(curve.system(start.value), start.orbit, image).image
     values, bound = curve.multipliers(known)
     special = start.bifurcation.kind if start.bifurcation is not None else None
     point = BranchPoint(
         start.value, start.orbit, values, tangent, special, units, image.period, bound, start.bifurcation, curve.periods
     )
-    leaving = start.mode is not None
-    if not leaving:
-        return curve.anchored(point, np.vstack([matrix, tangent]), section)
-    return curve.anchor(point, ahead=ahead, leaving=True)
+    return curve.anchor(point, ahead=ahead if leaving else 0.0, leaving=leaving)
 
 
 def _along(matrix: Array, rising: bool) -> Array:

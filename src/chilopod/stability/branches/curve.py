@@ -60,6 +60,19 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             scaled = jacobian * sizes / sizes[:, None] - np.eye(len(jacobian))
         return np.block([[scaled, (derivative / sizes)[:, None]], [tangent[None]]])
 
+    def matrix_at(
+        self,
+        x: Array,
+        value: float,
+        section: Section | None,
+        row: Array,
+        with_error: bool = False,
+        mapped: Array | None = None,
+    ) -> tuple[ReturnMap, Array]:
+        """The return map at a state, and :meth:`matrix` there with its last row; from H there if it is known."""
+        image = self.image(x, value, section, with_error)
+        return image, self.matrix(image.jacobian, self.by_parameter(x, value, section, mapped), row)
+
     def moved(self, start: BranchPoint, x: Array, value: float) -> Array:
         """Displacement of an orbit from a point, in units, shape (n+1,)."""
         return np.append(x - start.orbit, value - start.value) / self.units(x.size)
@@ -74,11 +87,14 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     ) -> Anchor:
         """The anchor of a point, with its matrix computed ``ahead`` by a distance along the tangent."""
         section = self.section_at(last.orbit, last.value, last.period)
-        matrix = self._matrix_at(last, ahead, section)
+        x = last.orbit + ahead * last.tangent[:-1] * self.units(last.orbit.size)[:-1]
+        # With errors, to be equal to the end of a step, to the bit.
+        matrix = self.matrix_at(x, last.value, section, last.tangent, True)[1]
         # The matrix of a branch point was computed ahead, so it gives no prediction.
         if before is None or before.special is not None:
             return self.anchored(last, matrix, section, leaving=leaving)
-        return self.anchored(last, matrix, section, before, read_only(self._matrix_at(before, 0.0, section)))
+        matrix_before = self.matrix_at(before.orbit, before.value, section, before.tangent, True)[1]
+        return self.anchored(last, matrix, section, before, read_only(matrix_before))
 
     def anchored(
         self,
@@ -140,9 +156,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """The matrix at an orbit near a branch point."""
         if not anchor.leaving:
             return None
-        jacobian = self.image(found.x, found.value, anchor.section).jacobian
-        derivative = self.by_parameter(found.x, found.value, anchor.section, found.mapped)
-        return within_space(anchor.space, self.matrix(jacobian, derivative, row))
+        matrix = self.matrix_at(found.x, found.value, anchor.section, row, mapped=found.mapped)[1]
+        return within_space(anchor.space, matrix)
 
     def step(self, anchor: Anchor, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Anchor, OnCurve]:
         """The orbit near a guess, by multiple shooting where a return magnifies errors of the guess, or rounding, above
@@ -153,7 +168,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         count = node_count(guess.matrix[:n, :n] + np.eye(n), np.ones(n)) if space is None else 0
         off, weakest, corrections = self.precision, 0.0, 0
         if count >= _MANY_NODES:
-            moved, x, value, image, derivative = self._shot(anchor, timed, plane, count)
+            moved, x, value, image, matrix = self._shot(anchor, timed, plane, count)
             if bounded:
                 with contextlib.suppress(AnalysisError):  # the flow may magnify too much over the whole return
                     image = replace(image, error=self.image(x, value, timed.section, with_error=True).error)
@@ -163,9 +178,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             # The residual shows one direction.
             off = _CLEAR * float(np.linalg.norm(solved.inverse @ solved.residual))
             weakest = float(np.linalg.norm(solved.inverse, 2))
-            image = self.image(x, value, timed.section, bounded)
-            derivative = self.by_parameter(x, value, timed.section, mapped)
-        matrix = self.matrix(image.jacobian, derivative, last.tangent)
+            image, matrix = self.matrix_at(x, value, timed.section, last.tangent, bounded, mapped)
         tangent = null_vector(within_space(space, matrix))
         if not tangent @ last.tangent >= SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
@@ -195,8 +208,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _shot(
         self, anchor: Anchor, timed: Anchor, plane: Plane, count: int
     ) -> tuple[Array, Array, float, ReturnMap, Array]:
-        """Displacement in units, state, parameter, return map and its derivative by the parameter, per scale, by
-        multiple shooting from an anchor."""
+        """Displacement in units, state, parameter, return map and :meth:`matrix`, by multiple shooting from an
+        anchor."""
         last, section = anchor.last, timed.section
         system, units = self.system(last.value), self.units(last.orbit.size)
         duration = return_duration(system) if anchor.section is None else anchor.section.duration
@@ -214,7 +227,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             across -= np.outer(velocity, section.normal) / float(section.normal @ velocity)
         normal = None if section is None else section.normal
         image = ReturnMap(x, across @ found.jacobian, np.nan, count, count * found.nodes.duration, velocity, normal)
-        return (np.append(x, value) - start) / units, x, value, image, across @ found.by_value * self.scale
+        matrix = self.matrix(image.jacobian, across @ found.by_value * self.scale, last.tangent)
+        return (np.append(x, value) - start) / units, x, value, image, matrix
 
     def _inside(self, value: float) -> float:
         """A value of the parameter inside the interval; one within rounding of an end becomes that end."""
@@ -346,10 +360,3 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             return anchor
         longer = 1.0 + min(max(anchor.lengthening * ahead, -_SOONER), _LATER)
         return replace(anchor, section=replace(anchor.section, duration=anchor.section.duration * longer))
-
-    def _matrix_at(self, last: BranchPoint, ahead: float, section: Section | None) -> Array:
-        x = last.orbit + ahead * last.tangent[:-1] * self.units(last.orbit.size)[:-1]
-        # Equal to the end of a step, to the bit.
-        jacobian = self.image(x, last.value, section, with_error=True).jacobian
-        derivative = self.by_parameter(x, last.value, section)
-        return self.matrix(jacobian, derivative, last.tangent)

@@ -28,7 +28,6 @@ from chilopod.stability.problem.budget import Budget, SpentError
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
 _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
 _HALVINGS = 12  # halvings of the amplitude
-_BEFORE = 0.9  # fraction of an amplitude from which the direction outward is taken
 _NEAR = 0.25  # largest error of a predicted fold, relative to the amplitude and its distance from the point
 
 _CURVES = {
@@ -158,8 +157,8 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
     for k in range(_HALVINGS):
         amplitude = there.fifth.amplitude * 0.5**k
         try:
-            place, before = (there.fold(share * sign * amplitude) for share in (1.0, _BEFORE))
-            if place is None or before is None:
+            place = there.fold(sign * amplitude)
+            if place is None:
                 continue
             found = folds.begin(place)
         except SpentError:
@@ -167,12 +166,12 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         except (ChilopodError, ArithmeticError, ValueError) as error:
             cause = error
             continue
-        values, origin = found.place.values, there.spot.place.values
+        values, origin = found.values, there.spot.place
         off = abs(float(left @ (found.place.state - place.state))) / amplitude
-        missed, way = (float(np.linalg.norm((values - one) / widths)) for one in (place.values, origin))
+        missed, way = (float(np.linalg.norm((values - one) / widths)) for one in (place.values, origin.values))
         inside = (folds.box[:, 0] <= values) & (values <= folds.box[:, 1])
         if off <= _NEAR and missed <= _NEAR * way and inside.all():
-            outward = np.concatenate([place.state - before.state, place.values - before.values])
+            outward = np.concatenate([place.state - origin.state, place.values - origin.values])
             value, bound, state = float(values[0]), float(across(found)[0]), found.place.state
             mode, period = critical(1, found).mode, found.image.period
             fold = BifurcationPoint(Kind.FOLD, value, bound, state, mode, 1.0 + 0j, 0.0, period=period)

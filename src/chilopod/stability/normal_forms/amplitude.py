@@ -6,8 +6,6 @@ terms, bends the sampled curve along the centre manifold, and continues while th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from chilopod.labels import Labelled
@@ -18,6 +16,7 @@ from chilopod.stability.normal_forms.center_manifold import (
     Powers,
     ReturnedStates,
     Sampled,
+    Term,
     displacements,
     images,
     turns,
@@ -50,21 +49,15 @@ class NormalFormStatus(Labelled):
     SEVERAL_CRITICAL = "several critical", "another multiplier is on the unit circle as well"
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Terms of one return on the centre manifold."""
-
-    status: NormalFormStatus  # FOUND or LINEAR
-    sampled: Sampled  # map at the best amplitude
-    cubic: complex  # coefficient of the resonant cubic term
-    cubic_error: float
+Fit = tuple[NormalFormStatus, Sampled, Term]
+"""Status, FOUND or LINEAR, the map at the best amplitude, and the resonant cubic term of one return."""
 
 
-def fitted(mapped: ReturnedStates, at: CriticalOrbit, resonance: int | None, radius: float) -> Fit | None:
+def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | None:
     """The terms at the amplitude, and with the bend of the curve, of the most accurate cubic coefficient, from a given
     first amplitude; None if none is suitable."""
     third: Powers = (3, 0) if at.real else (2, 1)
-    manifold = Manifold(mapped, at, 3, resonance)
+    manifold = Manifold(mapped, at, 3)
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
     best = None
     best_error, status = np.inf, NormalFormStatus.LINEAR
@@ -111,7 +104,7 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, resonance: int | None, rad
     if best is None or (status is NormalFormStatus.LINEAR and np.isfinite(high)):
         return None
     found, manifold.curve = best
-    return Fit(status, found, *manifold.coefficient(found, third))
+    return status, found, manifold.coefficient(found, third)
 
 
 def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, high: float) -> float:

@@ -29,6 +29,9 @@ Powers = tuple[int, int]
 Curve = Mapping[Powers, ComplexArray]
 """Coefficient of every monomial, shape (n,); of two conjugate ones only the one with i >= j."""
 
+Term = tuple[complex, float]
+"""A coefficient and its error."""
+
 _ANGLES = 8
 _HIGHEST = 5.0  # highest power of a radius that must not overflow
 _DRAWS = 3  # randomly disturbed curves
@@ -76,7 +79,7 @@ class Sampled:
         value, error = self.harmonics[(i - j) % len(self.harmonics)].taylor(order, self.noise)
         return value / self.radius**order, error / self.radius**order
 
-    def term(self, powers: Powers) -> tuple[complex, float]:
+    def term(self, powers: Powers) -> Term:
         """Coefficient of a monomial in the projection of H(W(z)), and its error."""
         value, error = self.taylor(powers)
         return complex(value[-1]), float(error[-1])
@@ -117,15 +120,15 @@ def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
 def solve_homological(
     at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
 ) -> ComplexArray:
-    """Solution w of (nu^i conj(nu)^j - A) w = r, both of shape (n,). It has no part along the critical direction if the
-    factor is critical (``resonant``: nu, or its conjugate at the resonance 1:3)."""
+    """Solution w of (nu^i conj(nu)^j - A) w = r, both of shape (n,), without a part along the critical direction if the
+    factor is nu (``resonant``)."""
     i, j = powers
     n = at.state.size
     factor = at.multiplier**i * at.multiplier.conjugate() ** j
     matrix = factor * np.eye(n) - at.jacobian
     if not resonant:
         return np.asarray(np.linalg.solve(matrix, right_side), dtype=np.complex128)
-    q, p = (at.right, at.left) if abs(factor - at.multiplier) < 0.5 else (at.right.conj(), at.left.conj())
+    q, p = at.right, at.left
     bordered = np.block([[matrix, q[:, None]], [p.conj()[None], np.zeros((1, 1))]])
     padded = np.append(right_side - q * (p.conj() @ right_side), 0.0)
     return np.asarray(np.linalg.solve(bordered, padded)[:n], dtype=np.complex128)
@@ -138,13 +141,13 @@ class Manifold:
     monomials (Kuznetsov, sections 9.3 and 9.4; Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007).
     """
 
-    def __init__(self, mapped: ReturnedStates, at: CriticalOrbit, order: int, resonance: int | None = None) -> None:
+    def __init__(self, mapped: ReturnedStates, at: CriticalOrbit, order: int) -> None:
         self._mapped, self._at, self._order = mapped, at, order
         if at.real:
             nu = at.multiplier.real
             self._resonant = {(k, 0): nu**k == nu for k in range(2, order)}
         else:
-            self._resonant = {(2, 0): resonance == 3, (1, 1): False}
+            self._resonant = {(2, 0): False, (1, 1): False}
             if order == 5:  # z^4 does not reach z^3 conj(z)^2
                 self._resonant |= {(3, 0): False, (2, 1): True, (3, 1): False, (2, 2): False}
         nothing = np.zeros(at.state.size, dtype=np.complex128)
@@ -187,7 +190,7 @@ class Manifold:
                 self.curve[powers] = self.curve[powers] + solve_homological(self._at, powers, excess, resonant)
         return bent
 
-    def coefficient(self, found: Sampled, powers: Powers) -> tuple[complex, float]:
+    def coefficient(self, found: Sampled, powers: Powers) -> Term:
         """Coefficient of a resonant monomial of odd order, and a bound on its error, which includes the difference of
         the sampled curve from the centre manifold: curves disturbed as much, with random signs, are sampled as
         well."""
@@ -224,9 +227,7 @@ class Manifold:
         inner = np.zeros((self._order, self._order), dtype=np.complex128)
         inner[1, 0] = self._at.multiplier
         for powers in (each for each, resonant in self._resonant.items() if resonant):
-            # At 1:3 z^2 is resonant in conj(g), and so conj(z)^2 in g.
-            own = powers if self._at.real or powers == (2, 1) else (0, 2)
-            inner[own] = found.term(own)[0]
+            inner[powers] = found.term(powers)[0]
         outer = np.zeros((self._order, self._order, self._at.state.size), dtype=np.complex128)
         for (i, j), coefficient in self.curve.items():
             outer += _monomial(inner, i, j)[..., None] * coefficient

@@ -8,7 +8,7 @@ series determine the amplitude at which it is sampled, so any units give the sam
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fitted
-from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, images
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, Term, images
 from chilopod.stability.spectrum.eigenvalues import eigensystem
 
 _START = 0.2  # first amplitude of the search, relative to the scale of the states
@@ -38,8 +38,7 @@ class NormalForm:
     Attributes
     ----------
     status
-        Status of the numbers. If it is neither FOUND nor LINEAR they are NaN with infinite errors, except at the
-        resonances 1:3 and 1:4, where they decide nothing alone.
+        Status of the numbers. If it is neither FOUND nor LINEAR they are NaN with infinite errors.
     quadratic, cubic
         Coefficients. A negative ``cubic`` bounds the growth: supercritical.
     rotation
@@ -50,10 +49,6 @@ class NormalForm:
         Largest amplitude at which the map was sampled for these numbers.
     resonance
         Number k, 1 to 4, if the pair is exp(+-2 pi i / k) within its uncertainty; else None.
-    resonant, resonant_error
-        Coefficient of conj(a)^2 (1:3) or conj(a)^3 (1:4) of one return; it turns with the phase of the mode.
-    ratio
-        At 1:4: A = -i C / |D| of Kuznetsov, section 9.5.3, with C and D the coefficients of a |a|^2 and conj(a)^3.
     """
 
     status: NormalFormStatus
@@ -65,9 +60,6 @@ class NormalForm:
     rotation_error: float = 0.0
     amplitude: float = np.nan
     resonance: int | None = None
-    resonant: complex | None = None
-    resonant_error: float | None = None
-    ratio: complex | None = None
 
 
 def normal_form(
@@ -75,7 +67,7 @@ def normal_form(
     at: CriticalOrbit,
     *,
     uncertainty: float = 0.0,  # relative error of the derivative of the map
-    scale: ArrayLike | None = None,  # sizes of the states, shape (n,), where the search for an amplitude starts
+    scale: ArrayLike = 1.0,  # sizes of the states, shape (n,), where the search for an amplitude starts
     orbit_error: float | None = None,  # error of the orbit along the mode; by default from its residual
 ) -> NormalForm:
     """Normal form on the centre manifold of a critical orbit of a map of several states, shape (k, n)."""
@@ -84,25 +76,21 @@ def normal_form(
     others = np.delete(np.arange(values.size), own)
     if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
         return NormalForm(NormalFormStatus.SEVERAL_CRITICAL)
-    resonance = None
-    if not at.real:  # where the terms z^(k-1) of the conjugate are resonant as well: Kuznetsov, sections 9.5.1 to 9.5.4
-        upper = complex(at.multiplier.real, abs(at.multiplier.imag))
-        near = (k for k in (1, 2, 3, 4) if abs(upper - np.exp(2j * np.pi / k)) <= errors[own[0]])
-        resonance = next(near, None)
-    if resonance in (1, 2):
-        return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=resonance)
+    # Where the terms z^(k-1) of the conjugate are resonant as well (Kuznetsov, sections 9.5.1 to 9.5.4).
+    upper = complex(at.multiplier.real, abs(at.multiplier.imag))
+    for k in () if at.real else (1, 2, 3, 4):
+        if abs(upper - np.exp(2j * np.pi / k)) <= errors[own[0]]:
+            return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=k)
     # An overflow far out is a valid result.
     with np.errstate(all="ignore"):
-        fit = fitted(mapped, at, resonance, _start(at, scale))
+        fit = fitted(mapped, at, _START * float(np.nanmin(np.abs(scale) / np.abs(at.right))))
     if fit is None:
-        return NormalForm(NormalFormStatus.OUT_OF_REACH, resonance=resonance)
+        return NormalForm(NormalFormStatus.OUT_OF_REACH)
     if at.real:
         return _of_full_period(fit, mapped, at, orbit_error)
-    cubic = at.returns * np.conj(at.multiplier) * fit.cubic
-    error = at.returns * fit.cubic_error
-    real, turning, radius = float(cubic.real), float(cubic.imag), fit.sampled.radius
-    form = NormalForm(fit.status, 0.0, 0.0, real, error, turning, error, radius, resonance=resonance)
-    return form if resonance is None else _with_resonant_terms(form, fit, at, resonance)
+    status, sampled, (cubic, error) = fit
+    cubic, error = at.returns * np.conj(at.multiplier) * cubic, at.returns * error
+    return NormalForm(status, 0.0, 0.0, float(cubic.real), error, float(cubic.imag), error, sampled.radius)
 
 
 def _uncertainties(jacobian: Array, relative: float) -> tuple[ComplexArray, Array]:
@@ -114,17 +102,6 @@ def _uncertainties(jacobian: Array, relative: float) -> tuple[ComplexArray, Arra
     error = relative * np.linalg.norm(balanced)
     # To first order the condition gives each error, but even for a defective pair it is at most the square root.
     return values, np.minimum(error * np.linalg.norm(left, axis=0), np.sqrt(error))
-
-
-def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
-    """First amplitude of the search; the result does not depend on it."""
-    mode = np.abs(at.right)
-    if scale is not None:
-        known = mode > 0.0
-        return _START * float((np.abs(np.asarray(scale, dtype=np.float64))[known] / mode[known]).min())
-    orbit = float(np.abs(at.state).max())
-    # An orbit at the origin gives no scale: the search may then take many steps up or down.
-    return orbit / float(mode.max()) if orbit > 0.0 else _START
 
 
 def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic: float) -> float:
@@ -145,9 +122,9 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic
 
 def _of_full_period(fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, orbit_error: float | None) -> NormalForm:
     """Coefficients of the map with multiplier +1 from those of one return at a real multiplier."""
-    quadratic, quadratic_error = fit.sampled.term((2, 0))
-    cubic, cubic_error = fit.cubic.real, fit.cubic_error
-    fourth, fourth_error = fit.sampled.term((4, 0))
+    status, sampled, (third, cubic_error) = fit
+    cubic, (quadratic, quadratic_error) = third.real, sampled.term((2, 0))
+    fourth, fourth_error = sampled.term((4, 0))
     off = orbit_error
     if off is None:
         off = _loose_by(mapped, at, abs(quadratic), abs(cubic) + cubic_error)
@@ -158,30 +135,17 @@ def _of_full_period(fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, orbit_e
     if at.multiplier.real < 0.0:
         # a -> -a + c a^3 twice: a -> a - 2 c a^3.
         times = k if k % 2 == 0 else 2 * k
-        return NormalForm(fit.status, 0.0, 0.0, -times * cubic, times * cubic_error, amplitude=fit.sampled.radius)
+        return NormalForm(status, 0.0, 0.0, -times * cubic, times * cubic_error, amplitude=sampled.radius)
     cubic = k * cubic + k * (k - 1) * quadratic.real**2
     cubic_error = k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error
     quadratic_value, quadratic_error = k * quadratic.real, k * quadratic_error
-    return NormalForm(fit.status, quadratic_value, quadratic_error, cubic, cubic_error, amplitude=fit.sampled.radius)
-
-
-def _with_resonant_terms(form: NormalForm, fit: Fit, at: CriticalOrbit, resonance: int) -> NormalForm:
-    """The terms conj(a)^2 and conj(a)^3 of one return."""
-    resonant, error = fit.sampled.term((0, resonance - 1))
-    ratio = None
-    if resonance == 4 and abs(resonant) > error:
-        ratio = complex(-1j * fit.cubic / abs(resonant))
-    form = replace(form, status=NormalFormStatus.STRONG_RESONANCE, ratio=ratio)
-    return replace(form, resonant=complex(resonant), resonant_error=float(error))
+    return NormalForm(status, quadratic_value, quadratic_error, cubic, cubic_error, amplitude=sampled.radius)
 
 
 _BENDS = 4  # one for every order of the manifold, and one more
 _STEP = 1.5  # ratio of successive amplitudes
 _TRIES = 8  # largest number of amplitudes each way
 _WORSE = 2  # amplitudes tried beyond the best one
-
-Term = tuple[complex, float]
-"""A coefficient and its error."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array
-from chilopod.stability.branches.fold import Fold
 from chilopod.stability.crossing_points.description import Formed, described
 from chilopod.stability.crossing_points.place import Course, past_singular, place_error
 from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
@@ -24,6 +23,7 @@ from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap, returned_states
 from chilopod.stability.problem.scales import sizes
+from chilopod.stability.search.extent import Fold
 from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.shown import bounded as bounded_text

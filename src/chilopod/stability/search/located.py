@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, overload
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.branches.fold import Fold
 from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.problem.budget import UserCode
-from chilopod.stability.search.extent import extent
+from chilopod.stability.search.extent import Fold, extent
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.symmetry.isotypic import Block

@@ -77,24 +77,14 @@ def finite_group(generators: ArrayLike) -> Group:
     for matrix, (_, residual) in zip(given, returns, strict=True):
         if np.abs(_scaled(residual, scales)).max() > _SAME:
             raise _infinite(matrix, most)
-    found = _factors(_scaled(given, scales), most)
+    found = _closure(given, scales, most)
     if found is None:
         raise ParameterError(
             "generate an infinite group, or too large a one",
             field="generators",
             allowed=f"{most} elements or fewer in dimension {n}",
         )
-    by, of = found
-    elements = np.empty((len(by), n, n))
-    elements[0] = np.eye(n)
-    for i in range(1, len(by)):
-        elements[i] = given[by[i]] @ elements[of[i]]
-    return _with_metric(given[_needed(by)], elements, scales)
-
-
-def _needed(by: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Indices of generators that suffice for a group; one for the identity alone."""
-    return np.unique(by[1:]) if len(by) > 1 else by
+    return _with_metric(*found, scales)
 
 
 def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
@@ -206,11 +196,11 @@ def _scaled(matrices: Array, scales: Array) -> Array:
 
 
 def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
-    chosen = np.flatnonzero(members)
-    found = _factors(_scaled(group.elements[chosen], group.scales), len(chosen))
+    elements = group.elements[members]
+    found = _closure(elements, group.scales, len(elements))
     if found is None:
         raise AnalysisError("is invariant under elements that do not form a group: its error is too large", field=field)
-    return _with_metric(group.elements[chosen[_needed(found[0])]], group.elements[chosen], group.scales)
+    return _with_metric(found[0], elements, group.scales)
 
 
 def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
@@ -266,26 +256,24 @@ class Images:
         return math.floor(float(np.vdot(self._weights, image)) / _CELL)
 
 
-def _factors(generators: Array, largest: int) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-    """Numbers of a generator, with entries of order one, and of an earlier element whose product is each element, shape
-    (order,) both, undefined for the identity, which comes first; None for more than ``largest`` elements."""
-    images, by, of = Images(generators.shape[1]), [0], [0]
+def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Array] | None:
+    """Generators that suffice for a group, one at least, and all products, the identity first, shape (order, n, n);
+    None for more than ``largest``."""
+    n, needed = len(scales), generators[:0]
+    images, elements = Images(n), [np.eye(n)]
     images.add(images.probes)
-    needed: list[int] = []
-    for new, image in enumerate(generators @ images.probes):
-        if images.number(image) is not None:
+    for generator in generators:
+        if images.number(_scaled(generator, scales) @ images.probes) is not None:
             continue
-        needed.append(new)  # and the order at least doubles
-        images, by, of = Images(generators.shape[1]), [0], [0]
+        needed = np.concatenate([needed, generator[None]])  # and the order at least doubles
+        images, elements = Images(n), [np.eye(n)]
         images.add(images.probes)
-        done = 0
-        while done < len(images.all):
-            for number, product in zip(needed, generators[needed] @ images.all[done], strict=True):
-                if images.number(product) is None:
-                    if len(images.all) == largest:
+        for element in elements:  # which grow meanwhile
+            for product in needed @ element:
+                image = _scaled(product, scales) @ images.probes
+                if images.number(image) is None:
+                    if len(elements) == largest:
                         return None
-                    images.add(product)
-                    by.append(number)
-                    of.append(done)
-            done += 1
-    return np.array(by), np.array(of)
+                    images.add(image)
+                    elements.append(product)
+    return needed if len(needed) else generators[:1], np.array(elements)
