@@ -17,11 +17,14 @@ from chilopod.stability import (
     exponents,
     find_orbit,
     follow,
+    from_map,
     from_rhs,
     locate,
     multipliers,
+    sweep,
 )
 from chilopod.stability.problem.budget import SpentError
+from chilopod.stability.search.extent import find_fold
 from chilopod.stability.unit_circle.crossings import SearchStatus
 from helpers.systems import duffing, linear, lorenz
 
@@ -261,9 +264,23 @@ def test_time_limits_reach_flows_of_the_user_and_settling():
         time.sleep(0.01)
         return x + 1.0 + np.sin(37.0 * x), np.eye(1)
 
-    system = PeriodicSystem(1, 1.0, flow, scale=[1.0])
-    for search in (multipliers, exponents, find_orbit):
+    system, known = (PeriodicSystem(1, 1.0, flow, scale=[1.0], orbit=orbit) for orbit in (None, [0.5]))
+    for search in (multipliers, exponents, find_orbit, lambda _, orbit, seconds: sweep([known] * 3, seconds=seconds)):
         asked.clear()
         with pytest.raises(SpentError, match="the time limit is reached"):
             search(system, [0.5], seconds=0.05)
         assert len(asked) < 20
+
+
+def test_a_search_for_a_fold_ends_with_its_budget():
+    """x' = p - x^2 as a map: the fold is at 0."""
+
+    def family(p):
+        return from_map(lambda x: (x + p - x**2, np.array([[1.0 - 2.0 * x[0]]])), 1)
+
+    budget = Budget(1000)
+    assert find_fold(family, 0.04, np.array([0.2]), 1.0, False, budget).value == pytest.approx(0.0, abs=1e-9)
+    assert 0 < budget.left < 1000
+    spent = Budget(20)
+    assert find_fold(family, 0.04, np.array([0.2]), 1.0, False, spent) is None
+    assert spent.left == 0

@@ -346,7 +346,7 @@ def test_no_lines_are_looked_for_at_a_pair():
 
 
 def test_period_doubling_has_no_quadratic_terms_and_keeps_shifts_by_the_old_period():
-    assert crossing(np.eye(1)[None], Event.MINUS).kind is SymmetricKind.PERIOD_DOUBLING
+    assert crossing(np.eye(1)[None], Event.MINUS).kind is SymmetricKind.SYMMETRY_KEPT
     found = crossing(dihedral(3), Event.MINUS)
     assert found.kind is SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
     assert found.quadratic == 0

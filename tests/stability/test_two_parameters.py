@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, follow2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, SpecialPoint2, follow2, switch2
 from chilopod.stability.codimension_two import detection
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from helpers.systems import doubling, of_map
@@ -154,10 +154,18 @@ def test_what_two_parameters_would_unfold_is_refused():
         follow2(family2, start, BOX, second=0.0)
 
 
-def test_a_krein_collision_is_named():
-    point, _ = start_at(0.4, Kind.KREIN_COLLISION)
-    with pytest.raises(ParameterError, match="Krein collision, which is not followed"):
+@pytest.mark.parametrize("kind", [Kind.KREIN_COLLISION, Kind.HOPF])
+def test_a_point_of_a_wrong_kind_is_named(kind):
+    point, _ = start_at(0.4, kind)
+    with pytest.raises(ParameterError, match=f"{kind.label}, which is not followed; allowed: .* of another kind"):
         follow2(circle(), point, BOX, second=SECOND)
+    one = np.ones(1, complex)
+    special = SpecialPoint2(np.zeros(2), np.zeros(2), np.zeros(1), one, 1.0 + 0j, one, 0.0, kind=CodimensionTwo.CUSP)
+    for start in (special, "here"):
+        with pytest.raises(ParameterError, match="BifurcationPoint from `locate`, or a start from `switch2`"):
+            follow2(circle(), start, BOX, second=SECOND)
+    with pytest.raises(ParameterError, match="must be a point of codimension two; allowed: one of the `special`"):
+        switch2(circle(), point, BOX)
 
 
 turning = doubling(many=True)

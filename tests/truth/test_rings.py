@@ -89,7 +89,7 @@ def test_five_van_der_pol_cells():
         assert farthest(np.linalg.eigvals(matrix), known) < 1e-13
         crossing = symmetric_crossing(block, Event.PAIR)
         assert crossing.kind is (
-            SymmetricKind.NEIMARK_SACKER if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER
+            SymmetricKind.SYMMETRY_KEPT if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER
         )
 
 

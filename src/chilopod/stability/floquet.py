@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -208,25 +209,28 @@ def _leading_of(every: Multipliers, count: int) -> tuple[Multipliers, float]:
     return chosen, following
 
 
-def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
-    """Multipliers of many systems at their known orbits, on all cores if the systems allow it."""
+def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[Multipliers]:
+    """Multipliers of many systems at their known orbits, on all cores if the systems allow it; an AnalysisError after
+    ``seconds``, the time in s."""
     if not isinstance(systems, Sequence):
         raise ParameterError("must be a list", field="systems", value=systems, allowed="a list of systems")
     for system in systems:
         check_system(system)
     if not systems:
         return []
-    if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
-        with ThreadPoolExecutor(cores()) as threads:
-            return list(threads.map(multipliers, systems))
-    if any(is_autonomous(system) for system in systems):
-        return [multipliers(system) for system in systems]
-    states = [known_state(system) for system in systems]
-    images = return_maps(systems, states)
-    return [
-        _multipliers(from_known(system, state, image=image))
-        for system, state, image in zip(systems, states, images, strict=True)
-    ]
+    with Deadline(seconds):
+        if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
+            with ThreadPoolExecutor(cores()) as threads:  # which share the time limit
+                jobs = [threads.submit(copy_context().run, multipliers, system) for system in systems]
+                return [job.result() for job in jobs]
+        if any(is_autonomous(system) for system in systems):
+            return [multipliers(system) for system in systems]
+        states = [known_state(system) for system in systems]
+        images = return_maps(systems, states)
+        return [
+            _multipliers(from_known(system, state, image=image))
+            for system, state, image in zip(systems, states, images, strict=True)
+        ]
 
 
 def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: float = math.inf) -> Exponents:

@@ -217,7 +217,7 @@ def follow(
         True to follow orbits with the systems' symmetry in time. By default the full period is used, since the orbits
         of interest have usually lost that symmetry.
     budget, seconds
-        Number of flows, and time in s, after which the branch ends.
+        Number of flows, beside those of normal forms, and time in s, after which the branch ends.
     progress
         Called with the number of points and the newest one.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -15,11 +14,9 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.within import SAME_ORBIT, Within
 from chilopod.stability.crossing_points.description import described
 from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, past_singular, place_error
-from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
-from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits.orbit import Orbit, bounded, find_orbit
 from chilopod.stability.points import Kind
-from chilopod.stability.problem.returns import ReturnMap, returned_states
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.unit_circle.critical import Crossing
@@ -75,8 +72,8 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     else:
         value, error = point.value, _value_error(within, place, along, orbit.image)
     point = replace(point, value=value)
-    kind, formed = Kind.FOLD if place.fold else None, partial(_form, curve, point, orbit)
-    found = described(curve.system(value), (value, error), orbit, crossing, block, formed, kind=kind)
+    kind = Kind.FOLD if place.fold else None
+    found = described(curve.system(value), (value, error), orbit, crossing, block, kind=kind)
     nu = found.multiplier
     off = abs(abs(nu) - 1.0) if crossing.event is Event.PAIR else abs(nu - TARGETS[crossing.event])
     if off > _CRITICAL and not crossing.collision:
@@ -146,19 +143,3 @@ def _fold_error(curve: Curve, here: Step[Anchor, OnCurve], image: ReturnMap) -> 
     off = (np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes
     slope = abs(float(left @ matrix[:, -1]))
     return curve.scale * SAFETY * float(np.abs(left) @ off) / slope if slope > 0.0 else np.inf
-
-
-def _form(
-    curve: Curve, point: BranchPoint, orbit: Orbit, critical: CriticalOrbit, uncertainty: float
-) -> NormalForm | None:
-    """The normal form; None where the map cannot be evaluated."""
-    system = curve.system(point.value)
-
-    def mapped(states: Array) -> Array:
-        curve.budget.take(len(states))
-        return returned_states(system, states, orbit.section)
-
-    try:
-        return normal_form(mapped, critical, uncertainty=uncertainty, scale=curve.units(critical.state.size)[:-1])
-    except (AnalysisError, ValueError, np.linalg.LinAlgError):
-        return None

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ComplexArray
+from chilopod.errors import AnalysisError
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.crossing_points.place import critical_multipliers
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
-from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import (
     WITHOUT_CRITICALITY,
@@ -22,7 +22,10 @@ from chilopod.stability.points import (
     kind_at_plus_one,
     with_coefficients,
 )
+from chilopod.stability.problem.budget import UserCode
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
+from chilopod.stability.problem.returns import returned_states
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block
@@ -33,9 +36,6 @@ _EPSILON = float(np.finfo(float).eps)
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
 _SETTLED = 1e-9  # change of the mean from half as many parts; its error is about the square of that
 
-Formed = Callable[[CriticalOrbit, float], NormalForm | None]
-"""The normal form at a critical orbit, from the relative error of the return map; None if it cannot be computed."""
-
 
 def described(
     system: SystemLike,
@@ -43,7 +43,6 @@ def described(
     orbit: Orbit,
     crossing: Crossing,
     block: Block | None,
-    formed: Formed,
     *,
     kind: Kind | None = None,
     with_normal_form: bool = True,
@@ -51,7 +50,7 @@ def described(
     """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added.
 
     The critical multipliers belong to the whole return map; their block is given if spatial symmetries split it, and
-    the kind of the point if known. ``formed`` computes the normal form for one critical multiplier or pair.
+    the kind of the point if known.
     """
     value, error_bound = place
     spec = spectrum(orbit.image)
@@ -76,7 +75,7 @@ def described(
     # At +1 the normal form, or a broken symmetry, determines the kind.
     asked = with_normal_form or (crossing.event is Event.PLUS and not breaking and kind is None)
     if simple and asked and not crossing.collision:
-        form = formed(*_critical_orbit(orbit, crossing.event, nu, mode, left))
+        form = _formed(system, orbit, crossing.event, nu, mode, left)
     # No orbits branch off from a Krein collision, whatever the symmetries.
     branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
     symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
@@ -109,10 +108,10 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
         before, parts = mean, 2 * parts
 
 
-def _critical_orbit(
-    orbit: Orbit, event: Event, nu: complex, mode: ComplexArray, left: ComplexArray
-) -> tuple[CriticalOrbit, float]:
-    """Arguments of a normal form: the critical orbit and the relative error of the return map."""
+def _formed(
+    system: SystemLike, orbit: Orbit, event: Event, nu: complex, mode: ComplexArray, left: ComplexArray
+) -> NormalForm | None:
+    """The normal form for one critical multiplier or pair; None if it cannot be computed."""
     image = orbit.image
     exact = nu / abs(nu) if event is Event.PAIR else complex(TARGETS[event])
     if event is not Event.PAIR:
@@ -120,7 +119,17 @@ def _critical_orbit(
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = np.asarray(image.error) / np.abs(image.jacobian).max()
     uncertainty = float(np.nan_to_num(relative, nan=0.0, posinf=0.0).max())
-    return CriticalOrbit(orbit.state, image.jacobian, exact, mode, left, image.returns), uncertainty
+    critical = CriticalOrbit(orbit.state, image.jacobian, exact, mode, left, image.returns)
+    scale = sizes(system, orbit.state, orbit.period / image.returns)
+
+    def mapped(states: Array) -> Array:
+        with UserCode("flow", None):
+            return returned_states(system, states, orbit.section)
+
+    try:
+        return normal_form(mapped, critical, uncertainty=uncertainty, scale=scale)
+    except (AnalysisError, ValueError):
+        return None
 
 
 def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: SymmetricCrossing | None) -> Kind:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,17 +11,15 @@ from numpy.typing import ArrayLike
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array
-from chilopod.stability.crossing_points.description import Formed, described
+from chilopod.stability.crossing_points.description import described
 from chilopod.stability.crossing_points.place import Course, past_singular, place_error
-from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_interval
 from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import Family
-from chilopod.stability.problem.returns import ReturnMap, returned_states
-from chilopod.stability.problem.scales import sizes
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.extent import Fold
 from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
@@ -146,8 +143,8 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     # Where an orbit is lost the point may be its fold.
     lost = samples.end < samples.high and value + bound >= samples.end
     kind = Kind.BRANCH_POINT if (touch or (lost and trivial)) and crossing.event is Event.PLUS else None
-    system, formed, asked = samples.family(value), _formed(samples, value, orbit), with_normal_form and not touch
-    point = described(system, (value, bound), orbit, crossing, block, formed, kind=kind, with_normal_form=asked)
+    system, asked = samples.family(value), with_normal_form and not touch
+    point = described(system, (value, bound), orbit, crossing, block, kind=kind, with_normal_form=asked)
     if not point.error_bound < samples.width:
         raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
     if touch:
@@ -160,13 +157,8 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
     """The fold that a followed orbit begins or ends in."""
     orbit = Orbit(fold.image.state, fold.image, np.zeros(fold.image.state.size))
     crossing = Crossing(fold.value, (fold.value, fold.value), Event.PLUS, 1, 1, 1.0 + 0.0j)
-    system, place, formed = (
-        samples.family(fold.value),
-        (fold.value, fold.error_bound),
-        _formed(samples, fold.value, orbit),
-    )
-    about: dict[str, Any] = {"kind": Kind.FOLD, "with_normal_form": with_normal_form}
-    return described(system, place, orbit, crossing, None, formed, **about)
+    system, place = samples.family(fold.value), (fold.value, fold.error_bound)
+    return described(system, place, orbit, crossing, None, kind=Kind.FOLD, with_normal_form=with_normal_form)
 
 
 def _orbit(samples: Samples, value: float) -> Orbit:
@@ -174,16 +166,6 @@ def _orbit(samples: Samples, value: float) -> Orbit:
     sample = samples.at(np.array([value]))[0]
     system = samples.family(value)
     return from_known(system, sample.orbit) if samples.known else bounded(system, sample.orbit, sample.image)
-
-
-def _formed(samples: Samples, value: float, orbit: Orbit) -> Formed:
-    system = samples.family(value)
-    scale = sizes(system, orbit.state, orbit.period / orbit.image.returns)
-
-    def mapped(states: Array) -> Array:
-        return returned_states(system, states, orbit.section)
-
-    return lambda critical, uncertainty: normal_form_of(mapped, critical, uncertainty=uncertainty, scale=scale)
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:

@@ -45,12 +45,10 @@ class SymmetricKind(Labelled):
         "several multipliers cross at once; branches of orbits with less symmetry, those whose halves differ on both "
         "sides of the point, leave unstable as a rule",
     )
-    PERIOD_DOUBLING = "period doubling", "an orbit of twice the period and with the same symmetries branches off"
     SYMMETRIC_PERIOD_DOUBLING = (
         "symmetric period doubling",
         "orbits of twice the period and with less symmetry at an instant branch off",
     )
-    NEIMARK_SACKER = "Neimark-Sacker", "an oscillation at a second frequency branches off that keeps all symmetries"
     SYMMETRIC_NEIMARK_SACKER = (
         "symmetric Neimark-Sacker",
         "oscillations at a second frequency branch off that are waves: rotating, standing, or both kinds",
@@ -113,12 +111,12 @@ def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> Symme
 
 
 def _kind(block: Block, critical: Event, quadratic: int, returns: int) -> SymmetricKind:
-    if critical is Event.PAIR:
-        return SymmetricKind.NEIMARK_SACKER if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER
-    if critical is Event.MINUS and returns % 2:
-        return SymmetricKind.PERIOD_DOUBLING if block.trivial else SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
-    if block.trivial and critical is Event.PLUS:
+    if block.trivial and not (critical is Event.MINUS and returns % 2 == 0):
         return SymmetricKind.SYMMETRY_KEPT
+    if critical is Event.PAIR:
+        return SymmetricKind.SYMMETRIC_NEIMARK_SACKER
+    if critical is Event.MINUS and returns % 2:
+        return SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
     if block.dimension == 1:
         return SymmetricKind.PITCHFORK
     return SymmetricKind.EQUIVARIANT_TRANSCRITICAL if quadratic else SymmetricKind.EQUIVARIANT_PITCHFORK
