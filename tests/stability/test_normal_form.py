@@ -9,6 +9,7 @@ from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import normal_form
 from chilopod.stability.points import Criticality, criticality, kind_at_plus_one
+from chilopod.stability.problem.returns import ReturnMap
 
 
 def at_origin(jacobian, multiplier, right=None, left=None, returns=1):
@@ -16,11 +17,10 @@ def at_origin(jacobian, multiplier, right=None, left=None, returns=1):
     first = np.eye(n)[0]
     return CriticalOrbit(
         np.zeros(n),
-        np.array(jacobian, dtype=float),
+        ReturnMap(np.zeros(n), np.array(jacobian, dtype=float), 0.0, returns, 1.0),
         complex(multiplier),
         np.asarray(first if right is None else right, dtype=complex),
         np.asarray(first if left is None else left, dtype=complex),
-        returns,
     )
 
 
@@ -106,7 +106,8 @@ def test_returns_at_plus_one(returns):
 def test_an_orbit_off_by_a_little_beside_a_pitchfork_is_not_transcritical():
     """x - x^3 around a point beside its fixed point has a quadratic term, and returns to round-off all the same."""
     off = 1e-6
-    at = CriticalOrbit(np.array([off]), np.array([[1.0 - 3.0 * off**2]]), 1.0 + 0j, np.ones(1), np.ones(1))
+    image = ReturnMap(np.array([off]), np.array([[1.0 - 3.0 * off**2]]), 0.0, 1, 1.0)
+    at = CriticalOrbit(np.array([off]), image, 1.0 + 0j, np.ones(1), np.ones(1))
     form = normal_form(lambda x: x - x**3, at)
     assert abs(form.quadratic) <= form.quadratic_error < 1e-3
     assert kind_at_plus_one(form) is Kind.PITCHFORK

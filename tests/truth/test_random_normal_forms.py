@@ -13,6 +13,7 @@ import pytest
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import normal_form, quintic
+from chilopod.stability.problem.returns import ReturnMap
 
 CASES = 60
 SHEARS = 3
@@ -105,7 +106,8 @@ def random_map(kind, random):
     right, left = units * (basis @ mode), inverse.T @ dual / units
     length = np.linalg.norm(right)
     jacobian = units[:, None] * (basis @ linear @ inverse) / units
-    at = CriticalOrbit(orbit * units, jacobian, multiplier, right / length, left * length)
+    image = ReturnMap(orbit * units, jacobian, 0.0, 1, 1.0)
+    at = CriticalOrbit(orbit * units, image, multiplier, right / length, left * length)
     per_amplitude = (2.0 if kind == "pair" else 1.0) / length
     return mapped, at, b * per_amplitude, c * per_amplitude**2, e * per_amplitude**4
 
@@ -144,13 +146,13 @@ def test_errors_of_fifth_order_hold(kind, monkeypatch):
     for case in range(CASES // 3):
         random = np.random.default_rng([8, case])
         mapped, at, _, cubic, fifth = random_map(kind, random)
-        at = replace(at, returns=int(random.integers(1, 4)))
+        at = replace(at, image=replace(at.image, returns=int(random.integers(1, 4))))
         form = normal_form(mapped, at, orbit_error=0.0)
         if form.status is not NormalFormStatus.FOUND:
             continue
         found = quintic(mapped, at, form.amplitude)
         once = {"flip": -2.0 * fifth.real, "fold": fifth.real, "pair": fifth.real + 0.5 * cubic.imag**2}[kind]
-        times = at.returns // 2 if kind == "flip" and at.returns == 2 else at.returns
+        times = at.image.returns // 2 if kind == "flip" and at.image.returns == 2 else at.image.returns
         assert abs(found.coefficient - times * once) <= found.error, case
         used.append(abs(found.coefficient - times * once) / found.error)
     assert len(used) >= 0.3 * CASES

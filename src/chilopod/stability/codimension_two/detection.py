@@ -146,14 +146,14 @@ class Detector:
         if shift is not None:
             state = at.frame.size * (np.abs(at.frame.basis) @ shift[: at.frame.parameters.start])
             orbit_error = float(np.abs(here.left) @ state)
-        error = 0.0 if shift is None else float(at.error.max() / np.linalg.norm(at.jacobian))
-        return normal_form(*self.sampled(here), uncertainty=error, scale=at.frame.size, orbit_error=orbit_error)
+        return normal_form(*self.sampled(here), scale=at.frame.size, orbit_error=orbit_error)
 
     def sampled(self, here: Critical) -> tuple[ReturnedStates, CriticalOrbit]:
         """Return map and critical orbit of a normal form."""
         place, image, section = here.at.place, here.at.image, here.at.frame.section
         system = self._curve.system(place.values)
-        orbit = CriticalOrbit(place.state, image.jacobian, here.multiplier, here.mode, here.left, image.returns)
+        image = image if np.isfinite(image.error).all() else replace(image, error=0.0)
+        orbit = CriticalOrbit(place.state, image, here.multiplier, here.mode, here.left)
         return lambda states: returned_states(system, states, section), orbit
 
     def fifth(self, here: Critical, *forms: NormalForm) -> Quintic | None:

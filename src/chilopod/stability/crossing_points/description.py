@@ -116,10 +116,7 @@ def _formed(
     exact = nu / abs(nu) if event is Event.PAIR else complex(TARGETS[event])
     if event is not Event.PAIR:
         mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.asarray(image.error) / np.abs(image.jacobian).max()
-    uncertainty = float(np.nan_to_num(relative, nan=0.0, posinf=0.0).max())
-    critical = CriticalOrbit(orbit.state, image.jacobian, exact, mode, left, image.returns)
+    bounded = replace(image, error=np.nan_to_num(image.error, nan=0.0, posinf=0.0))
     scale = sizes(system, orbit.state, orbit.period / image.returns)
 
     def mapped(states: Array) -> Array:
@@ -127,7 +124,7 @@ def _formed(
             return returned_states(system, states, orbit.section)
 
     try:
-        return normal_form(mapped, critical, uncertainty=uncertainty, scale=scale)
+        return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)
     except (AnalysisError, ValueError):
         return None
 

@@ -110,7 +110,7 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
 def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, high: float) -> float:
     """Least factor on the amplitude at which nonlinear terms may become visible."""
     factor = 1.0
-    reach = np.abs(at.jacobian)
+    reach = np.abs(at.image.jacobian)
     for _ in range(_UPS):
         factor *= _LONG_UP
         if factor * radius >= high:
@@ -120,7 +120,7 @@ def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: 
         if image is None:
             break
         size = np.abs(at.state) + np.abs(shift) @ reach.T
-        if (np.abs(image - shift @ at.jacobian.T) > _LOST * size).any():
+        if (np.abs(image - shift @ at.image.jacobian.T) > _LOST * size).any():
             break
     else:
         return np.inf

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.normal_forms.extrapolation import RADII, Series, radii, series
+from chilopod.stability.problem.returns import ReturnMap
 
 ReturnedStates = Callable[[Array], Array]
 """The return map: states, shape (k, n), to their images, shape (k, n)."""
@@ -44,12 +45,11 @@ class CriticalOrbit(ReadOnlyArrays):
     """A fixed point of a return map, with its critical multiplier."""
 
     state: Array  # the fixed point, shape (n,)
-    jacobian: Array  # Jacobian of the return map there, shape (n, n)
+    image: ReturnMap  # return map there, with the errors of its derivative
     multiplier: complex  # nu: exactly +1, exactly -1, or the one of a complex pair with the mode ``right``
     # Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
     right: ComplexArray
     left: ComplexArray
-    returns: int = 1  # number of returns in a full period
 
     @property
     def real(self) -> bool:
@@ -113,7 +113,7 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
 
 def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
     """Errors of images of a size, shape (n,), and of their projection, shape (n + 1,)."""
-    rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
+    rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.image.jacobian) @ reached)
     return np.append(rounding, np.abs(at.left) @ rounding)
 
 
@@ -125,7 +125,7 @@ def solve_homological(
     i, j = powers
     n = at.state.size
     factor = at.multiplier**i * at.multiplier.conjugate() ** j
-    matrix = factor * np.eye(n) - at.jacobian
+    matrix = factor * np.eye(n) - at.image.jacobian
     if not resonant:
         return np.asarray(np.linalg.solve(matrix, right_side), dtype=np.complex128)
     q, p = at.right, at.left

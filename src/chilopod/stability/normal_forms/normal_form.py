@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.flows.balance import numerical_balance
-from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fitted
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, Term, images
-from chilopod.stability.spectrum.eigenvalues import eigensystem
+from chilopod.stability.spectrum.eigenvalues import spectrum
 
 _START = 0.2  # first amplitude of the search, relative to the scale of the states
 
@@ -66,20 +64,18 @@ def normal_form(
     mapped: ReturnedStates,
     at: CriticalOrbit,
     *,
-    uncertainty: float = 0.0,  # relative error of the derivative of the map
     scale: ArrayLike = 1.0,  # sizes of the states, shape (n,), where the search for an amplitude starts
     orbit_error: float | None = None,  # error of the orbit along the mode; by default from its residual
 ) -> NormalForm:
     """Normal form on the centre manifold of a critical orbit of a map of several states, shape (k, n)."""
-    values, errors = _uncertainties(at.jacobian, max(uncertainty, 16.0 * np.finfo(float).eps))
-    own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
-    others = np.delete(np.arange(values.size), own)
-    if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
+    spec = spectrum(at.image)
+    own = [spec.nearest(one) for one in (at.multiplier, at.multiplier.conjugate())]
+    if (np.abs(np.abs(np.delete(spec.values, own)) - 1.0) <= np.delete(spec.error, own)).any():
         return NormalForm(NormalFormStatus.SEVERAL_CRITICAL)
     # Where the terms z^(k-1) of the conjugate are resonant as well (Kuznetsov, sections 9.5.1 to 9.5.4).
     upper = complex(at.multiplier.real, abs(at.multiplier.imag))
     for k in () if at.real else (1, 2, 3, 4):
-        if abs(upper - np.exp(2j * np.pi / k)) <= errors[own[0]]:
+        if abs(upper - np.exp(2j * np.pi / k)) <= spec.error[own[0]]:
             return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=k)
     # An overflow far out is a valid result.
     with np.errstate(all="ignore"):
@@ -89,19 +85,8 @@ def normal_form(
     if at.real:
         return _of_full_period(fit, mapped, at, orbit_error)
     status, sampled, (cubic, error) = fit
-    cubic, error = at.returns * np.conj(at.multiplier) * cubic, at.returns * error
+    cubic, error = at.image.returns * np.conj(at.multiplier) * cubic, at.image.returns * error
     return NormalForm(status, 0.0, 0.0, float(cubic.real), error, float(cubic.imag), error, sampled.radius)
-
-
-def _uncertainties(jacobian: Array, relative: float) -> tuple[ComplexArray, Array]:
-    """Eigenvalues of a matrix and bounds on their errors, shape (n,) both, for an error relative to its norm in units
-    that balance it."""
-    units = numerical_balance(jacobian)
-    balanced = jacobian * units / units[:, None]
-    values, _, left = eigensystem(balanced)
-    error = relative * np.linalg.norm(balanced)
-    # To first order the condition gives each error, but even for a defective pair it is at most the square root.
-    return values, np.minimum(error * np.linalg.norm(left, axis=0), np.sqrt(error))
 
 
 def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic: float) -> float:
@@ -131,7 +116,7 @@ def _of_full_period(fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, orbit_e
     if off > 0.0:
         quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
         cubic_error += 4.0 * (abs(fourth) + fourth_error) * off
-    k = at.returns
+    k = at.image.returns
     if at.multiplier.real < 0.0:
         # a -> -a + c a^3 twice: a -> a - 2 c a^3.
         times = k if k % 2 == 0 else 2 * k
@@ -196,7 +181,7 @@ def _measured(manifold: Manifold, at: CriticalOrbit, radius: float) -> Quintic |
 def _fifth_of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[float, float]:
     """Coefficient of fifth order over a full period, or over two, from the terms of one return."""
     (c, c_error), (e, e_error) = third, fifth
-    cubic, cubic_error, value, error, times = c.real, c_error, e.real, e_error, at.returns
+    cubic, cubic_error, value, error, times = c.real, c_error, e.real, e_error, at.image.returns
     if not at.real:
         # z -> nu z (1 + c |z|^2 + e |z|^4): |1 + u| = 1 + Re u + (Im u)^2 / 2 + ...
         c, e = c * at.multiplier.conjugate(), e * at.multiplier.conjugate()
