@@ -69,18 +69,14 @@ class Frame(ReadOnlyArrays):
     def between(self, start: Place, end: Place) -> Array:
         """Coordinates of one place relative to another: state, parameters and, for a pair, cosine."""
         moved = self.basis.T @ ((end.state - start.state) / self.size)
-        turned = [end.cosine - start.cosine] if self.column.shape[1] == 2 else []
+        turned = [end.cosine - start.cosine] * (self.column.shape[1] - 1)
         return np.concatenate([moved, (end.values - start.values) / self.widths, turned])
 
     def moved(self, start: Place, step: Array) -> Place:
         """The place at a displacement from another; the inverse of :meth:`between`."""
         m = self.basis.shape[1]
-        turned = float(step[m + 2]) if self.column.shape[1] == 2 else 0.0
-        return Place(
-            start.state + self.size * (self.basis @ step[:m]),
-            start.values + self.widths * step[m : m + 2],
-            start.cosine + turned,
-        )
+        state = start.state + self.size * (self.basis @ step[:m])
+        return Place(state, start.values + self.widths * step[m : m + 2], start.cosine + float(step[m + 2 :].sum()))
 
     def carried(self, direction: Array, other: Frame) -> Array:
         """A direction in the coordinates of this frame, from those in another frame of the same curve."""

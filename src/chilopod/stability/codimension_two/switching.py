@@ -9,7 +9,6 @@ Where the cubic coefficient c of a -> (1 + b) a + c a^3 + e a^5 vanishes on a cu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, 
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, across, critical
 from chilopod.stability.codimension_two.two_parameters import BUDGET, over_periods
-from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
-from chilopod.stability.normal_forms.normal_form import Quintic
+from chilopod.stability.normal_forms.center_manifold import displacements
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
 from chilopod.stability.problem.budget import Budget, SpentError
@@ -85,63 +83,55 @@ def switch2(
     folds = CriticalCurve(over_periods(family2, periods), 1, False, box, allowed)
     signs = (1.0,) if kind is Kind.PERIOD_DOUBLING else (1.0, -1.0)
     with allowed:
-        there = _unfolding(family2, point, kind, box, allowed)
+        there = _Unfolding(family2, point, kind, box, allowed)
         return tuple(_start(there, folds, sign, periods) for sign in signs)
 
 
-@dataclass(frozen=True)
 class _Unfolding:
-    """Unfolding of a degenerate point on a curve."""
+    """Unfolding of a degenerate point on a curve: the critical orbit with its terms of fifth order, and the changes of
+    the cubic coefficient and of the multiplier."""
 
-    equations: CriticalCurve  # the curve, the point, and its critical orbit
-    spot: Spot
-    at: CriticalOrbit
-    fifth: Quintic  # terms of fifth order
-    slope: float  # change of the cubic coefficient along the curve, by the length of ``spot.tangent``
-    # Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
-    response: Array
-    times: int  # number of returns in the map of the coefficients
+    def __init__(self, family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, budget: Budget) -> None:
+        system = system_of(family2, *point.values.tolist())
+        targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
+        target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
+        self._equations = curve = CriticalCurve(family2, target, knows_orbit(system), box, budget)
+        # For a point on the edge of the box the other side is used.
+        curve.box = box + 2.0 * _FARTHEST * curve.widths[:, None] * [-1.0, 1.0]
+        self.spot = spot = curve.begin(Place(point.orbit, point.values, 0.0))
+        detector = Detector(curve, kind, True)
+        here = critical(target, spot)
+        beside = [critical(target, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
+        low, high = forms = [detector.form(each) for each in beside]
+        if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
+            raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
+        fifth = detector.fifth(here, detector.form(here), *forms)
+        if fifth is None:
+            raise AnalysisError("no coefficient of fifth order was found", field="point")
+        if abs(fifth.coefficient) <= fifth.error:
+            raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
+        self.at, self.fifth = detector.sampled(here)[1], fifth
+        returns = spot.image.returns
+        self._times = returns if target > 0 or returns % 2 == 0 else 2 * returns  # in the map of the coefficients
+        self._slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)  # by the length of ``spot.tangent``
+        self._response = _across(spot, target)
 
     def fold(self, a: float) -> Place | None:
         """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
         spot, fifth = self.spot, self.fifth
-        away = -2.0 * fifth.coefficient * a * a / self.slope
-        across = fifth.coefficient * a**4 / self.times
-        if not (abs(away) <= _FARTHEST and np.abs(across * self.response).max() <= _FARTHEST):
+        away = -2.0 * fifth.coefficient * a * a / self._slope
+        across = fifth.coefficient * a**4 / self._times
+        if not (abs(away) <= _FARTHEST and np.abs(across * self._response).max() <= _FARTHEST):
             return None
-        base = self.equations.along(spot, away)
-        place = spot.frame.moved(base.place, across * self.response)
+        base = self._equations.along(spot, away)
+        place = spot.frame.moved(base.place, across * self._response)
         bent = displacements(self.at, fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
 
 
-def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, budget: Budget) -> _Unfolding:
-    system = system_of(family2, *point.values.tolist())
-    targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
-    target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
-    equations = CriticalCurve(family2, target, knows_orbit(system), box, budget)
-    # For a point on the edge of the box the other side is used.
-    equations.box = box + 2.0 * _FARTHEST * equations.widths[:, None] * [-1.0, 1.0]
-    spot = equations.begin(Place(point.orbit, point.values, 0.0))
-    detector = Detector(equations, kind, True)
-    here = critical(target, spot)
-    beside = [critical(target, equations.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
-    low, high = forms = [detector.form(each) for each in beside]
-    if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
-        raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
-    fifth = detector.fifth(here, detector.form(here), *forms)
-    if fifth is None:
-        raise AnalysisError("no coefficient of fifth order was found", field="point")
-    if abs(fifth.coefficient) <= fifth.error:
-        raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
-    returns = spot.image.returns
-    times = returns if target > 0 or returns % 2 == 0 else 2 * returns
-    slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)
-    return _Unfolding(equations, spot, detector.sampled(here)[1], fifth, slope, _across(spot, target), times)
-
-
 def _across(spot: Spot, target: int) -> Array:
-    """``response`` of an unfolding, by the shortest way; g changes by -(w . v) times the change of the multiplier."""
+    """Change of orbit and parameters, in coordinates of the frame, with the modulus of the multiplier, by the
+    shortest way; g changes by -(w . v) times the change of the multiplier."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.left[:, 0] @ spot.right[:, 0])
     orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])
