@@ -27,7 +27,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
 from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, UserCode
-from chilopod.stability.problem.capabilities import KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.problem.capabilities import SystemLike, given_scale
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
@@ -265,7 +265,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
         size = sizes(system, place.state, image.period / image.returns)
-        if self.known or place.state.any() or (isinstance(system, Scaled) and system.scale is not None):
+        if self.known or place.state.any() or given_scale(system) is not None:
             return size
         # The parameters set the size of an orbit that rests at zero.
         reach = 0.0
@@ -363,8 +363,3 @@ def _orthonormal(columns: Array) -> Array:
     if columns.shape[1] == 1:
         return columns / np.linalg.norm(columns)
     return np.asarray(np.linalg.qr(columns)[0])
-
-
-def knows_orbit(system: SystemLike) -> bool:
-    """True if a system knows its orbit."""
-    return isinstance(system, KnowsOrbit) and system.orbit is not None

@@ -9,15 +9,14 @@ from __future__ import annotations
 import enum
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Spot
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
@@ -25,7 +24,7 @@ from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Retur
 from chilopod.stability.normal_forms.normal_form import NormalForm, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.problem.returns import returned_states
-from chilopod.stability.spectrum.eigenvalues import Spectrum, spectrum
+from chilopod.stability.spectrum.eigenvalues import spectrum
 from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.tracing.tracer import Parts
@@ -66,42 +65,38 @@ Test = Callable[[float], tuple[float, float]]
 """A test function and its error at a distance along a step; NaN where undefined."""
 
 
-@dataclass(frozen=True)
-class Critical(ReadOnlyArrays):
-    """A place of a curve with its multipliers."""
+class Critical:
+    """A place of a curve, with the critical multipliers separated from the others.
 
-    at: Evaluated
-    spectrum: Spectrum  # all multipliers of the return map
-    others: NDArray[np.intp]  # indices of the multipliers that are not critical, shape (others,)
-    multiplier: complex  # critical multiplier: +1, -1, or on the unit circle with positive imaginary part
-    mode: ComplexArray  # unit right eigenvector and left one with left^H mode = 1, shape (n,)
-    left: ComplexArray
-    overlap: float  # overlap of the two, each a unit vector in the frame: 0 for a double multiplier, NaN for a pair
+    ``spectrum`` has all multipliers, ``others`` the indices of those that are not critical, shape (others,).
+    ``multiplier`` is +1, -1, or on the unit circle with positive imaginary part, ``mode`` its unit right eigenvector
+    and ``left`` the left one with left^H mode = 1, shape (n,), ``overlap`` that of the two, each a unit vector in the
+    frame: 0 for a double multiplier, NaN for a pair.
+    """
 
-
-def critical(target: int, at: Evaluated) -> Critical:
-    """A place of a curve, with the critical multipliers separated from the others."""
-    spec = spectrum(at.image)
-    if target:
-        own = [int(np.abs(spec.values - target).argmin())]
-        v, w, size = at.right[:, 0], at.left[:, 0], at.frame.size
-        overlap = float(w @ v / (np.linalg.norm(w) * np.linalg.norm(v)))
-        nu, mode, left = complex(target), (size * v).astype(np.complex128), (w / size).astype(np.complex128)
-        mode /= np.linalg.norm(mode)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            left /= left @ mode
-    else:
-        cosine, overlap = at.place.cosine, np.nan
-        nu = complex(cosine + 1j * np.sqrt(complex(1.0 - cosine * cosine)))
-        first = int(np.abs(spec.values - nu).argmin())
-        distance = np.abs(spec.values - 1.0 / nu)
-        distance[first] = np.inf
-        own = [first, int(distance.argmin())]
-        mode, left = spec.right[:, first], spec.left[:, first]
-        turn = np.abs(mode).max() / mode[np.abs(mode).argmax()]
-        mode, left = mode * turn, left * turn
-    others = np.delete(np.arange(spec.values.size), own)
-    return Critical(at, spec, others, nu, mode, left, overlap)
+    def __init__(self, target: int, at: Evaluated) -> None:
+        self.at, self.spectrum, self.overlap = at, spectrum(at.image), np.nan
+        values = self.spectrum.values
+        if target:
+            own = [self.spectrum.nearest(target)]
+            v, w, size = at.right[:, 0], at.left[:, 0], at.frame.size
+            self.multiplier, self.overlap = complex(target), float(w @ v / (np.linalg.norm(w) * np.linalg.norm(v)))
+            mode, left = (size * v).astype(np.complex128), (w / size).astype(np.complex128)
+            mode /= np.linalg.norm(mode)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                left /= left @ mode
+        else:
+            cosine = at.place.cosine
+            self.multiplier = nu = complex(cosine + 1j * np.sqrt(complex(1.0 - cosine * cosine)))
+            first = self.spectrum.nearest(nu)
+            distance = np.abs(values - 1.0 / nu)
+            distance[first] = np.inf
+            own = [first, int(distance.argmin())]
+            mode, left = self.spectrum.right[:, first], self.spectrum.left[:, first]
+            turn = np.abs(mode).max() / mode[np.abs(mode).argmax()]
+            mode, left = mode * turn, left * turn
+        self.others = np.delete(np.arange(values.size), own)
+        self.mode, self.left = mode, left
 
 
 class Station(NamedTuple):
@@ -121,7 +116,7 @@ class Detector:
 
     def station(self, spot: Spot) -> Station:
         """The point at a spot, and the test functions."""
-        here = critical(self._curve.target, spot)
+        here = Critical(self._curve.target, spot)
         form = self.form(here) if self._coefficients and abs(spot.place.cosine) < 1.0 else None
         signals = {signal: self._measured(signal, here, form) for signal in self._signals}
         bound = across(spot) + 4.0 * _EPSILON * np.abs(spot.values)
@@ -198,14 +193,14 @@ class Detector:
 
         @functools.cache
         def test(place: float) -> tuple[float, float]:
-            return self._measured(signal, critical(curve.target, parts.at(place).found))
+            return self._measured(signal, Critical(curve.target, parts.at(place).found))
 
         zero = _zero(test, length)
         if zero is None:
             return None
         root, beside, unsure = zero
         spot = curve.spot(parts.at(root).found.place, start.frame, start.tangent)
-        here = critical(curve.target, spot)
+        here = Critical(curve.target, spot)
         value, error = self._measured(signal, here)
         if np.isnan(value):
             value, error = 0.0, max(test(root - beside)[1], test(root + beside)[1])
@@ -220,7 +215,7 @@ class Detector:
         point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
         if signal is Own.COEFFICIENT:
             slope = abs(test(root + beside)[0] - test(root - beside)[0]) / 2.0
-            there = critical(curve.target, parts.at(root + beside).found)
+            there = Critical(curve.target, parts.at(root + beside).found)
             point = self._with_next_term(point, here, there, _SAFETY * (abs(value) + error + unsure) / slope)
         return root, spot, point
 

@@ -14,14 +14,15 @@ import numpy as np
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Array, in_one_line
-from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot, knows_orbit
+from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
-from chilopod.stability.codimension_two.detection import Detector, across, critical
+from chilopod.stability.codimension_two.detection import Critical, Detector, across
 from chilopod.stability.codimension_two.two_parameters import BUDGET, over_periods
 from chilopod.stability.normal_forms.center_manifold import displacements
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
 from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.capabilities import known_orbit
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
 _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
@@ -95,13 +96,13 @@ class _Unfolding:
         system = system_of(family2, *point.values.tolist())
         targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
         target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
-        self._equations = curve = CriticalCurve(family2, target, knows_orbit(system), box, budget)
+        self._equations = curve = CriticalCurve(family2, target, known_orbit(system) is not None, box, budget)
         # For a point on the edge of the box the other side is used.
         curve.box = box + 2.0 * _FARTHEST * curve.widths[:, None] * [-1.0, 1.0]
         self.spot = spot = curve.begin(Place(point.orbit, point.values, 0.0))
         detector = Detector(curve, kind, True)
-        here = critical(target, spot)
-        beside = [critical(target, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
+        here = Critical(target, spot)
+        beside = [Critical(target, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
         low, high = forms = [detector.form(each) for each in beside]
         if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
             raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
@@ -163,7 +164,7 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         if off <= _NEAR and missed <= _NEAR * way and inside.all():
             outward = np.concatenate([place.state - origin.state, place.values - origin.values])
             value, bound, state = float(values[0]), float(across(found)[0]), found.place.state
-            mode, period = critical(1, found).mode, found.image.period
+            mode, period = Critical(1, found).mode, found.image.period
             fold = BifurcationPoint(Kind.FOLD, value, bound, state, mode, 1.0 + 0j, 0.0, period=period)
             return Start2(fold, float(values[1]), outward, periods)
     raise AnalysisError("no curve of folds was found where one is predicted to leave", field="point") from cause

@@ -15,12 +15,13 @@ import numpy as np
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.frozen import in_one_line
-from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot, knows_orbit
+from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, Station
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
 from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.capabilities import known_orbit
 from chilopod.stability.problem.returns import return_duration, whole_period
 from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import reverses
@@ -151,7 +152,7 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
         raise ParameterError(
             said, field="start", value=start.value, allowed="a point on a periodic orbit, of another kind"
         )
-    known = knows_orbit(system) and start.kind is not Kind.FOLD
+    known = known_orbit(system) is not None and start.kind is not Kind.FOLD
     if start.kind is Kind.NEIMARK_SACKER:
         return 0, known
     target = 1 if start.multiplier.real > 0.0 else -1
