@@ -80,8 +80,16 @@ def test_another_branch_is_refused_in_one_line(saved, extra, expected):
     assert (saved / "branch.nc").read_bytes() == before
 
 
-def test_no_branch_to_resume(tmp_path):
-    code, _, err = run(*ROBOT, "--resume", tmp_path / "none")
-    assert code == 2
-    assert "branch.nc" in err
-    assert not (tmp_path / "none").exists()
+def test_no_branch_to_resume(saved, tmp_path):
+    empty, misspelt = tmp_path / "empty", saved.parent / f"{saved.name}s"
+    empty.mkdir()
+    for folder, missing, nearest in (
+        (empty, empty / "branch.nc", ""),
+        (misspelt, misspelt, f"did you mean '{saved.name}'?"),
+    ):
+        code, out, err = run(*ROBOT, "--resume", folder)
+        assert (code, out) == (2, "")
+        assert len(err.splitlines()) == 1
+        assert f"{missing}: does not exist" in err
+        assert nearest in err
+    assert not misspelt.exists()
