@@ -180,7 +180,6 @@ def test_keys_do_what_controls_do(opened, live):
     read(opened, "first spring softer, stiffer")
     opened.locator("body").press("h")
     opened.get_by_text("first spring softer, stiffer").wait_for(state="hidden")
-    opened.get_by_text("first spring softer, stiffer").wait_for(state="hidden")
     opened.locator("body").press("z")
     read(opened, r"its first spring, 37\.3 N")
     opened.locator("body").press("Space")

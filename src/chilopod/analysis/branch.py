@@ -207,12 +207,9 @@ def read_walks(path: str | Path) -> xr.Dataset:
     try:
         data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")
     except FileNotFoundError:
-        missing, like = path, f"*{path.suffix}"
-        if not path.parent.is_dir():
-            missing, like = path.parent, f"*/{path.name}"
+        missing, like = (path, f"*{path.suffix}") if path.parent.is_dir() else (path.parent, f"*/{path.name}")
         names = (found.relative_to(missing.parent).parts[0] for found in sorted(missing.parent.glob(like)))
-        nearest = nearest_name(missing.name, names)
-        raise ParameterError("does not exist", source=str(missing), nearest=nearest) from None
+        raise ParameterError("does not exist", source=str(missing), nearest=nearest_name(missing.name, names)) from None
     except UnsoundError as error:
         raise ParameterError(str(error), source=str(path)) from None
     if data.attrs.get("version") != VERSION:

@@ -56,12 +56,10 @@ class Plan:
     expected: str
     larger: str = ""
 
-    def __str__(self) -> str:
-        return f"{self.what}: {self.expected}.{self.larger}"
-
-    def after(self, taken: float) -> str:
-        """The same after the report, which took some seconds."""
-        return f"{self.what}; it took {in_words(taken)}.{self.larger}"
+    def words(self, taken: float | None = None) -> str:
+        """All of it; of a report that is done, what it has taken (s) in place of the expected duration."""
+        duration = f": {self.expected}" if taken is None else f"; it took {in_words(taken)}"
+        return f"{self.what}{duration}.{self.larger}"
 
 
 def plan(sections: Sequence[Section[Any]], size: Size, named: bool = False) -> Plan:

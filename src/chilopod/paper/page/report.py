@@ -188,8 +188,8 @@ class Report:
         waiting = [section for section in self._sections if section not in self._found]
         waiting += [section for section, _ in self._films]
         drawings = Drawings(self._headline, self._opening, shown, self.failures, waiting)
-        plan, taken = self._plan, time.perf_counter() - self._begun
-        said = "" if plan is None else plan.after(taken) if state is State.DONE else str(plan)
+        taken = time.perf_counter() - self._begun if state is State.DONE else None
+        said = "" if self._plan is None else self._plan.words(taken)
         html = page(self._found, self._sections, drawings, name, state, said)
         self._written += 1
         write_atomic(self.page, html)  # first: what is beside it is known by it to be ours

@@ -163,8 +163,7 @@ class Identification(Summary):
 
 
 def residuals(robot: Robot, data: CriticalMode, between: tuple[float, float] | None = None) -> Array:
-    """Computed numbers less the data, over their tolerance, shape (N,); the pitchfork is that of an interval of k1
-    (N*m/rad), by default the interval of the data."""
+    """Computed numbers less the data, over their tolerance, shape (N,), of a pitchfork ``between`` two k1, N*m/rad."""
     count = robot.body.modules
     if len(data.components) != count - 1:
         problem = f"must be {count - 1} numbers, one for each joint of {robot.name}"
@@ -246,12 +245,11 @@ def _scale(robot: Robot, data: CriticalMode) -> Array:
 
 
 class _Residuals:
-    """Residuals and their derivatives over the constants in units of :func:`_scale`, each computed once."""
+    """Residuals, each computed once, and their derivatives over the constants in units of :func:`_scale`."""
 
     def __init__(self, robot: Robot, data: CriticalMode) -> None:
         self._robot, self._data, self._scale = robot, data, _scale(robot, data)
         self._values: dict[bytes, Array] = {}
-        self._slopes: dict[bytes, Array] = {}
 
     def __call__(self, scaled: Array) -> Array:
         key = scaled.tobytes()
@@ -261,16 +259,11 @@ class _Residuals:
 
     def jacobian(self, scaled: Array) -> Array:
         """Forward differences, shape (N, 3), of the same pitchfork, which takes a third of the time of a search."""
-        key = scaled.tobytes()
-        if key not in self._slopes:
-            here = self(scaled)
-            k1 = self._data.k1 + here[0] * self._data.k1_tolerance
-            beside = [
-                residuals(with_constants(self._robot, step * self._scale), self._data, (0.99 * k1, 1.01 * k1))
-                for step in scaled + _STEP * np.eye(len(FREE))
-            ]
-            self._slopes[key] = ((np.array(beside) - here) / _STEP).T
-        return self._slopes[key]
+        here, steps = self(scaled), scaled + _STEP * np.eye(len(FREE))
+        k1 = self._data.k1 + here[0] * self._data.k1_tolerance
+        robots = [with_constants(self._robot, step * self._scale) for step in steps]
+        beside = np.array([residuals(robot, self._data, (0.99 * k1, 1.01 * k1)) for robot in robots])
+        return ((beside - here) / _STEP).T
 
 
 def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -283,7 +276,7 @@ def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArr
     within = {
         "type": "ineq",
         "fun": lambda scaled: np.concatenate([1.0 - off(scaled), 1.0 + off(scaled)]),
-        "jac": lambda scaled: np.concatenate([-off.jacobian(scaled), off.jacobian(scaled)]),
+        "jac": lambda scaled: np.kron([[-1.0], [1.0]], off.jacobian(scaled)),
     }
     bounds = list(zip(_LEAST, _MOST, strict=True))
     ends: dict[tuple[int, int], Array] = {}
