@@ -80,8 +80,10 @@ def test_another_branch_is_refused_in_one_line(saved, extra, expected):
     assert (saved / "branch.nc").read_bytes() == before
 
 
-def test_no_branch_to_resume(tmp_path):
-    code, _, err = run(*ROBOT, "--resume", tmp_path / "none")
-    assert code == 2
-    assert "branch.nc" in err
-    assert not (tmp_path / "none").exists()
+def test_no_branch_to_resume(saved):
+    beside, misspelt = saved.parent, saved.parent / f"{saved.name}s"
+    nearest = f"; did you mean '{saved.name}'?"
+    for folder, missing, more in ((beside, beside / "branch.nc", ""), (misspelt, misspelt, nearest)):
+        code, out, err = run(*ROBOT, "--resume", folder)
+        assert (code, out, len(err.splitlines())) == (2, "", 1)
+        assert f"{missing}: does not exist{more}" in err

@@ -23,10 +23,11 @@ def test_another_robot_is_refused_in_one_line(capsys):
     assert "takes no robot and no --set" in " ".join(capsys.readouterr().out.split())
 
 
-def test_the_json_names_the_robots(tmp_path):
-    found = printed("reproduce", "--only", "mode", "--out", tmp_path, "--json")
+def test_the_json_names_the_robots_and_has_the_rows_of_that_size(tmp_path):
+    found = printed("reproduce", "--tiny", "--only", "modules", "--out", tmp_path, "--json")
     assert (found["robot"], found["whole_robot"]) == ("aoi2022-planar", "aoi2022")
-    assert found["rows"]
+    (row,) = found["rows"]
+    assert "7 to 7 modules" in row["quantity"]
 
 
 def test_a_page_that_is_no_report_is_not_replaced(capsys, tmp_path):

@@ -79,10 +79,14 @@ def test_the_plan_says_what_a_report_has_and_how_long_it_takes(monkeypatch):
         (Size.MAIN, "one headline of every chapter beyond", "--all adds"),
         (Size.FULL, "everything beyond", ""),
     ):
-        said = duration.plan(chosen(size=size), size)
-        assert re.search(rf"{words}.*: about [\d.]+ (minutes|hours) here", said)
-        assert (larger in said) if larger else ("--all" not in said)
-    assert duration.plan([MODE], Size.FULL, named=True) == "1 of all sections: less than a minute."
+        planned = duration.plan(chosen(size=size), size)
+        for said, lasting in (
+            (planned.words(), r": about [\d.]+ (minutes|hours) here"),
+            (planned.words(180.0), "; it took about 3 min"),
+        ):
+            assert re.search(rf"{words}.*{lasting}", said)
+            assert (larger in said) if larger else ("--all" not in said)
+    assert duration.plan([MODE], Size.FULL, named=True).words() == "1 of all sections: less than a minute."
     assert set(duration.SECONDS) <= set(REGISTRY)
 
 

@@ -310,7 +310,9 @@ def test_a_client_that_is_killed_takes_its_workers_along_and_loses_nothing(tmp_p
 
 
 @pytest.mark.parametrize("seed", KILLS)
-def test_a_scheduler_that_is_killed_ends_in_one_line_and_loses_nothing(scheduler, tmp_path, uninterrupted, seed):
+def test_a_scheduler_that_is_killed_ends_in_one_line_and_loses_nothing(
+    scheduler, controllers, tmp_path, uninterrupted, seed
+):
     address, process, worker = scheduler
     worker()
     folder = tmp_path / "trials"
@@ -321,8 +323,12 @@ def test_a_scheduler_that_is_killed_ends_in_one_line_and_loses_nothing(scheduler
             process.kill()
             process.wait()
 
-    with waited_for_workers(address) as there, pytest.raises(ClusterError, match="the scheduler was lost"):
-        run(TRIALS, folder, kill, there)
+    with waited_for_workers(address) as there:
+        # A controller that its worker cannot import is one line, and it goes on.
+        with pytest.raises(ParameterError, match="somebodys_own"):
+            run([replace(BASE, duration=3.0, controller=controllers.Counted(""))], executor=there)
+        with pytest.raises(ClusterError, match="the scheduler was lost"):
+            run(TRIALS, folder, kill, there)
     assert resumed_as_if_nothing_was(folder, uninterrupted) > moment * len(TRIALS)
 
 
@@ -369,14 +375,6 @@ def test_a_batch_that_kills_its_workers_is_named_when_all_else_is_done(cluster, 
 def test_a_fault_of_a_controller_is_what_it_would_be_here(cluster, controllers):
     with pytest.raises(AnalysisError, match="ZeroDivisionError: no way"):
         run([replace(BASE, duration=3.0, controller=controllers.Faulty(""))], executor=cluster)
-
-
-def test_a_controller_that_workers_cannot_import_is_one_line(scheduler, controllers):
-    address, _, worker = scheduler
-    worker()
-    trial = replace(BASE, duration=3.0, controller=controllers.Counted(""))
-    with waited_for_workers(address) as there, pytest.raises(ParameterError, match="somebodys_own"):
-        run([trial], executor=there)
 
 
 def test_a_worker_of_another_version_is_refused(scheduler, tmp_path):

@@ -17,7 +17,7 @@ import xarray as xr
 from chilopod import stability, units
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family, interval_text
 from chilopod.engine import Status
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, unsealed
 from chilopod.planar.along import FollowedModel, walk_means
@@ -207,7 +207,9 @@ def read_walks(path: str | Path) -> xr.Dataset:
     try:
         data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")
     except FileNotFoundError:
-        raise ParameterError("cannot be read (No such file or directory)", source=str(path)) from None
+        missing, like = (path, f"*{path.suffix}") if path.parent.is_dir() else (path.parent, f"*/{path.name}")
+        names = (found.relative_to(missing.parent).parts[0] for found in sorted(missing.parent.glob(like)))
+        raise ParameterError("does not exist", source=str(missing), nearest=nearest_name(missing.name, names)) from None
     except UnsoundError as error:
         raise ParameterError(str(error), source=str(path)) from None
     if data.attrs.get("version") != VERSION:

@@ -136,7 +136,7 @@ def _computed(
             progress_bar("reproduce") as progress,
             Report(sections, context, options.out, progress, said) as report,
         ):
-            typer.echo(said, err=options.as_json)
+            typer.echo(said.words(), err=options.as_json)
             typer.echo(f"The page is {report.page.resolve()}", err=options.as_json)
             computed.reproduce(sections, context, progress, add)
     except OutputError as error:

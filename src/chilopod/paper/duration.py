@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from chilopod.paper.registry import chosen
@@ -48,18 +48,32 @@ _IN_FULL: Final = {
 }
 
 
-def plan(sections: Sequence[Section[Any]], size: Size, named: bool = False) -> str:
-    """Kind of a report of a size, its duration here, and additions of a larger one; ``named`` for named sections."""
+@dataclass(frozen=True)
+class Plan:
+    """Kind of a report, its expected duration here, and additions of a larger one, in words."""
+
+    what: str
+    expected: str
+    larger: str = ""
+
+    def words(self, taken: float | None = None) -> str:
+        """All of it; of a report that is done, what it has taken (s) in place of the expected duration."""
+        duration = f": {self.expected}" if taken is None else f"; it took {in_words(taken)}"
+        return f"{self.what}{duration}.{self.larger}"
+
+
+def plan(sections: Sequence[Section[Any]], size: Size, named: bool = False) -> Plan:
+    """Plan of a report of a size; ``named`` for named sections."""
     what = f"{len(sections)} of all sections" if named else f"{size.value[0].upper()}{size.value[1:]}"
     own = seconds(sections, size)
     if own < _SHORT:
-        return f"{what}: {in_words(own)}."
+        return Plan(what, in_words(own))
     here = pace()
-    said = f"{what}: {in_words(here * own)} here, less where trials are kept."
+    expected = f"{in_words(here * own)} here, less where trials are kept"
     if named or size not in _IN_FULL:
-        return said
+        return Plan(what, expected)
     larger = list(Size)[list(Size).index(size) - 1]
-    return f"{said} {_IN_FULL[size]}: {in_words(here * seconds(chosen(size=larger), larger))}."
+    return Plan(what, expected, f" {_IN_FULL[size]}: {in_words(here * seconds(chosen(size=larger), larger))}.")
 
 
 def seconds(sections: Sequence[Section[Any]], size: Size) -> float:

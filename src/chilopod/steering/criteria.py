@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.steering.target import ARRIVAL_RADIUS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Outcome(Labelled):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod.frozen import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SAME_INSTANT = 1e-9  # s
 _NONE = np.zeros(0)

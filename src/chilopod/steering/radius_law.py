@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from chilopod import units
 from chilopod.errors import AnalysisError, ParameterError
@@ -100,6 +98,8 @@ class RadiusLaw(ReadOnlyArrays):
         AnalysisError
             If no value within the law gives the radius.
         """
+        from scipy.optimize import brentq
+
         if not radius >= self.tightest:
             softest = units.format(float(self.values[0]), self.unit, digits=4)
             allowed = f"{self.tightest:.4g} m (at {softest}) and more"
@@ -112,4 +112,6 @@ class RadiusLaw(ReadOnlyArrays):
         return float(brentq(lambda value: self._squared_curvature(value) - wanted, low, high, xtol=1e-12 * high))
 
     def _squared_curvature(self, value: float) -> float:
+        from scipy.interpolate import PchipInterpolator
+
         return float(PchipInterpolator(self.values, 1.0 / self.radii**2)(value))

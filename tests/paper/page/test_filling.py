@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from chilopod.cli import main
 from chilopod.errors import OutputError
 from chilopod.paper import registry
+from chilopod.paper.duration import Plan
 from chilopod.paper.page import Report, write_report
 from chilopod.paper.page.page import Drawings, Film, State, page
 from chilopod.paper.section import Context, Found, Section, reproduce
@@ -64,9 +65,10 @@ def text(report):
 
 
 def test_page_is_there_before_anything_is_computed(tmp_path):
-    with Report([ONE, TWO], CONTEXT, tmp_path) as report:
+    with Report([ONE, TWO], CONTEXT, tmp_path, plan=Plan("All", "an hour")) as report:
         html = text(report)
         assert RUNNING in html
+        assert "All: an hour." in html
         assert "0 of 2 sections" in html
         assert re.findall("Still to come:</b> (.*).</p>", html) == ["the first", "the second"]
 
@@ -74,10 +76,12 @@ def test_page_is_there_before_anything_is_computed(tmp_path):
 def test_the_first_lines_say_what_is_computed_and_where_the_page_is(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(registry, "load_sections", lambda: (ONE,))
     assert main(["reproduce", "--out", str(tmp_path)]) == 0
-    plan, page, *_ = capsys.readouterr().out.splitlines()
-    assert plan.startswith("The paper's own experiments, and one headline of every chapter beyond")
+    said, page, *_ = capsys.readouterr().out.splitlines()
+    what, _, expected = said.partition(":")
+    assert what.startswith("The paper's own experiments, and one headline of every chapter beyond")
+    assert expected == " less than a minute."
     assert page == f"The page is {tmp_path / 'index.html'}"
-    assert plan in PAGE((tmp_path / "index.html").read_text(encoding="utf-8")).text
+    assert f"{what}; it took less than a minute." in PAGE((tmp_path / "index.html").read_text(encoding="utf-8")).text
 
 
 def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):

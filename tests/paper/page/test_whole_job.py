@@ -12,7 +12,6 @@ from chilopod.paper.fit_data import critical_mode_data, variant_settings
 from chilopod.paper.registry import load_sections
 from chilopod.paper.straight.sections import IDENTIFICATION
 from chilopod.tasks.identify import planar
-from helpers.command_line import printed
 from helpers.html_page import Page as PAGE
 
 HERE = Path(__file__).parent
@@ -140,8 +139,3 @@ def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
     assert set(variant_settings()) < set(found.profile.data_vars)
     result = found.as_json()
     assert set(result["constants"]) == set(planar.FREE)
-
-
-def test_from_the_command_line(tmp_path):
-    (row,) = printed("reproduce", "--tiny", "--only", "modules", "--out", tmp_path, "--json")["rows"]
-    assert "7 to 7 modules" in row["quantity"]

@@ -22,7 +22,7 @@ def test_residuals_need_the_number_of_modules_of_the_data():
 
 def test_a_robot_without_a_pitchfork_is_refused(monkeypatch):
     # Of such a robot every search ends where it began.
-    monkeypatch.setattr(planar, "residuals", lambda robot, data: np.full(6, planar._NO_PITCHFORK))
+    monkeypatch.setattr(planar, "residuals", lambda *_: np.full(6, planar._NO_PITCHFORK))
     with pytest.raises(AnalysisError, match="must have a pitchfork on its straight walk"):
         planar.identify_planar(ROBOT, DATA)
 

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from chilopod.errors import OutputError
 from chilopod.output import check_files, check_folder, write_atomic
 from chilopod.paper.curved.sections import CURVED
+from chilopod.paper.duration import Plan
 from chilopod.paper.page.headline import pitchfork
 from chilopod.paper.page.page import Drawings, Drawn, Film, Shown, State, page
 from chilopod.paper.robot.sections import WALKS
@@ -47,8 +48,8 @@ class Report:
 
     As a context manager it writes the page on entry and completes it on exit. Meanwhile ``news.js`` announces new
     results. Figures are drawn in a thread beside the computation of the next section, and ``progress`` receives the
-    fraction drawn. The page begins with ``plan``, see :func:`chilopod.paper.duration.plan`. It creates a missing
-    folder.
+    fraction drawn. The page begins with ``plan``, and when it is done with the duration in place of the expected
+    one. It creates a missing folder.
 
     Raises
     ------
@@ -62,7 +63,7 @@ class Report:
         context: Context,
         folder: str | Path,
         progress: SectionProgress = lambda what, done, words: None,
-        plan: str = "",
+        plan: Plan | None = None,
     ) -> None:
         self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
@@ -79,6 +80,7 @@ class Report:
         self._thread = ThreadPoolExecutor(1, "drawing")
 
     def __enter__(self) -> Report:
+        self._begun = time.perf_counter()
         self._write(State.RUNNING)
         self._opened = self._thread.submit(self._open)
         self._alive = Thread(target=self._tell, daemon=True)
@@ -186,7 +188,9 @@ class Report:
         waiting = [section for section in self._sections if section not in self._found]
         waiting += [section for section, _ in self._films]
         drawings = Drawings(self._headline, self._opening, shown, self.failures, waiting)
-        html = page(self._found, self._sections, drawings, name, state, self._plan)
+        taken = time.perf_counter() - self._begun if state is State.DONE else None
+        said = "" if self._plan is None else self._plan.words(taken)
+        html = page(self._found, self._sections, drawings, name, state, said)
         self._written += 1
         write_atomic(self.page, html)  # first: what is beside it is known by it to be ours
         write_atomic(robot_file, context.robot.to_toml())

@@ -249,7 +249,9 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
     progress(1.0, "planar limit by growth")
     data.attrs = {
         "robot": robot.name,
-        "vouched": limit_point(robot, planar, FINER if size is Size.FULL else PLANAR, folder, size.cut(_DURATION, 9.0)),
+        "vouched": limit_point(
+            robot, planar, FINER if size is Size.FULL else PLANAR, folder, size.cut(_DURATION, 12.0)
+        ),
         "exact": pitchfork(planar, normal_form=False).value,
         "limit": points[frozenset()],
         "twin": points[every],

@@ -162,14 +162,14 @@ class Identification(Summary):
         return axes
 
 
-def residuals(robot: Robot, data: CriticalMode) -> Array:
-    """Computed numbers less the data, over their tolerance, shape (N,)."""
+def residuals(robot: Robot, data: CriticalMode, between: tuple[float, float] | None = None) -> Array:
+    """Computed numbers less the data, over their tolerance, shape (N,), of a pitchfork ``between`` two k1, N*m/rad."""
     count = robot.body.modules
     if len(data.components) != count - 1:
         problem = f"must be {count - 1} numbers, one for each joint of {robot.name}"
         raise AnalysisError(problem, field="data components", value=data.components)
     try:
-        points = bifurcations(robot, K1, (data.between[0], data.between[1]), normal_form=False)
+        points = bifurcations(robot, K1, between or (data.between[0], data.between[1]), normal_form=False)
     except AnalysisError:
         points = []
     points = [each for each in points if each.point.kind is Kind.PITCHFORK]
@@ -245,7 +245,7 @@ def _scale(robot: Robot, data: CriticalMode) -> Array:
 
 
 class _Residuals:
-    """Residuals and their derivatives over the constants in units of :func:`_scale`, each computed once."""
+    """Residuals, each computed once, and their derivatives over the constants in units of :func:`_scale`."""
 
     def __init__(self, robot: Robot, data: CriticalMode) -> None:
         self._robot, self._data, self._scale = robot, data, _scale(robot, data)
@@ -258,9 +258,12 @@ class _Residuals:
         return self._values[key]
 
     def jacobian(self, scaled: Array) -> Array:
-        """Forward differences, shape (N, 3)."""
-        here = self(scaled)
-        return np.stack([(self(scaled + _STEP * each) - here) / _STEP for each in np.eye(len(FREE))], axis=1)
+        """Forward differences, shape (N, 3), of the same pitchfork, which takes a third of the time of a search."""
+        here, steps = self(scaled), scaled + _STEP * np.eye(len(FREE))
+        k1 = self._data.k1 + here[0] * self._data.k1_tolerance
+        robots = [with_constants(self._robot, step * self._scale) for step in steps]
+        beside = np.array([residuals(robot, self._data, (0.99 * k1, 1.01 * k1)) for robot in robots])
+        return ((beside - here) / _STEP).T
 
 
 def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -273,7 +276,7 @@ def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArr
     within = {
         "type": "ineq",
         "fun": lambda scaled: np.concatenate([1.0 - off(scaled), 1.0 + off(scaled)]),
-        "jac": lambda scaled: np.concatenate([-off.jacobian(scaled), off.jacobian(scaled)]),
+        "jac": lambda scaled: np.kron([[-1.0], [1.0]], off.jacobian(scaled)),
     }
     bounds = list(zip(_LEAST, _MOST, strict=True))
     ends: dict[tuple[int, int], Array] = {}
@@ -309,8 +312,7 @@ def _valley(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, float
 def _fit(robot: Robot, data: CriticalMode, start: Array) -> tuple[Array, Array]:
     """Least squares over the constants; returns these and the residuals."""
     off, scale = _Residuals(robot, data), _scale(robot, data)
-    how = {"bounds": (_LEAST, _MOST), "x_scale": 0.1, "diff_step": 1e-5, "xtol": 1e-9}
-    answer = least_squares(off, start / scale, **how)
+    answer = least_squares(off, start / scale, off.jacobian, (_LEAST, _MOST), x_scale=0.1, xtol=1e-9)
     return answer.x * scale, np.asarray(answer.fun)
 
 
@@ -330,8 +332,9 @@ def _smallest(robot: Robot, data: CriticalMode, start: Array) -> Array:
         return np.hstack([np.concatenate([-found, found]), np.ones((2 * len(found), 1))])
 
     near = least_squares(
-        lambda free: off(all_of(free)), start[:2] / scale[:2], bounds=(_LEAST[:2], _MOST[:2]), x_scale=0.1
-    ).x
+        lambda free: off(all_of(free)), start[:2] / scale[:2], lambda free: off.jacobian(all_of(free))[:, :2],
+        (_LEAST[:2], _MOST[:2]), x_scale=0.1,
+    ).x  # fmt: skip
     last = np.array([0.0, 0.0, 1.0])
     found = minimize(
         lambda free: free[2], np.append(near, np.abs(off(all_of(near))).max()), jac=lambda free: last,
