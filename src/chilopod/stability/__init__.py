@@ -9,7 +9,6 @@ False
 
 from chilopod.flows.called import NotAnalytic
 from chilopod.flows.events import Event
-from chilopod.flows.implicit.flow import Stretched
 from chilopod.flows.jumps import UndeclaredSwitch
 from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, proceed, switch
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
@@ -88,7 +87,6 @@ __all__ = [
     "SpecialPoint2",
     "Start",
     "Start2",
-    "Stretched",
     "SymmetricCrossing",
     "SymmetricKind",
     "SystemLike",

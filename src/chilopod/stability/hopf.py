@@ -121,9 +121,13 @@ def locate_hopf(
     if last.value == at < high and not pieces[-1].ending:
         status = SearchStatus.BUDGET
         remarks.append(f"the budget was spent before the orbit was followed beyond {at:.9g}")
-    points, said = tuple(point for each in pieces for point in each), tuple(dict.fromkeys(map(_of_equilibria, remarks)))
-    searched, ending = (low, pieces[-1].searched[1]), _of_equilibria(pieces[-1].ending)
-    return Located(points, status, said, budget - left, searched, ending)
+    points: list[BifurcationPoint] = []
+    for each in pieces:  # a point on the border of two is found in both
+        points += [
+            new for new in each if all(new.value - old.value > new.error_bound + old.error_bound for old in points)
+        ]
+    said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(pieces[-1].ending)
+    return Located(tuple(points), status, said, budget - left, (low, pieces[-1].searched[1]), ending)
 
 
 def _piece(

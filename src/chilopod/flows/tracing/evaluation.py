@@ -29,31 +29,26 @@ def evaluate(tape: Tape, nodes: Integers, t: Any, x: Any, params: Array) -> Arra
 
 def evaluate_jacobian(tape: Tape, t: float, x: Array, params: Array) -> tuple[Array, Array]:
     """dx/dt, shape (n,), and its derivative with respect to the state, shape (n, n)."""
-    from chilopod.flows.tracing import series
-
-    slope, jacobian = np.empty(tape.dimension), np.empty((tape.dimension, tape.dimension))
-    series.differentiate(tape, np.array(params, dtype=np.float64), float(t), np.array(x, float), slope, jacobian)
-    return slope, jacobian
+    found = evaluate_series(tape, np.stack([np.tile(x, (x.size, 1)), np.eye(x.size)], axis=1), params, t, False)
+    return found[0, 0], found[:, 1].T.copy()
 
 
-def evaluate_series(tape: Tape, curves: Array, params: Array) -> Array:
-    """Taylor coefficients in s of f(x(s)) at time 0, shape (curves, orders, n), along the curves x(s) = c0 + c1 s + ...
-    with these coefficients, of the same shape. Raises AnalysisError if a curve starts on a switching surface."""
+def evaluate_series(tape: Tape, curves: Array, params: Array, t: float = 0.0, smooth: bool = True) -> Array:
+    """Taylor coefficients in s of f(t, x(s)), shape (curves, orders, n), along the curves x(s) = c0 + c1 s + ... with
+    these coefficients, of the same shape; AnalysisError if one starts on a switching surface, where f is not smooth."""
     from chilopod.flows.tracing import series
 
     kinds, surfaces = tape.switches[:2]
     result, branches = np.empty(curves.shape), np.zeros(kinds.size)
     for curve, out in zip(np.array(curves, dtype=np.float64), result, strict=True):
         if kinds.size:
-            functions = evaluate(tape, surfaces, 0.0, curve[0], params)
+            functions = evaluate(tape, surfaces, t, curve[0], params)
             branches = branches_of(tape, functions)
-            if ((functions == np.where(kinds == ops.FLOOR, branches, 0.0)) & (kinds != ops.GUARD)).any():
-                raise AnalysisError(
-                    "has no derivatives in a state on a switching surface",
-                    field="rhs",
-                    allowed="an equilibrium away from it",
-                )
-        series.compose(tape, np.array(params, dtype=np.float64), curve, branches, out)
+            there = (functions == np.where(kinds == ops.FLOOR, branches, 0.0)) & (kinds != ops.GUARD)
+            if smooth and there.any():
+                said = "has no derivatives in a state on a switching surface"
+                raise AnalysisError(said, field="rhs", allowed="an equilibrium away from it")
+        series.compose(tape, np.array(params, dtype=np.float64), float(t), curve, branches, out)
     return result
 
 
