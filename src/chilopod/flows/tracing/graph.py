@@ -259,14 +259,3 @@ class Graph:
         """The operands of a node, weights included."""
         code, operands = self.nodes[node]
         return [] if code in LEAVES else list(operands)
-
-    def parameters_below(self, node: int) -> frozenset[int]:
-        """Numbers of the parameters that a node depends on."""
-        seen: set[int] = set()
-        ahead = [node]
-        while ahead:
-            node = ahead.pop()
-            if node not in seen:
-                seen.add(node)
-                ahead += self.operands(node)
-        return frozenset(self.nodes[i][1][0] for i in seen if self.nodes[i][0] == ops.PARAMETER)

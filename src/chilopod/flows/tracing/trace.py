@@ -17,7 +17,7 @@ from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.graph import Graph
 from chilopod.flows.tracing.ordering import ordered
 from chilopod.flows.tracing.tape import Tape
-from chilopod.flows.tracing.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
+from chilopod.flows.tracing.traced import Traced, Untraceable, as_traced, node_of, states
 from chilopod.frozen import Array
 
 _MOST_NODES = 200_000
@@ -35,8 +35,7 @@ class Trace:
     derived: dict[Any, Any]  # cache of results that depend on the tape alone
 
 
-_Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], tuple[Tape, dict[Any, Any]]]]]
-_KEPT: weakref.WeakKeyDictionary[types.CodeType, _Kept] = weakref.WeakKeyDictionary()
+_KEPT: weakref.WeakKeyDictionary[types.CodeType, dict[Any, tuple[Tape, dict[Any, Any]]]] = weakref.WeakKeyDictionary()
 
 
 def trace(
@@ -50,9 +49,10 @@ def trace(
 ) -> Trace:
     """Record the operations of a right-hand side, once for all values of its floats.
 
-    Floats in ``args``, alone or in arrays, tuples and lists, are parameters of the tape. ``events`` are pairs of a
-    guard and a reset or None; the tape is compared with the function between some times and around a state ``base``.
-    Raises Untraceable if the function is not a fixed sequence of known operations, or disagrees with the tape.
+    Floats in ``args``, alone or in arrays, tuples and lists, are parameters of the tape, or numbers if the function
+    needs their values, as in a branch. ``events`` are pairs of a guard and a reset or None; the tape is compared with
+    the function between some times and around a state ``base``. Raises Untraceable if the function is not a fixed
+    sequence of known operations, or disagrees with the tape.
     """
     functions = (rhs, *(part for event in events for part in event))
     floats: list[float] = []
@@ -62,59 +62,38 @@ def trace(
     try:
         key = (dimension, describe(functions, floats, seen), describe(args, floats, seen))
         kept = _KEPT.setdefault(code, {}) if code is not None else {}
-        baked, tapes = kept.get(key, ((), {}))
+        known = kept.get(key)
     except (Opaque, TypeError, ValueError):  # not hashable, an empty cell
-        key, floats, baked, tapes, kept = None, [], (), {}, {}
-    values = np.array(floats)
-    known = tapes.get(tuple(floats[i] for i in baked))
+        key, floats, known, kept = None, [], None, {}
+    known = known or kept.get((key, *floats))
     if known is None:
-        before = baked
-        tape, baked = _traced(functions, dimension, args, floats, key is not None, baked)
-        _verify(tape, _open(values, baked), rhs, args, times, base)
+        try:
+            tape = _traced(functions, dimension, args, len(floats))
+        except Untraceable:
+            if not floats:
+                raise
+            tape = _traced(functions, dimension, args, 0)
+        _verify(tape, np.array(floats[: tape.parameters]), rhs, args, times, base)
         known = tape, {}
         if key is not None:
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
-            if baked != before or len(tapes) >= _MOST_KEPT:
-                tapes = {}
-            tapes[tuple(floats[i] for i in baked)] = known
-            kept[key] = (baked, tapes)
-    return Trace(known[0], _open(values, baked), known[1])
+            kept[key if tape.parameters else (key, *floats)] = known
+    return Trace(known[0], np.array(floats[: known[0].parameters]), known[1])
 
 
-def _open(values: Array, baked: tuple[int, ...]) -> Array:
-    return np.delete(values, baked) if baked else values
-
-
-def _traced(
-    functions: tuple[Any, ...],
-    dimension: int,
-    args: tuple[Any, ...],
-    floats: list[float],
-    symbolic: bool,
-    baked: tuple[int, ...],
-) -> tuple[Tape, tuple[int, ...]]:
-    """Trace with all floats as parameters, then with needed values as numbers."""
-    everything = tuple(range(len(floats)))
-    while True:
-        graph = Graph(dimension, len(floats) - len(baked) if symbolic else 0)
-        unbaked = iter(graph.parameters)
-        source = [floats[i] if i in baked else Traced(graph, next(unbaked)) for i in everything]
-        try:
-            return _record(graph, functions, dimension, args, iter(source) if symbolic else None), baked
-        except Concrete as needed:
-            places = [i for i in everything if i not in baked]
-            baked = tuple(sorted({*baked, *(places[i] for i in needed.parameters)}))
-        except Untraceable:
-            if not symbolic or baked == everything:
-                raise
-            baked = everything
-        except RecursionError:
-            raise Untraceable("it is too deeply nested") from None
-        except Exception as error:  # any exception of a user's function means the same
-            if not symbolic or baked == everything:
-                raise Untraceable(f"{type(error).__name__}: {error}") from None
-            baked = everything
+def _traced(functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], floats: int) -> Tape:
+    """The tape, with a number of floats as parameters, or none."""
+    graph = Graph(dimension, floats)
+    source = iter([Traced(graph, node) for node in graph.parameters]) if floats else None
+    try:
+        return _record(graph, functions, dimension, args, source)
+    except Untraceable:
+        raise
+    except RecursionError:
+        raise Untraceable("it is too deeply nested") from None
+    except Exception as error:  # any exception of a user's function means the same
+        raise Untraceable(f"{type(error).__name__}: {error}") from None
 
 
 def _record(

@@ -160,13 +160,9 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
     """The fold that a followed orbit begins or ends in."""
     orbit = Orbit(fold.image.state, fold.image, np.zeros(fold.image.state.size))
     crossing = Crossing(fold.value, (fold.value, fold.value), Event.PLUS, 1, 1, 1.0 + 0.0j)
-    system, place, formed = (
-        samples.family(fold.value),
-        (fold.value, fold.error_bound),
-        _formed(samples, fold.value, orbit),
-    )
+    place, formed = (fold.value, fold.error_bound), _formed(samples, fold.value, orbit)
     about: dict[str, Any] = {"kind": Kind.FOLD, "with_normal_form": with_normal_form}
-    return described(system, place, orbit, crossing, None, formed, **about)
+    return described(samples.family(fold.value), place, orbit, crossing, None, formed, **about)
 
 
 def _orbit(samples: Samples, value: float) -> Orbit:
