@@ -234,7 +234,7 @@ def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: f
     if shapes[:2] != [(n,), (n, n)] or shapes[2:] not in ([], [()], [(n, n)]):
         said = f"gives shapes {' and '.join(map(str, shapes))}"
         raise AnalysisError(said, field="flow", allowed=f"({n},) and ({n}, {n})")
-    parts = [numbers(each, shape, "flow") for each, shape in zip(found, shapes, strict=True)]
+    parts = [numbers(each, np.shape(each), "flow") for each in found]
     return tuple(each if each.ndim else float(each) for each in parts)
 
 

@@ -26,12 +26,12 @@ def split_stiff(system: FlowsVolumes, x: Array, image: ReturnMap) -> tuple[Compl
     """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and the errors of the
     logarithms; AnalysisError if more than one direction decays too fast to be resolved."""
     cut = moderate_cut(system, x, image, unresolved=1)
-    factors, slow = np.array(cut.factors), cut.sections[0].shape[1] - 1
+    slow = cut.sections[0].shape[1] - 1
     values, modes, errors = np.empty(0, np.complex128), np.empty((slow + 1, 0), np.complex128), np.zeros(slow)
     if slow:
-        values, modes = split_leading(factors, slow)
-        for drawn in disturbed(factors, np.array(cut.errors), _DRAWS):
-            others = np.abs(values[:, None] - split_leading(drawn, slow)[0])
+        values, modes = split_leading(cut.factors, slow)
+        for drawn in disturbed(np.array(cut.factors), np.array(cut.errors), _DRAWS):
+            others = np.abs(values[:, None] - split_leading(list(drawn), slow)[0])
             errors = np.maximum(errors, SAFETY * others.min(axis=1))
     growth, error = system.flow_volume(x, 0.0, float(cut.times[-1]))
     turned = system.symmetry is not None and np.linalg.det(system.symmetry) < 0.0
