@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.flows.tracing.environment import Opaque, describe, python_function, rebuild
-from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.graph import Graph
 from chilopod.flows.tracing.ordering import ordered
-from chilopod.flows.tracing.tape import Tape
+from chilopod.flows.tracing.tape import Tape, evaluate
 from chilopod.flows.tracing.traced import Traced, Untraceable, as_traced, node_of, states
 from chilopod.frozen import Array
 

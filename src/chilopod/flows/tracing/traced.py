@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.flows.tracing.elementary import BUILDS
-from chilopod.flows.tracing.graph import Graph
+from chilopod.flows.tracing.graph import BUILDS, Graph
 
 
 class Untraceable(Exception):

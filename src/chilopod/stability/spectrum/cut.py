@@ -23,19 +23,17 @@ _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, ab
 
 @dataclass(frozen=True)
 class Cut:
-    """A return in parts, with orthonormal bases at the borders: of the planes across the motion, or of the space."""
+    """A return in parts, between planes across the motion if a system does not depend on time."""
 
-    times: Array  # times of the borders, shape (parts + 1,)
-    states: Array  # states there, shape (parts + 1, n)
     units: Array  # sizes of the states, shape (n,)
-    sections: Sequence[Array]  # bases, in units
-    factors: Sequence[Array]  # derivatives of the flow over the parts in these, the last one with the symmetry in time
+    section: Array  # orthonormal basis of the first plane, or of the space, in units
+    factors: Sequence[Array]  # derivatives of the flow over the parts, the last one with the symmetry in time
     errors: Sequence[Array]  # bounds on the errors of their entries
 
     @property
     def basis(self) -> Array:
-        """The first section in the units of the system."""
-        return self.units[:, None] * self.sections[0]
+        """The first plane in the units of the system."""
+        return self.units[:, None] * self.section
 
 
 @dataclass(frozen=True)
@@ -65,8 +63,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
         product = np.linalg.multi_dot([turn_in_units(system, units), *(part.factor for part in reversed(parts))])
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
             error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
-            times = np.array([0.0, duration])
-            return Cut(times, np.array([x, image.state]), units, [np.eye(x.size)] * 2, [whole], [error])
+            return Cut(units, np.eye(x.size), [whole], [error])
     return _on_sections(system, x, _of_moderate_condition(system, x, parts, units, unresolved), units)
 
 
@@ -112,13 +109,11 @@ def _of_moderate_condition(
 
 
 def _on_sections(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> Cut:
-    states = [x, *(part.state for part in parts)]
-    sections = [section_basis(system, state, units) for state in states[:-1]]
-    sections.append(sections[0])
+    states = [x, *(part.state for part in parts[:-1])]
+    sections = [section_basis(system, state, units) for state in states]
     turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
     factors, errors = [], []
-    for part, turn, (before, after) in zip(parts, turns, itertools.pairwise(sections), strict=True):
+    for part, turn, (before, after) in zip(parts, turns, itertools.pairwise([*sections, sections[0]]), strict=True):
         factors.append(after.T @ turn @ part.factor @ before)
         errors.append(np.abs(after.T) @ np.abs(turn) @ part.error @ np.abs(before))
-    times = np.array([0.0, *(part.end for part in parts)])
-    return Cut(times, np.array(states), units, sections, factors, errors)
+    return Cut(units, sections[0], factors, errors)
