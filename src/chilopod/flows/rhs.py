@@ -25,8 +25,7 @@ from chilopod.flows.events import Event, check_events, checked_events
 from chilopod.flows.implicit.flow import ImplicitFlow, can_be_implicit
 from chilopod.flows.jumps import fast_parts, warn_of_jumps
 from chilopod.flows.taylor.flow import TaylorFlow
-from chilopod.flows.tracing.tape import evaluate, evaluate_jacobian, evaluate_series
-from chilopod.flows.tracing.trace import Trace, trace
+from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_jacobian, evaluate_series, trace
 from chilopod.flows.tracing.traced import Untraceable
 from chilopod.frozen import Array, read_only
 

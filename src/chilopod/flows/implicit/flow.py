@@ -16,7 +16,8 @@ from chilopod.flows.balance import numerical_balance
 from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
 from chilopod.flows.jumps import longest_step
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.tape import Tape, branches_of, evaluate, evaluate_jacobian
+from chilopod.flows.tracing.tape import Tape
+from chilopod.flows.tracing.trace import branches_of, evaluate, evaluate_jacobian
 from chilopod.frozen import Array, ReadOnlyArrays
 
 _STAGES, _OTHER_STAGES = 9, 7
