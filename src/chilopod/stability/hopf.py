@@ -177,9 +177,8 @@ def _of_map(
     frequency = abs(float(np.angle(crossing.multiplier))) / duration
     error = place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value)
     mode = vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128)
-    about: dict[str, Any] = {"period": 2.0 * np.pi / frequency, "multiplicity": crossing.multiplicity}
-    value, nu = crossing.value, crossing.multiplier
-    return BifurcationPoint(Kind.HOPF, value, error, sample.orbit, mode, nu, frequency, **about)
+    at = BifurcationPoint(Kind.HOPF, crossing.value, error, sample.orbit, mode, crossing.multiplier, frequency)
+    return replace(at, period=2.0 * np.pi / frequency, multiplicity=crossing.multiplicity)
 
 
 def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
@@ -292,8 +291,9 @@ def _hopf_point(
     decided = Criticality.SUPERCRITICAL if coefficient < 0.0 else Criticality.SUBCRITICAL
     verdict = decided if abs(coefficient) > error else Criticality.UNDECIDED
     about: dict[str, Any] = {"criticality": verdict, "coefficient": coefficient, "coefficient_error": error}
-    about |= {"period": 2.0 * np.pi / frequency, "multiplicity": 2, "rate": rate}
-    return BifurcationPoint(Kind.HOPF, value, bound, here.state, form.mode, 1j * frequency, frequency, **about)
+    about |= {"mode": form.mode, "multiplier": 1j * frequency, "frequency": frequency, "rate": rate}
+    period = 2.0 * np.pi / frequency
+    return replace(point, value=value, error_bound=bound, orbit=here.state, period=period, **about)
 
 
 def _rate(
