@@ -40,8 +40,7 @@ from chilopod.stability.problem.maps import from_map
 from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.rhs import from_rhs
-from chilopod.stability.search.locate import locate
-from chilopod.stability.search.located import Located
+from chilopod.stability.search.locate import Located, locate
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.tracing.ending import Ending

@@ -30,7 +30,7 @@ from chilopod.stability.problem.arguments import check_arguments, checked_interv
 from chilopod.stability.problem.budget import SpentError, UserCode
 from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.problem.system import PeriodicSystem
-from chilopod.stability.search.located import Found, Located, located
+from chilopod.stability.search.locate import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
