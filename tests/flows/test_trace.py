@@ -11,8 +11,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian
-from chilopod.flows.tracing.trace import trace
+from chilopod.flows.tracing.trace import evaluate, evaluate_jacobian, trace
 from chilopod.flows.tracing.traced import Untraceable
 
 STIFFNESS = 1.7

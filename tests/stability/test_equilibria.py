@@ -541,6 +541,13 @@ def test_hopf_points_are_found_where_growth_soon_exceeds_all_numbers():
     assert [abs(point.value) <= point.error_bound for point in found] == [True]
 
 
+def test_a_point_on_the_border_of_two_parts_of_an_interval_is_listed_once():
+    """The first part of an interval from 1 ends at 3.7."""
+    (point,) = found = locate_hopf(lambda p: oscillator(p - 3.7), (1.0, 9.0), [0.0, 0.0])
+    assert found.complete
+    assert abs(point.value - 3.7) <= point.error_bound < 1e-9
+
+
 @pytest.mark.parametrize("between", [(0.01, 1000.0), (0.5, 30.0)])
 def test_the_brusselator_over_decades(between):
     def family(b):

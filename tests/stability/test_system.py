@@ -168,10 +168,11 @@ def test_dimension_and_period_are_checked(dimension, period, field):
     [
         lambda x, t0, t1: (x, np.eye(3)),
         lambda x, t0, t1: (np.zeros(3), np.eye(2)),
+        lambda x, t0, t1: (x, [[1.0, 0.0], [0.0]]),
         lambda x, t0, t1: (x, np.full((2, 2), np.nan)),
         lambda x, t0, t1: (x + np.inf, np.eye(2)),
     ],
-    ids=["matrix", "state", "nan", "infinite"],
+    ids=["matrix", "state", "ragged", "nan", "infinite"],
 )
 def test_a_broken_flow_is_one_line(flow):
     system = PeriodicSystem(2, 1.0, flow, orbit=np.zeros(2))

@@ -74,6 +74,14 @@ def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
     return array
 
 
+def shape_of(value: Any) -> tuple[int, ...] | str:
+    """The shape of an array-like, or a word for rows of different lengths."""
+    try:
+        return np.shape(value)
+    except ValueError:
+        return "ragged"
+
+
 def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
     """Values of a user's function as an array of the required shape."""
     try:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
 import threading
 import time
-from contextvars import ContextVar, Token
+from contextvars import ContextVar
 from numbers import Real
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -34,9 +34,8 @@ class Deadline:
             raise ParameterError("must be a number of seconds", field="seconds", value=seconds, allowed="0 or more")
         self._ends = _now() + (seconds if seconds < threading.TIMEOUT_MAX else math.inf)
         self._stop = np.zeros(1)
-        self._token: Token[Array | None] | None = None
         self._said: set[str] = set()
-        self._before: Token[set[str] | None] | None = None
+        self._left = contextlib.ExitStack()
         self._timer: threading.Timer | None = None
 
     @property
@@ -55,23 +54,16 @@ class Deadline:
         self._stop[0] = 0.0
 
     def __enter__(self) -> Self:
-        self._before = _SAID.set(self._said if (outer := _SAID.get()) is None else outer)
+        self._left.callback(_SAID.reset, _SAID.set(self._said if (outer := _SAID.get()) is None else outer))
         if self._ends < math.inf:  # else an outer limit holds
-            self._token = _STOP.set(self._stop)
+            self._left.callback(_STOP.reset, _STOP.set(self._stop))
             self._wait()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._before is not None:
-            _SAID.reset(self._before)
-        if self._token is not None:
-            _STOP.reset(self._token)
-            self._token = None
+    def __exit__(self, *_: object) -> None:
+        self._left.close()
         if self._timer is not None:
             self._timer.cancel()
-            self._timer = None
 
     def _wait(self) -> None:
         if self.late:

@@ -22,11 +22,10 @@ from chilopod.flows.arguments import (
 from chilopod.flows.called import CalledFlow
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.events import Event, check_events, checked_events
-from chilopod.flows.implicit.flow import ImplicitFlow, Stretched, can_be_implicit
+from chilopod.flows.implicit.flow import ImplicitFlow, can_be_implicit
 from chilopod.flows.jumps import fast_parts, warn_of_jumps
 from chilopod.flows.taylor.flow import TaylorFlow
-from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian, evaluate_series
-from chilopod.flows.tracing.trace import Trace, trace
+from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_jacobian, evaluate_series, trace
 from chilopod.flows.tracing.traced import Untraceable
 from chilopod.frozen import Array, read_only
 
@@ -53,8 +52,8 @@ class Flows(NamedTuple):
     flow_states: Callable[[Array, float, float], Array]
     # flow of some directions; None if only the whole derivative is available
     flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = None
-    # flow of an orthonormal frame, and a test for an implicit flow from a state; None if no flow is implicit
-    flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = None
+    # growth of volume, and a test for an implicit flow from a state; None if no flow is implicit
+    flow_volume: Callable[[Array, float, float], tuple[float, float]] | None = None
     is_stiff: Callable[[Array, float, float], bool] | None = None
     # Taylor coefficients of f along curves; None where f cannot be traced, or depends on time
     velocity_series: Callable[[Array], Array] | None = None
@@ -162,7 +161,7 @@ class RightHandSide:
                 stiff.flow,
                 stiff.flow_with_error,
                 stiff.flow_states,
-                flow_frame=stiff.flow_frame,
+                flow_volume=stiff.flow_volume,
                 is_stiff=lambda x, t0, t1: True,
                 concurrent=True,
             )
@@ -251,7 +250,7 @@ def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
         flow=either("flow"),
         flow_with_error=either("flow_with_error"),
         flow_states=either("flow_states"),
-        flow_frame=lambda *arguments: implicit().flow_frame(*arguments),
+        flow_volume=lambda x, t0, t1: implicit().flow_volume(x, t0, t1),
         is_stiff=is_stiff,
     )
 

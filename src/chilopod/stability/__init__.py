@@ -9,7 +9,6 @@ False
 
 from chilopod.flows.called import NotAnalytic
 from chilopod.flows.events import Event
-from chilopod.flows.implicit.flow import Stretched
 from chilopod.flows.jumps import UndeclaredSwitch
 from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, proceed, switch
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
@@ -40,8 +39,7 @@ from chilopod.stability.problem.maps import from_map
 from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.rhs import from_rhs
-from chilopod.stability.search.locate import locate
-from chilopod.stability.search.located import Located
+from chilopod.stability.search.locate import Located, locate
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.tracing.ending import Ending
@@ -86,7 +84,6 @@ __all__ = [
     "SpecialPoint2",
     "Start",
     "Start2",
-    "Stretched",
     "SymmetricCrossing",
     "SymmetricKind",
     "SystemLike",

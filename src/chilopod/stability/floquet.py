@@ -27,8 +27,7 @@ from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, r
 from chilopod.stability.spectrum.cut import moderate_cut
 from chilopod.stability.spectrum.eigenvalues import phased, spectrum
 from chilopod.stability.spectrum.errors import VERDICTS, stable_within
-from chilopod.stability.spectrum.splitting import split_product
-from chilopod.stability.spectrum.stiff import split_stiff
+from chilopod.stability.spectrum.splitting import split_product, split_stiff
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -30,7 +30,7 @@ from chilopod.stability.problem.budget import SpentError, UserCode
 from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.search.extent import Fold
-from chilopod.stability.search.located import Found, Located, located
+from chilopod.stability.search.locate import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
@@ -121,9 +121,13 @@ def locate_hopf(
     if last.value == at < high and not pieces[-1].ending:
         status = SearchStatus.BUDGET
         remarks.append(f"the budget was spent before the orbit was followed beyond {at:.9g}")
-    points, said = tuple(point for each in pieces for point in each), tuple(dict.fromkeys(map(_of_equilibria, remarks)))
-    searched, ending = (low, pieces[-1].searched[1]), _of_equilibria(pieces[-1].ending)
-    return Located(points, status, said, budget - left, searched, ending)
+    points: list[BifurcationPoint] = []
+    for each in pieces:  # a point on the border of two is found in both
+        points += [
+            new for new in each if all(new.value - old.value > new.error_bound + old.error_bound for old in points)
+        ]
+    said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(pieces[-1].ending)
+    return Located(tuple(points), status, said, budget - left, (low, pieces[-1].searched[1]), ending)
 
 
 def _piece(
@@ -173,9 +177,8 @@ def _of_map(
     frequency = abs(float(np.angle(crossing.multiplier))) / duration
     error = place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value)
     mode = vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128)
-    about: dict[str, Any] = {"period": 2.0 * np.pi / frequency, "multiplicity": crossing.multiplicity}
-    value, nu = crossing.value, crossing.multiplier
-    return BifurcationPoint(Kind.HOPF, value, error, sample.orbit, mode, nu, frequency, **about)
+    at = BifurcationPoint(Kind.HOPF, crossing.value, error, sample.orbit, mode, crossing.multiplier, frequency)
+    return replace(at, period=2.0 * np.pi / frequency, multiplicity=crossing.multiplicity)
 
 
 def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
@@ -288,8 +291,9 @@ def _hopf_point(
     decided = Criticality.SUPERCRITICAL if coefficient < 0.0 else Criticality.SUBCRITICAL
     verdict = decided if abs(coefficient) > error else Criticality.UNDECIDED
     about: dict[str, Any] = {"criticality": verdict, "coefficient": coefficient, "coefficient_error": error}
-    about |= {"period": 2.0 * np.pi / frequency, "multiplicity": 2, "rate": rate}
-    return BifurcationPoint(Kind.HOPF, value, bound, here.state, form.mode, 1j * frequency, frequency, **about)
+    about |= {"mode": form.mode, "multiplier": 1j * frequency, "frequency": frequency, "rate": rate}
+    period = 2.0 * np.pi / frequency
+    return replace(point, value=value, error_bound=bound, orbit=here.state, period=period, **about)
 
 
 def _rate(

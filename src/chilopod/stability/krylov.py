@@ -15,10 +15,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.arguments import shape_of
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.convergence import RETURN
 from chilopod.stability.problem.budget import Budget
@@ -149,12 +151,10 @@ class TangentMap(ReadOnlyArrays):
         state, images = self.point, directions
         for a, b in zip(times, times[1:], strict=False):
             state, images = self.system.flow_tangents(np.array(state), np.array(images), a, b)
-            if np.shape(state) != self.point.shape or np.shape(images) != directions.shape:
-                raise AnalysisError(
-                    f"gives shapes {np.shape(state)} and {np.shape(images)}",
-                    field="flow_tangents",
-                    allowed=f"{self.point.shape} and {directions.shape}",
-                )
+            shapes, allowed = (shape_of(state), shape_of(images)), (self.point.shape, directions.shape)
+            if shapes != allowed:
+                said = "gives shapes {} and {}".format(*shapes)
+                raise AnalysisError(said, field="flow_tangents", allowed="{} and {}".format(*allowed))
         if not np.isfinite(images).all():
             raise AnalysisError("the flow is not finite over one return", field="flow")
         if self.system.symmetry is not None:
@@ -275,24 +275,12 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
     return move, subspace.basis @ np.where(largest.imag.any(axis=0), largest.imag + largest.real, largest.real)
 
 
-@dataclass(frozen=True)
-class LeadingMultipliers(ReadOnlyArrays):
-    """The largest eigenvalues of the derivative of a return map by falling modulus, shape (count,), or one more to
-    complete a pair; a bound on the error of each; and the approximate modulus of the next one."""
+class LeadingMultipliers(NamedTuple):
+    """The largest eigenvalues of the derivative of a return map by falling modulus."""
 
-    values: ComplexArray
-    error: Array
-    following: float
-
-
-@dataclass(frozen=True)
-class _Ritz:
-    """Eigenvalues of H in a Krylov subspace, by falling modulus, and their distances from those of the matrix."""
-
-    values: ComplexArray
-    vectors: ComplexArray  # unit columns
-    condition: Array  # norm of the left eigenvector for a right one of norm 1
-    residual: Array
+    values: ComplexArray  # shape (count,), or one more to complete a pair
+    error: Array  # bound on the error of each
+    following: float  # approximate modulus of the next one
 
 
 def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMultipliers:
@@ -308,33 +296,28 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMu
     width = min(n, max(_FEWEST, -(-(count + _SPARE) // _LANES) * _LANES))
     start = np.random.default_rng(0).standard_normal((n, width))
     for subspace in krylov_subspaces(lambda directions: image.images(units * directions) / units, start):
-        ritz = _ritz(subspace)
-        chosen = whole_pairs(ritz.values, count)
-        if _settled(ritz, chosen, float(np.linalg.norm(subspace.matrix, 2))):
+        every, vectors, left = eigensystem(subspace.matrix)
+        chosen = whole_pairs(every, count)
+        off = np.linalg.norm(subspace.coupling @ vectors, axis=0)  # distances from eigenvalues of the matrix
+        if _settled(every, off, chosen, float(np.linalg.norm(subspace.matrix, 2))):
             break
-    values, vectors = ritz.values[:chosen], subspace.basis @ ritz.vectors[:, :chosen]
+    values, vectors = every[:chosen], subspace.basis @ vectors[:, :chosen]
     both, errors, state_error = image.images_with_error(units * np.hstack([vectors.real, vectors.imag]))
     images = (both[:, :chosen] + 1j * both[:, chosen:]) / units
     residual = np.linalg.norm(images - values * vectors, axis=0)
     residual += np.linalg.norm((errors[:, :chosen] + errors[:, chosen:]) / units, axis=0)
     residual += 4.0 * np.finfo(float).eps * np.linalg.norm(images, axis=0)
     residual += _bend(image, size, subspace, state_error, units * np.hstack([vectors.real, vectors.imag]), both)
-    error = ritz.condition[:chosen] * residual
+    condition = np.linalg.norm(left[:, :chosen], axis=0)
+    if subspace.coupling.size:
+        seen = np.linalg.norm(left[: subspace.first, :chosen], axis=0)
+        condition = np.maximum(condition, _SAFETY * np.sqrt(n / subspace.first) * seen)
+    error = condition * residual
     if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
         wrong = np.full(subspace.matrix.shape, float(residual.max()))
-        error = np.minimum(error, eigenvalue_errors(ritz.values, subspace.matrix, wrong)[:chosen])
-    following = float(np.abs(ritz.values[chosen])) if chosen < ritz.values.size else 0.0
+        error = np.minimum(error, eigenvalue_errors(every, subspace.matrix, wrong)[:chosen])
+    following = float(np.abs(every[chosen])) if chosen < every.size else 0.0
     return LeadingMultipliers(values, error, following)
-
-
-def _ritz(subspace: KrylovSubspace) -> _Ritz:
-    values, vectors, left = eigensystem(subspace.matrix)
-    n, known = subspace.basis.shape[0], left[: subspace.first]
-    seen = _SAFETY * np.sqrt(n / subspace.first) * np.linalg.norm(known, axis=0)
-    condition = np.linalg.norm(left, axis=0)
-    if subspace.coupling.size:
-        condition = np.maximum(condition, seen)
-    return _Ritz(values, vectors, condition, np.linalg.norm(subspace.coupling @ vectors, axis=0))
 
 
 def whole_pairs(values: ComplexArray, count: int) -> int:
@@ -345,14 +328,11 @@ def whole_pairs(values: ComplexArray, count: int) -> int:
     return count
 
 
-def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
+def _settled(values: ComplexArray, off: Array, chosen: int, largest: float) -> bool:
     """True if the chosen ones have converged to round-off, and no other one may become larger."""
-    if ritz.values.size <= chosen:
-        return False
-    least = float(np.abs(ritz.values[chosen - 1]))
-    known = ritz.residual <= _CONVERGED * largest
-    rising = ~known & (np.abs(ritz.values) + ritz.residual > least)
-    return bool(known[:chosen].all() and not rising.any())
+    known = off <= _CONVERGED * largest
+    rising = ~known & (np.abs(values) + off > np.abs(values[chosen - 1]))
+    return bool(values.size > chosen and known[:chosen].all() and not rising.any())
 
 
 def _bend(

@@ -25,11 +25,13 @@ import numpy as np
 
 from chilopod.compiled import fused_njit
 from chilopod.flows.carrying import BUDGET, DONE, NOT_FINITE, STALLED, TIME_OVER
-from chilopod.flows.implicit.stages import Problem, Step, estimated, stages, turn
 from chilopod.flows.tracing.series import loaded, slope_at
 
 _PATIENCE, _HOPELESS = 2048, 16.0  # steps, and factor on the budget, beyond which the mean step is hopelessly short
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
+_MOST_ROUNDS = 10
+_CLOSE = 1e-7  # Newton correction after which the next one is round-off
+_NOISE = 2.0**-51  # round-off relative to the terms whose difference is the error estimate
 
 
 class Interval(NamedTuple):
@@ -59,12 +61,219 @@ class Outcome(NamedTuple):
     # largest moduli of the states and of the entries of the derivative so far, shapes (n,) and as `derivative`
     largest: Any
     extent: Any
-    frame: Any  # orthonormal, shape (n, n), carried along (:func:`.stages.turn`); shape (0, 0) for none
-    # logarithm of the growth of each direction of the frame, which is added, and cosine of its largest turn in a
-    # step, shape (n,)
-    stretch: Any
-    turned: Any
-    report: Any  # number of steps, and the time reached, shape (2,)
+    report: Any  # number of steps, time reached, and logarithm of the growth of volume, which is added, shape (3,)
+
+
+class Problem(NamedTuple):
+    """A right-hand side on an interval, in units of the states."""
+
+    tape: Any  # its operations
+    units: Any  # units of the states, shape (n,), positive; everything else here is in these units
+    # values and tangents of the tape, with the states' own tangents 1, and the branches of its switches on the interval
+    series: Any
+    largest: Any  # largest moduli of the states so far, shape (n,)
+
+
+class Method(NamedTuple):
+    """Coefficients of Radau IIA."""
+
+    nodes: Any  # c, rising to 1, shape (s,)
+    weights: Any  # a, shape (s, s); the last row has the weights
+    start: Any  # values at 0 of the Lagrange polynomials on the nodes, shape (s,): f there as the stages have it
+    # of the filter 1 / (1 - h gamma J) in the estimate of the error: the inverse of the real eigenvalue of the inverse
+    # of `weights` (Hairer and Wanner, equation IV.8.18)
+    gamma: float
+
+
+class Step(NamedTuple):
+    """A step with s stages."""
+
+    # f and its jacobian at the start, shapes (n,) and (n, n)
+    slope: Any
+    jacobian: Any
+    moved: Any  # states of the stages less the state at the start, shape (s, n)
+    # f and its jacobian in the stages, shapes (s, n) and (s, n, n)
+    slopes: Any
+    jacobians: Any
+    matrix: Any  # matrix of Newton's method, shape (s n, s n), overwritten by its elimination
+    columns: Any  # derivative of the stages with respect to the state at the start, shape (s n, n)
+    reached: Any  # derivative of the stages with respect to the start of the interval, shape (s, n, n)
+
+
+@fused_njit(error_model="numpy")
+def _solve(matrix: Any, columns: Any) -> bool:
+    """Solve linear equations for columns of shape (n, m), in place, by elimination with rows exchanged; False if the
+    matrix is singular or not finite."""
+    n, m = columns.shape
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                pivot = i
+        if not 0.0 < abs(matrix[pivot, k]) < math.inf:
+            return False
+        if pivot != k:
+            for j in range(k, n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+            for j in range(m):
+                columns[k, j], columns[pivot, j] = columns[pivot, j], columns[k, j]
+        for i in range(k + 1, n):
+            f = matrix[i, k] / matrix[k, k]
+            if f != 0.0:
+                for j in range(k + 1, n):
+                    matrix[i, j] -= f * matrix[k, j]
+                for j in range(m):
+                    columns[i, j] -= f * columns[k, j]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            f = matrix[i, k]
+            for j in range(m):
+                columns[i, j] -= f * columns[k, j]
+        f = 1.0 / matrix[i, i]
+        for j in range(m):
+            columns[i, j] *= f
+    return True
+
+
+@fused_njit(error_model="numpy")
+def _newton_matrix(weights: Any, h: float, jacobians: Any, matrix: Any) -> None:
+    """Matrix of Newton's method for the stages."""
+    s, n = jacobians.shape[:2]
+    for i in range(s):
+        for j in range(s):
+            f = h * weights[i, j]
+            for k in range(n):
+                for m in range(n):
+                    matrix[i * n + k, j * n + m] = -f * jacobians[j, k, m]
+    for i in range(s * n):
+        matrix[i, i] += 1.0
+
+
+@fused_njit(error_model="numpy")
+def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
+    """Solve for the stages from the guess in ``moved``.
+
+    At the end ``columns`` has the derivative of the stages with respect to x, and ``slopes`` and ``jacobians`` belong
+    to the stages. False without convergence.
+    """
+    nodes, weights, largest = method.nodes, method.weights, problem.largest
+    moved, slopes = step.moved, step.slopes
+    s, n = moved.shape
+    y = np.empty(n)
+    before = math.inf
+    close = False
+    for _ in range(_MOST_ROUNDS):
+        for j in range(s):
+            for i in range(n):
+                y[i] = x[i] + moved[j, i]
+            if not slope_at(
+                problem.tape, problem.series, problem.units, t + nodes[j] * h, y, slopes[j], step.jacobians[j]
+            ):
+                return False
+        # The residual and, in the last round, the derivative of the equations with respect to the state at the start.
+        right = np.zeros((s * n, 1 + n if close else 1))
+        for i in range(s):
+            for k in range(n):
+                total = 0.0
+                for j in range(s):
+                    total += weights[i, j] * slopes[j, k]
+                right[i * n + k, 0] = h * total - moved[i, k]
+                if close:
+                    right[i * n + k, 1 + k] = 1.0
+        _newton_matrix(weights, h, step.jacobians, step.matrix)
+        if not _solve(step.matrix, right):
+            return False
+        off = 0.0
+        for k in range(n):
+            size = largest[k]
+            for i in range(s):
+                size = max(size, abs(x[k] + moved[i, k]))
+            for i in range(s):
+                move = right[i * n + k, 0]
+                moved[i, k] += move
+                if move != 0.0:
+                    off = max(off, abs(move) / max(size, abs(move)))
+        if close:
+            step.columns[:] = right[:, 1:]
+            return True
+        if off > 2.0 * before:
+            return False
+        close = off <= _CLOSE or (off >= 0.5 * before and off <= 1e3 * _CLOSE)
+        before = off
+    return False
+
+
+@fused_njit(error_model="numpy")
+def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple[Any, Any]:
+    """Defect of f at the start from the polynomial through its values in the stages, filtered by the inverse of
+    1 - h gamma J, of the state and of the columns of the derivative, shape (n, 1 + columns); and the round-off in it.
+    """
+    start, gamma = method.start, method.gamma
+    s, n = step.moved.shape
+    size = derivative.shape[0]
+    off, terms = np.empty((n, 1 + size)), np.empty((n, 1 + size))
+    filtering, inverse = np.empty((n, n)), np.eye(n)
+    for k in range(n):
+        total = step.slope[k]
+        for j in range(s):
+            total -= start[j] * step.slopes[j, k]
+        off[k, 0] = h * gamma * total
+        terms[k, 0] = abs(x[k])
+        for m in range(n):
+            filtering[k, m] = (1.0 if k == m else 0.0) - h * gamma * step.jacobian[k, m]
+    if size > 0:
+        factor = step.jacobian.copy()
+        for j in range(s):
+            factor -= start[j] * (step.jacobians[j] @ step.columns[j * n : (j + 1) * n])
+        entries = (h * gamma) * (factor @ derivative)
+        for k in range(n):
+            for m in range(n):
+                off[k, 1 + m] = entries[k, m]
+                terms[k, 1 + m] = abs(derivative[k, m])
+    if not _solve(filtering, inverse):
+        off[:] = math.inf
+        return off, np.zeros(off.shape)
+    # No shorter step removes its round-off.
+    noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(step.jacobian) @ terms))
+    return inverse @ off, noise
+
+
+@fused_njit(error_model="numpy")
+def _estimated(
+    problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any
+) -> float:
+    """The error of a step relative to the size of every state and entry of the derivative.
+
+    The size of a state is its largest value so far, or the effect of the others on it within the step; likewise for the
+    entries of the derivative, ``extent``.
+    """
+    largest, reached = problem.largest, step.reached
+    s, n = step.moved.shape
+    off, noise = _defects(x, h, method, step, derivative)
+    end = step.columns[(s - 1) * n :]
+    worst = 0.0
+    for k in range(n):
+        scale = largest[k]
+        for i in range(s):
+            scale = max(scale, abs(x[k] + step.moved[i, k]))
+        for m in range(n):
+            scale = max(scale, abs(end[k, m]) * largest[m])
+        if abs(off[k, 0]) > noise[k, 0]:
+            worst = max(worst, abs(off[k, 0]) / scale)
+    if derivative.shape[0] > 0:
+        for i in range(s):
+            reached[i] = step.columns[i * n : (i + 1) * n] @ derivative
+        for k in range(n):
+            for j in range(n):
+                if not near[k, j] or abs(off[k, 1 + j]) <= noise[k, 1 + j]:
+                    continue
+                scale = extent[k, j]
+                for i in range(s):
+                    scale = max(scale, abs(reached[i, k, j]))
+                for m in range(n):
+                    scale = max(scale, abs(end[k, m]) * extent[m, j])
+                worst = max(worst, abs(off[k, 1 + j]) / scale)
+    return worst
 
 
 @fused_njit(error_model="numpy")
@@ -124,7 +333,6 @@ def _room(n: int, s: int) -> Any:
         np.empty((s, n)),
         np.empty((s, n, n)),
         np.empty((s * n, s * n)),
-        np.empty(s * n, np.int64),
         np.empty((s * n, n)),
         np.empty((s, n, n)),
     )
@@ -170,11 +378,11 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
             status = STALLED
             break
         _predict(method.nodes, h / h_last if h_last > 0.0 else 0.0, last, step.moved)
-        if not stages(problem, method, x, t, h, step):
+        if not _stages(problem, method, x, t, h, step):
             h *= 0.3
             h_last = 0.0
             continue
-        off = estimated(problem, method, x, h, step, control.near, result.derivative, result.extent)
+        off = _estimated(problem, method, x, h, step, control.near, result.derivative, result.extent)
         factor = _FASTEST_GROWTH
         if off > 0.0:
             factor = min(factor, max(_FASTEST_FALL, _SAFETY * (control.tolerance / off) ** (1.0 / (s + 1))))
@@ -182,8 +390,9 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
             h *= min(factor, 0.9) if off < math.inf else _FASTEST_FALL
             continue
         _take(x, step, last, result)
-        if result.frame.shape[0] > 0:
-            turn(result.frame, step.columns, step.jacobians, method.weights[s - 1], h, result.stretch, result.turned)
+        for j in range(s):
+            for i in range(n):
+                result.report[2] += h * method.weights[s - 1, j] * step.jacobians[j, i, i]
         t = t1 if ends else t + h
         h_last = h
         h *= factor

@@ -16,8 +16,8 @@ from chilopod.flows.balance import numerical_balance
 from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
 from chilopod.flows.jumps import longest_step
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.evaluation import branches_of, evaluate, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
+from chilopod.flows.tracing.trace import branches_of, evaluate, evaluate_jacobian
 from chilopod.frozen import Array, ReadOnlyArrays
 
 _STAGES, _OTHER_STAGES = 9, 7
@@ -25,36 +25,11 @@ _NEAREST = 3  # largest number of couplings between two states with their deriva
 _MOST_WORK = 3e9  # multiplications
 _FEWEST_STEPS = 2000
 _FEWEST_PER_THREAD = 4
+_VOLUME_STEPS = 64  # fewest steps for the growth of volume
 _OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _FINER = 0.2
 _SHAKE = 2.0**-52
 _ROUNDING = 2.0**-49
-
-
-@dataclass(frozen=True)
-class Stretched(ReadOnlyArrays):
-    """Frame carried by a flow.
-
-    Attributes
-    ----------
-    state
-        State at the end, shape (n,).
-    frame
-        Orthonormal frame, shape (n, n): for every k its first k columns span the images of those at the start.
-    stretch
-        Logarithms of the growth of the columns, shape (n,): the volume of the first k less that of the first k-1.
-    other
-        Logarithms by a second computation, for their error.
-    turned
-        Smallest cosine of the angle between a column and itself a step later, shape (n,): a clearly positive one
-        preserves the sign of the column.
-    """
-
-    state: Array
-    frame: Array
-    stretch: Array
-    other: Array
-    turned: Array
 
 
 @dataclass(frozen=True)
@@ -85,15 +60,15 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""
-        return self._run(x, (t0, t1), _STAGES, self.tolerance)
+        return self._run(x, (t0, t1), _STAGES, self.tolerance)[:2]
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         """The same with a bound on the error of every entry of the derivative: a multiple of the larger difference from
         two other computations, of lower order and of smaller steps, from disturbed starts, and round-off."""
-        state, derivative = self._run(x, (t0, t1), _STAGES, self.tolerance)
+        state, derivative, _ = self._run(x, (t0, t1), _STAGES, self.tolerance)
         shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
-        _, lower = self._run(x * (1.0 + shake), (t0, t1), _OTHER_STAGES, self.tolerance)
-        _, finer = self._run(x * (1.0 - shake), (t0, t1), _STAGES, _FINER * self.tolerance)
+        lower = self._run(x * (1.0 + shake), (t0, t1), _OTHER_STAGES, self.tolerance)[1]
+        finer = self._run(x * (1.0 - shake), (t0, t1), _STAGES, _FINER * self.tolerance)[1]
         difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
         size = np.abs(derivative)
         return state, derivative, _OWN * difference + _ROUNDING * (size + size @ size)
@@ -108,14 +83,14 @@ class ImplicitFlow(ReadOnlyArrays):
         carry_all(carry, len(states), _FEWEST_PER_THREAD)
         return states
 
-    def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
-        """See :class:`chilopod.stability.problem.capabilities.FlowsFrames`."""
-        stretches = []
-        for stages in (_OTHER_STAGES, _STAGES):
-            end, stretch, turned = np.array(frame, order="C"), np.zeros(x.size), np.ones(x.size)
-            state, _ = self._run(x, (t0, t1), stages, self.tolerance, units=units, carried=(end, stretch, turned))
-            stretches.append(stretch)
-        return Stretched(state, end, stretches[1], stretches[0], turned)
+    def flow_volume(self, x: Array, t0: float, t1: float) -> tuple[float, float]:
+        """Logarithm of the growth of volume, by Liouville's formula, and its difference from another computation."""
+        # The step control does not see the divergence of f.
+        longest = (t1 - t0) / _VOLUME_STEPS
+        volume, other = (
+            self._run(x, (t0, t1), stages, self.tolerance, longest=longest)[2] for stages in (_STAGES, _OTHER_STAGES)
+        )
+        return volume, abs(volume - other)
 
     def _run(
         self,
@@ -124,36 +99,35 @@ class ImplicitFlow(ReadOnlyArrays):
         stages: int,
         tolerance: float,
         derived: bool = True,
-        units: Array | None = None,
-        carried: tuple[Array, Array, Array] = (np.empty((0, 0)), np.empty(0), np.empty(0)),
         stop: Array | None = None,
-    ) -> tuple[Array, Array]:
-        """State and derivative at t1; a frame is carried in place, with the stretch and turn of its directions."""
+        longest: float = np.inf,
+    ) -> tuple[Array, Array, float]:
+        """State and derivative at t1, and the logarithm of the growth of volume."""
         n, stop = self.tape.dimension, deadline.stop() if stop is None else stop
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
-        if not (x.shape == (n,) and carried[0].shape[0] in (0, n) and (units is None or np.shape(units) == (n,))):
+        if x.shape != (n,):
             # Compiled code would read out of bounds.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         if not np.isfinite(x).all():
             raise AnalysisError("the state is not finite", field="rhs")
-        balanced, near = self._coupling(x, 0.5 * sum(span))
-        units = balanced if units is None else np.array(units)
+        units, near = self._coupling(x, 0.5 * sum(span))
         x = x / units
         size = n if derived else 0
-        derivative, report = np.eye(size), np.zeros(2)
+        derivative, report = np.eye(size), np.zeros(3)
         kernels, method = _compiled(), _method(stages)
-        result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), *carried, report)
+        result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), report)
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
             branches = _branches(self.tape, params, np.array([0.5 * (a + b)]))[:, 0].copy()
-            interval = kernels.Interval(a, b, longest_step(self.fast, float(self.edges[-1]), a, b), branches)
+            limit = min(longest, longest_step(self.fast, float(self.edges[-1]), a, b))
+            interval = kernels.Interval(a, b, limit, branches)
             control = kernels.Control(tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, interval, control, result)
             if status:
                 raise failure(status, report[1])
             budget -= int(report[0])
-        return x * units, derivative * (units[:, None] / units if derived else 1.0)
+        return x * units, derivative * (units[:, None] / units if derived else 1.0), float(report[2])
 
     def _coupling(self, x: Array, t: float) -> tuple[Array, NDArray[np.bool_]]:
         """Units of the states, shape (n,), that balance the jacobian, and the pairs of near states."""
@@ -196,8 +170,6 @@ def _method(stages: int) -> Any:
     """Radau IIA with an odd number of stages."""
     from scipy.special import roots_jacobi  # slow to import
 
-    from chilopod.flows.implicit.stages import Method
-
     nodes = np.append(0.5 * (1.0 + roots_jacobi(stages - 1, 1.0, 0.0)[0]), 1.0)
     # In Legendre polynomials, whose integrals are known: Lagrange polynomial j is the sum over k of inverse[k, j] P_k.
     inverse = np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, stages - 1))
@@ -206,7 +178,7 @@ def _method(stages: int) -> Any:
     values = np.linalg.eigvals(np.linalg.inv(matrix))
     real = values[np.abs(values.imag).argmin()].real
     start = legendre.legvander(np.array([-1.0]), stages - 1)[0] @ inverse
-    return Method(nodes, matrix, start, float(1.0 / real))
+    return _compiled().Method(nodes, matrix, start, float(1.0 / real))
 
 
 @functools.cache

@@ -25,8 +25,8 @@ import numpy as np
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
-from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.tape import Tape
+from chilopod.flows.tracing.trace import evaluate
 from chilopod.frozen import Array
 
 _MOST_WORK = 1e7

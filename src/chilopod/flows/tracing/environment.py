@@ -112,13 +112,11 @@ def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> A
     if isinstance(value, functools.partial):
         function, args, keywords = (rebuild(part, source, seen) for part in (value.func, value.args, value.keywords))
         return functools.partial(function, *args, **keywords)
-    if isinstance(value, types.MethodType):
-        inner = python_function(value.__func__)
-        if isinstance(inner, types.FunctionType) and _own(inner):
-            return types.MethodType(_rebuilt_function(inner, None, seen), value.__self__)
-    call = vars(type(value)).get("__call__")
-    if isinstance(call, types.FunctionType) and _own(call):  # an object that is called like a function
-        return types.MethodType(_rebuilt_function(call, None, seen), value)
+    # A method, or an object that is called like a function.
+    bound = isinstance(value, types.MethodType)
+    call = python_function(value.__func__) if bound else vars(type(value)).get("__call__")
+    if _own(call):
+        return types.MethodType(_rebuilt_function(call, None, seen), value.__self__ if bound else value)
     return stand_in(value)
 
 

@@ -247,25 +247,14 @@ def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, j
 
 
 @fused_njit(error_model="numpy")
-def differentiate(tape: Any, params: Any, t: float, x: Any, slope: Any, jacobian: Any) -> None:
-    """f and its jacobian at a state, with its branches."""
-    series = loaded(tape, params, 1, x.size, np.zeros(tape.switches.shape[1]))
-    for i in range(x.size):
-        series.values[i, 0] = x[i]
-        series.tangents[i, 0, i] = 1.0
-    series.values[x.size, 0] = t
-    choose(tape, series)
-    slope_at(tape, series, np.ones(x.size), t, x, slope, jacobian)
-
-
-@fused_njit(error_model="numpy")
-def compose(tape: Any, params: Any, curve: Any, branches: Any, found: Any) -> None:
-    """Coefficients of f at time 0 along a curve, shapes (orders, n)."""
+def compose(tape: Any, params: Any, t: float, curve: Any, branches: Any, found: Any) -> None:
+    """Coefficients of f at a time along a curve, shapes (orders, n)."""
     orders, n = curve.shape
     series = loaded(tape, params, orders, 0, branches)
     for k in range(orders):
         for i in range(n):
             series.values[i, k] = curve[k, i]
+    series.values[n, 0] = t
     nothing, first, stop = np.empty(0, np.int64), tape.layout[3], tape.layout[4]  # no states follow from f
     values_at(tape.program, tape.terms, nothing, (first, stop), orders - 1, 1.0, series.values, branches)
     for k in range(orders):

@@ -143,7 +143,7 @@ def _extreme(ufunc: np.ufunc) -> Callable[..., Any]:
     return lambda value, axis=None, **_: ufunc.reduce(as_traced(value), axis=axis)
 
 
-_OWN: dict[Any, Callable[..., Any]] = {
+REPLACED |= {
     np.where: _where_arrays,
     np.clip: _clip,
     np.linalg.solve: _solve,
@@ -163,10 +163,6 @@ _OWN: dict[Any, Callable[..., Any]] = {
     np.isrealobj: lambda value: True,
     np.dot: lambda a, b: wrapped(np.dot(plain(as_traced(a)), plain(as_traced(b)))),
 }
-
-
-REPLACED.update(_OWN)
-
 
 _SAME_NAME = (
     *("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "expm1", "log1p", "log2", "log10", "exp2"),
@@ -196,7 +192,7 @@ def _instead() -> dict[int, Any]:
         (math.fmod, lambda a, b: a - b * np.trunc(a / b)),
     ]
     pairs += [(getattr(math, name), getattr(np, name)) for name in _SAME_NAME]
-    return {id(real): own for real, own in [*_OWN.items(), *pairs]}
+    return {id(real): own for real, own in [*REPLACED.items(), *pairs]}
 
 
 def _most(plain: Callable[..., Any], ufunc: np.ufunc) -> Callable[..., Any]:

@@ -1,4 +1,4 @@
-"""Tapes of right-hand sides: traced, verified and cached."""
+"""Tapes of right-hand sides: traced, verified, cached, and evaluated for checks (not for integration)."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chilopod.errors import AnalysisError
 from chilopod.flows.tracing.environment import Opaque, describe, python_function, rebuild
-from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.graph import Graph
 from chilopod.flows.tracing.ordering import ordered
-from chilopod.flows.tracing.tape import Tape
-from chilopod.flows.tracing.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
+from chilopod.flows.tracing.tape import FLOOR, GUARD, Integers, Tape
+from chilopod.flows.tracing.traced import Traced, Untraceable, as_traced, node_of, states
 from chilopod.frozen import Array
 
 _MOST_NODES = 200_000
@@ -35,8 +35,7 @@ class Trace:
     derived: dict[Any, Any]  # cache of results that depend on the tape alone
 
 
-_Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], tuple[Tape, dict[Any, Any]]]]]
-_KEPT: weakref.WeakKeyDictionary[types.CodeType, _Kept] = weakref.WeakKeyDictionary()
+_KEPT: weakref.WeakKeyDictionary[types.CodeType, dict[Any, tuple[Tape, dict[Any, Any]]]] = weakref.WeakKeyDictionary()
 
 
 def trace(
@@ -50,9 +49,10 @@ def trace(
 ) -> Trace:
     """Record the operations of a right-hand side, once for all values of its floats.
 
-    Floats in ``args``, alone or in arrays, tuples and lists, are parameters of the tape. ``events`` are pairs of a
-    guard and a reset or None; the tape is compared with the function between some times and around a state ``base``.
-    Raises Untraceable if the function is not a fixed sequence of known operations, or disagrees with the tape.
+    Floats in ``args``, alone or in arrays, tuples and lists, are parameters of the tape, or numbers if the function
+    needs their values, as in a branch. ``events`` are pairs of a guard and a reset or None; the tape is compared with
+    the function between some times and around a state ``base``. Raises Untraceable if the function is not a fixed
+    sequence of known operations, or disagrees with the tape.
     """
     functions = (rhs, *(part for event in events for part in event))
     floats: list[float] = []
@@ -62,59 +62,38 @@ def trace(
     try:
         key = (dimension, describe(functions, floats, seen), describe(args, floats, seen))
         kept = _KEPT.setdefault(code, {}) if code is not None else {}
-        baked, tapes = kept.get(key, ((), {}))
+        known = kept.get(key)
     except (Opaque, TypeError, ValueError):  # not hashable, an empty cell
-        key, floats, baked, tapes, kept = None, [], (), {}, {}
-    values = np.array(floats)
-    known = tapes.get(tuple(floats[i] for i in baked))
+        key, floats, known, kept = None, [], None, {}
+    known = known or kept.get((key, *floats))
     if known is None:
-        before = baked
-        tape, baked = _traced(functions, dimension, args, floats, key is not None, baked)
-        _verify(tape, _open(values, baked), rhs, args, times, base)
+        try:
+            tape = _traced(functions, dimension, args, len(floats))
+        except Untraceable:
+            if not floats:
+                raise
+            tape = _traced(functions, dimension, args, 0)
+        _verify(tape, np.array(floats[: tape.parameters]), rhs, args, times, base)
         known = tape, {}
         if key is not None:
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
-            if baked != before or len(tapes) >= _MOST_KEPT:
-                tapes = {}
-            tapes[tuple(floats[i] for i in baked)] = known
-            kept[key] = (baked, tapes)
-    return Trace(known[0], _open(values, baked), known[1])
+            kept[key if tape.parameters else (key, *floats)] = known
+    return Trace(known[0], np.array(floats[: known[0].parameters]), known[1])
 
 
-def _open(values: Array, baked: tuple[int, ...]) -> Array:
-    return np.delete(values, baked) if baked else values
-
-
-def _traced(
-    functions: tuple[Any, ...],
-    dimension: int,
-    args: tuple[Any, ...],
-    floats: list[float],
-    symbolic: bool,
-    baked: tuple[int, ...],
-) -> tuple[Tape, tuple[int, ...]]:
-    """Trace with all floats as parameters, then with needed values as numbers."""
-    everything = tuple(range(len(floats)))
-    while True:
-        graph = Graph(dimension, len(floats) - len(baked) if symbolic else 0)
-        unbaked = iter(graph.parameters)
-        source = [floats[i] if i in baked else Traced(graph, next(unbaked)) for i in everything]
-        try:
-            return _record(graph, functions, dimension, args, iter(source) if symbolic else None), baked
-        except Concrete as needed:
-            places = [i for i in everything if i not in baked]
-            baked = tuple(sorted({*baked, *(places[i] for i in needed.parameters)}))
-        except Untraceable:
-            if not symbolic or baked == everything:
-                raise
-            baked = everything
-        except RecursionError:
-            raise Untraceable("it is too deeply nested") from None
-        except Exception as error:  # any exception of a user's function means the same
-            if not symbolic or baked == everything:
-                raise Untraceable(f"{type(error).__name__}: {error}") from None
-            baked = everything
+def _traced(functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], floats: int) -> Tape:
+    """The tape, with a number of floats as parameters, or none."""
+    graph = Graph(dimension, floats)
+    source = iter([Traced(graph, node) for node in graph.parameters]) if floats else None
+    try:
+        return _record(graph, functions, dimension, args, source)
+    except Untraceable:
+        raise
+    except RecursionError:
+        raise Untraceable("it is too deeply nested") from None
+    except Exception as error:  # any exception of a user's function means the same
+        raise Untraceable(f"{type(error).__name__}: {error}") from None
 
 
 def _record(
@@ -177,3 +156,48 @@ def _verify(
         np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
     ).any():
         raise Untraceable("it gives other values when called again: it has memory or random numbers")
+
+
+def evaluate(tape: Tape, nodes: Integers, t: Any, x: Any, params: Array) -> Array:
+    """Values of some nodes, shape (nodes, ...), at times and states of shapes (...) and (n, ...), or one of either.
+
+    Nodes of resets have no values.
+    """
+    from chilopod.flows.tracing import series  # numba takes half a second to import
+
+    # Copies, because numba would compile again for read-only arrays.
+    times, states = np.array(t, dtype=np.float64, ndmin=1), np.array(x, dtype=np.float64).reshape(len(x), -1)
+    found = np.empty((nodes.size, max(times.size, states.shape[1])))
+    series.sample(tape, np.array(params, dtype=np.float64), times, states, nodes, found)
+    return found.reshape(-1, *(np.shape(t) or np.shape(x)[1:]))
+
+
+def evaluate_jacobian(tape: Tape, t: float, x: Array, params: Array) -> tuple[Array, Array]:
+    """dx/dt, shape (n,), and its derivative with respect to the state, shape (n, n)."""
+    found = evaluate_series(tape, np.stack([np.tile(x, (x.size, 1)), np.eye(x.size)], axis=1), params, t, False)
+    return found[0, 0], found[:, 1].T.copy()
+
+
+def evaluate_series(tape: Tape, curves: Array, params: Array, t: float = 0.0, smooth: bool = True) -> Array:
+    """Taylor coefficients in s of f(t, x(s)), shape (curves, orders, n), along the curves x(s) = c0 + c1 s + ... with
+    these coefficients, of the same shape; AnalysisError if one starts on a switching surface, where f is not smooth."""
+    from chilopod.flows.tracing import series
+
+    kinds, surfaces = tape.switches[:2]
+    result, branches = np.empty(curves.shape), np.zeros(kinds.size)
+    for curve, out in zip(np.array(curves, dtype=np.float64), result, strict=True):
+        if kinds.size:
+            functions = evaluate(tape, surfaces, t, curve[0], params)
+            branches = branches_of(tape, functions)
+            there = (functions == np.where(kinds == FLOOR, branches, 0.0)) & (kinds != GUARD)
+            if smooth and there.any():
+                said = "has no derivatives in a state on a switching surface"
+                raise AnalysisError(said, field="rhs", allowed="an equilibrium away from it")
+        series.compose(tape, np.array(params, dtype=np.float64), float(t), curve, branches, out)
+    return result
+
+
+def branches_of(tape: Tape, functions: Array) -> Array:
+    """Branches of the switches by the values of their functions, shapes (switches, ...)."""
+    floors = (tape.switches[0] == FLOOR).reshape(-1, *[1] * (functions.ndim - 1))
+    return np.where(floors, np.floor(functions), np.where(functions >= 0.0, 1.0, -1.0))

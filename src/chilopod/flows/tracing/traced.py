@@ -1,8 +1,7 @@
 """Numbers and arrays that record operations.
 
 A function that is called with these records its operations in a :class:`chilopod.flows.tracing.graph.Graph`.
-A use of the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`; if the value
-depends on parameters only, :class:`Concrete`, and the function can be traced again with those as plain numbers.
+A use of the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`.
 """
 
 from __future__ import annotations
@@ -14,21 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.flows.tracing.elementary import BUILDS
-from chilopod.flows.tracing.graph import Graph
-from chilopod.flows.tracing.tape import CONSTANT
+from chilopod.flows.tracing.graph import BUILDS, Graph
 
 
 class Untraceable(Exception):
     """A right-hand side is not a fixed sequence of known operations; the message names the obstacle."""
-
-
-class Concrete(Exception):
-    """The value of an expression of the given parameters alone is needed."""
-
-    def __init__(self, parameters: frozenset[int]) -> None:
-        super().__init__()
-        self.parameters = parameters
 
 
 Number = Any
@@ -59,11 +48,7 @@ class Traced(_Recording, np.lib.mixins.NDArrayOperatorsMixin):
         self.graph = graph
         self.node = node
 
-    # The caller needs the value.
-
     def _value(self, *_: Any) -> Any:
-        if self.graph.depends[self.node] == CONSTANT:
-            raise Concrete(self.graph.parameters_below(self.node))
         raise Untraceable("it needs the value of a number: a branch, an index, or a function of another library")
 
     __bool__ = __float__ = __int__ = __index__ = __complex__ = __hash__ = __round__ = _value

@@ -18,8 +18,7 @@ import numpy as np
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import numbers
-from chilopod.flows.implicit.flow import Stretched
+from chilopod.flows.arguments import numbers, shape_of
 from chilopod.frozen import Array
 
 
@@ -164,15 +163,15 @@ class FlowsMany(KnowsOrbit, Protocol):
 
 
 @runtime_checkable
-class FlowsFrames(SystemLike, Protocol):
-    """Systems that resolve the decay of directions that vanish within a step of the integration."""
+class FlowsVolumes(SystemLike, Protocol):
+    """Systems that resolve the decay of volumes where a direction vanishes within a step of the integration."""
 
     def is_stiff(self, x: Array, t0: float, t1: float, /) -> bool:
-        """True if the derivative of the flow from state x at t0 to t1 does not resolve such directions."""
+        """True if the derivative of the flow from state x at t0 to t1 does not resolve such a direction."""
         ...
 
-    def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float, /) -> Stretched:
-        """Carry a frame, orthonormal in these units of the states, from a state at t0 to t1."""
+    def flow_volume(self, x: Array, t0: float, t1: float, /) -> tuple[float, float]:
+        """Logarithm of the growth of volume from state x at t0 to t1, and a bound on its error."""
         ...
 
 
@@ -194,9 +193,9 @@ def expands_velocity(system: SystemLike) -> TypeGuard[ExpandsVelocity]:
     return getattr(system, "velocity_series", None) is not None
 
 
-def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[FlowsFrames]:
+def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[FlowsVolumes]:
     """True if a return from state x at time 0 contracts some directions more than its derivative resolves."""
-    return getattr(system, "flow_frame", None) is not None and system.is_stiff(x, 0.0, duration)  # type: ignore[attr-defined]
+    return getattr(system, "flow_volume", None) is not None and system.is_stiff(x, 0.0, duration)  # type: ignore[attr-defined]
 
 
 def flows_states(system: SystemLike) -> TypeGuard[FlowsStates]:
@@ -222,11 +221,11 @@ def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: f
     usual = type(state) is type(derivative) is np.ndarray and state.dtype == derivative.dtype == np.float64
     if usual and not with_error and state.shape == (n,) and derivative.shape == (n, n):
         return found
-    shapes = [np.shape(each) for each in found]
+    shapes = [shape_of(each) for each in found]
     if shapes[:2] != [(n,), (n, n)] or shapes[2:] not in ([], [()], [(n, n)]):
         said = f"gives shapes {' and '.join(map(str, shapes))}"
         raise AnalysisError(said, field="flow", allowed=f"({n},) and ({n}, {n})")
-    parts = [numbers(each, shape, "flow") for each, shape in zip(found, shapes, strict=True)]
+    parts = [numbers(each, np.shape(each), "flow") for each in found]
     return tuple(each if each.ndim else float(each) for each in parts)
 
 

@@ -274,7 +274,7 @@ def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
     after a time limit."""
     deadline.check()
     if flows_states(system):
-        return np.asarray(system.flow_states(states, t0, t1))
+        return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
     if flows_tangents(system):
         return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
     return np.array([checked_flow(system, x, t0, t1)[0] for x in states])

@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import LARGEST, checked_count, finite_array, positive
 from chilopod.flows.balance import numerical_balance
-from chilopod.flows.implicit.flow import Stretched
 from chilopod.frozen import Array, ReadOnlyArrays
 
 Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
 
-_MORE = "velocity", "flow_with_error", "flow_states", "flow_tangents", "flow_frame", "is_stiff", "velocity_series"
+_MORE = "velocity", "flow_with_error", "flow_states", "flow_tangents", "flow_volume", "is_stiff", "velocity_series"
 _HIGHEST_ORDER = 1000
 _SAME = 1e-8  # difference of equal matrices, relative to their size
 _ROUND_OFF = 1e-7  # relative to the largest entry, in units that balance the matrix: with the above, some last digits
@@ -55,7 +54,7 @@ class PeriodicSystem(ReadOnlyArrays):
     guess_period
         Approximate period of such a system's orbits; an orbit gets its shortest period even if the guess is nearer to
         a multiple of it.
-    flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff, velocity_series
+    flow_with_error, flow_states, flow_tangents, flow_volume, is_stiff, velocity_series
         See :mod:`chilopod.stability.problem.capabilities`.
     concurrent
         True if flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -75,7 +74,7 @@ class PeriodicSystem(ReadOnlyArrays):
     )
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
     flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = field(default=None, repr=False)
-    flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = field(default=None, repr=False)
+    flow_volume: Callable[[Array, float, float], tuple[float, float]] | None = field(default=None, repr=False)
     is_stiff: Callable[[Array, float, float], bool] | None = field(default=None, repr=False)
     velocity_series: Callable[[Array], Array] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)

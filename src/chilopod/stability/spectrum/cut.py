@@ -17,25 +17,23 @@ from chilopod.stability.problem.scales import sizes
 from chilopod.stability.spectrum.eigenvalues import normal_basis
 
 _WORST_CONDITION = 1e6
-_FEWEST, _MOST = 8, 32768  # numbers of parts of moderate condition
+_FEWEST, _MOST, _MOST_STIFF = 8, 32768, 4096  # numbers of parts of moderate condition; steps of a stiff flow are costly
 _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, above which the flow has no parts
 
 
 @dataclass(frozen=True)
 class Cut:
-    """A return in parts, with orthonormal bases at the borders: of the planes across the motion, or of the space."""
+    """A return in parts, between planes across the motion if a system does not depend on time."""
 
-    times: Array  # times of the borders, shape (parts + 1,)
-    states: Array  # states there, shape (parts + 1, n)
     units: Array  # sizes of the states, shape (n,)
-    sections: Sequence[Array]  # bases, in units
-    factors: Sequence[Array]  # derivatives of the flow over the parts in these, the last one with the symmetry in time
+    section: Array  # orthonormal basis of the first plane, or of the space, in units
+    factors: Sequence[Array]  # derivatives of the flow over the parts, the last one with the symmetry in time
     errors: Sequence[Array]  # bounds on the errors of their entries
 
     @property
     def basis(self) -> Array:
-        """The first section in the units of the system."""
-        return self.units[:, None] * self.sections[0]
+        """The first plane in the units of the system."""
+        return self.units[:, None] * self.section
 
 
 @dataclass(frozen=True)
@@ -49,26 +47,24 @@ class _Part:
     error: Array
 
 
-def equal_cut(system: SystemLike, x: Array, image: ReturnMap, count: int) -> Cut:
-    """A return from a state on the orbit in equal parts."""
-    units = _units(system, x, image)
-    return _on_sections(system, x, _equal_parts(system, x, image, count, units), units)
-
-
-def moderate_cut(system: SystemLike, x: Array, image: ReturnMap) -> Cut:
-    """A return from a state on the orbit in parts of moderate condition: those that contract too strongly are halved.
-    The return of a map, which has no parts, stays whole. Raises AnalysisError if no parts are of moderate condition."""
-    units = _units(system, x, image)
-    parts = _equal_parts(system, x, image, _FEWEST, units)
-    if not is_autonomous(system):
+def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int = 0) -> Cut:
+    """A return from a state on the orbit in parts of moderate condition, apart from the ``unresolved`` fastest
+    directions: those that contract too strongly are halved. The return of a map, which has no parts, stays whole.
+    Raises AnalysisError if no parts are of moderate condition."""
+    # The derivative on a section may be only round-off; an orbit that moves gives the sizes.
+    autonomous, duration = is_autonomous(system), image.period / image.returns
+    units = sizes(system, x, duration) if autonomous else numerical_balance(image.jacobian)
+    parts: list[_Part] = []
+    for start, end in itertools.pairwise(np.linspace(0.0, duration, _FEWEST + 1).tolist()):
+        parts.append(_part(system, parts[-1].state if parts else x, start, end, units))
+    if not (autonomous or unresolved):
         ratios = units / units[:, None]
         whole = image.jacobian * ratios
         product = np.linalg.multi_dot([turn_in_units(system, units), *(part.factor for part in reversed(parts))])
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
             error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
-            times = np.array([0.0, image.period / image.returns])
-            return Cut(times, np.array([x, image.state]), units, [np.eye(x.size)] * 2, [whole], [error])
-    return _on_sections(system, x, _of_moderate_condition(system, x, parts, units), units)
+            return Cut(units, np.eye(x.size), [whole], [error])
+    return _on_sections(system, x, _of_moderate_condition(system, x, parts, units, unresolved), units)
 
 
 def turn_in_units(system: SystemLike, units: Array) -> Array:
@@ -83,38 +79,29 @@ def section_basis(system: SystemLike, state: Array, units: Array) -> Array:
     return normal_basis(np.asarray(system.velocity(state)) / units)
 
 
-def _units(system: SystemLike, x: Array, image: ReturnMap) -> Array:
-    # The derivative on a section may be only round-off; an orbit that moves gives the sizes.
-    if is_autonomous(system):
-        return sizes(system, x, image.period / image.returns)
-    return numerical_balance(image.jacobian)
-
-
-def _equal_parts(system: SystemLike, x: Array, image: ReturnMap, count: int, units: Array) -> list[_Part]:
-    parts: list[_Part] = []
-    for start, end in itertools.pairwise(np.linspace(0.0, image.period / image.returns, count + 1).tolist()):
-        parts.append(_part(system, parts[-1].state if parts else x, start, end, units))
-    return parts
-
-
 def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) -> _Part:
     state, derivative, error = flow_with_error(system, x.copy(), start, end)
     factor = derivative * units / units[:, None]
     return _Part(start, end, state, factor, np.broadcast_to(error, factor.shape) * units / units[:, None])
 
 
-def _of_moderate_condition(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> list[_Part]:
+def _of_moderate_condition(
+    system: SystemLike, x: Array, parts: list[_Part], units: Array, unresolved: int
+) -> list[_Part]:
     """Parts of a return; those that contract too strongly are halved repeatedly."""
     done: list[_Part] = []
-    left, asked = parts[::-1], len(parts)
+    left, asked, most = parts[::-1], len(parts), _MOST_STIFF if unresolved else _MOST
     while left:
         part = left.pop()
-        if float(np.linalg.cond(part.factor)) < _WORST_CONDITION:
+        stretches = np.linalg.svd(part.factor, compute_uv=False)
+        # The errors of a stiff flow are relative to the states at the start.
+        largest, kept = max(stretches[0], float(unresolved)), stretches[: stretches.size - unresolved]
+        if not kept.size or largest < _WORST_CONDITION * kept[-1]:
             done.append(part)
             continue
         middle = 0.5 * (part.start + part.end)
         asked += 2
-        if asked > _MOST or not part.start < middle < part.end:
+        if asked > most or not part.start < middle < part.end:
             raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
         first = _part(system, done[-1].state if done else x, part.start, middle, units)
         left += [_part(system, first.state, middle, part.end, units), first]
@@ -122,13 +109,11 @@ def _of_moderate_condition(system: SystemLike, x: Array, parts: list[_Part], uni
 
 
 def _on_sections(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> Cut:
-    states = [x, *(part.state for part in parts)]
-    sections = [section_basis(system, state, units) for state in states[:-1]]
-    sections.append(sections[0])
+    states = [x, *(part.state for part in parts[:-1])]
+    sections = [section_basis(system, state, units) for state in states]
     turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
     factors, errors = [], []
-    for part, turn, (before, after) in zip(parts, turns, itertools.pairwise(sections), strict=True):
+    for part, turn, (before, after) in zip(parts, turns, itertools.pairwise([*sections, sections[0]]), strict=True):
         factors.append(after.T @ turn @ part.factor @ before)
         errors.append(np.abs(after.T) @ np.abs(turn) @ part.error @ np.abs(before))
-    times = np.array([0.0, *(part.end for part in parts)])
-    return Cut(times, np.array(states), units, sections, factors, errors)
+    return Cut(units, sections[0], factors, errors)

@@ -9,9 +9,9 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import matrix_balance
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
 from chilopod.stability.spectrum.errors import DRAWS, SAFETY, disturbed
@@ -121,8 +121,7 @@ class Spectra:
         if self._units is None:
             size = np.abs(matrices).max(axis=0)
             filled = size + _FILL * size.max() if size.max() > 0.0 else size
-            with np.errstate(all="ignore"):
-                units = matrix_balance(filled, permute=False, separate=True)[1][0]
+            units = numerical_balance(filled)
             self._units = units if (np.isfinite(units) & (units > 0.0)).all() else np.ones_like(units)
         return np.asarray(matrices * (self._units / self._units[:, None]))
 

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from chilopod.frozen import Array
-from chilopod.stability.unit_circle.interpolation import DEGREE, DENSE, PLACES, interpolated
 
 Interval = tuple[float, float]
 SignedLog = Callable[[Array], tuple[Array, Array]]
@@ -40,6 +39,17 @@ _ULPS = 256.0  # width of the finest piece in units in the last place
 _WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # places in a part, and least relative slope for a simple zero
 _REAL = 1e-6  # largest imaginary part of a place where a level is just reached
 
+DEGREE = 8
+PLACES: Array = np.append(np.cos(np.pi * np.arange(DEGREE, -1, -1) / DEGREE), [-0.618, 0.137])
+"""Nodes of the polynomial, and the two places of the comparison."""
+
+DENSE = np.linspace(-1.0, 1.0, 65)
+"""Places where the polynomial is evaluated."""
+
+_FIT = np.linalg.inv(chebyshev.chebvander(PLACES[: DEGREE + 1], DEGREE))
+_AT_CHECKS = chebyshev.chebvander(PLACES[DEGREE + 1 :], DEGREE)
+_AT_DENSE = chebyshev.chebvander(DENSE, DEGREE)
+
 _DEGREES = np.arange(DEGREE + 1.0)
 _BULGE = _DEGREES**2 * (_DEGREES**2 - 1.0) / 3.0 * (DENSE[1] - DENSE[0]) ** 2 / 8.0
 """Largest bulge of each Chebyshev polynomial between neighbours of ``DENSE``, by its largest second derivative."""
@@ -53,6 +63,14 @@ class Zeros(NamedTuple):
     unresolved: tuple[Interval, ...]  # not polynomial: the function is not smooth there, or the budget was spent
     missing: tuple[Interval, ...]  # the function cannot be evaluated, or only in part
     spent: bool  # the budget ended the search
+
+
+def interpolated(values: Array) -> tuple[Array, Array, Array]:
+    """Chebyshev coefficients of the polynomial through the values of a function, or of several as columns, at
+    ``PLACES``; its error; and its values at ``DENSE``."""
+    coefficients: Array = _FIT @ values[: DEGREE + 1]
+    off = np.abs(_AT_CHECKS @ coefficients - values[DEGREE + 1 :]).max(axis=0)
+    return coefficients, np.maximum(off, np.abs(coefficients[-2:]).max(axis=0)), _AT_DENSE @ coefficients
 
 
 def between(low: float, high: float) -> str:
