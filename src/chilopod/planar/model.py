@@ -307,8 +307,8 @@ def carry(
     ends = widths[:, None] * parts
     begins = np.hstack([np.zeros((widths.size, 1)), ends[:, :-1]])
     sample = np.full(ends.shape, -1)
-    sample[:, :-1] = np.arange(sample[:, :-1].size).reshape(widths.size, -1)
-    record = np.empty((sample.max(initial=-1) + 1, count, n + 3))
+    sample[:, :-1] = np.arange(widths.size * (parts.size - 1)).reshape(widths.size, parts.size - 1)
+    record = np.empty((widths.size * (parts.size - 1), count, n + 3))
     if count and widths.size:
         whole, status = np.zeros((count, n + 3)), np.full(count, stretch.WALKING)
         whole[:, :size] = states

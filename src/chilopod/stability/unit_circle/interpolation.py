@@ -1,4 +1,6 @@
-"""Polynomials of degree eight on a piece -1 ... 1, compared with the function at two more places."""
+"""Polynomials of degree eight or sixteen on a piece -1 ... 1, compared with the function at two more places."""
+
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -9,17 +11,28 @@ DEGREE = 8
 PLACES: Array = np.append(np.cos(np.pi * np.arange(DEGREE, -1, -1) / DEGREE), [-0.618, 0.137])
 """Nodes of the polynomial, and the two places of the comparison."""
 
+MORE_PLACES: Array = np.append(PLACES, np.cos(np.pi * (np.arange(DEGREE) + 0.5) / DEGREE))
+"""The same, and the nodes in between, for twice the degree."""
+
 DENSE = np.linspace(-1.0, 1.0, 65)
 """Places where the polynomial is evaluated."""
 
-_FIT = np.linalg.inv(chebyshev.chebvander(PLACES[: DEGREE + 1], DEGREE))
-_AT_CHECKS = chebyshev.chebvander(PLACES[DEGREE + 1 :], DEGREE)
-_AT_DENSE = chebyshev.chebvander(DENSE, DEGREE)
+_CHECKS = [DEGREE + 1, DEGREE + 2]
 
 
 def interpolated(values: Array) -> tuple[Array, Array, Array]:
     """Chebyshev coefficients of the polynomial through the values of a function, or of several as columns, at
-    ``PLACES``; its error; and its values at ``DENSE``."""
-    coefficients: Array = _FIT @ values[: DEGREE + 1]
-    off = np.abs(_AT_CHECKS @ coefficients - values[DEGREE + 1 :]).max(axis=0)
-    return coefficients, np.maximum(off, np.abs(coefficients[-2:]).max(axis=0)), _AT_DENSE @ coefficients
+    ``PLACES`` or ``MORE_PLACES``; its error; and its values at ``DENSE``."""
+    fit, at_checks, at_dense = _matrices(len(values))
+    coefficients: Array = fit @ np.delete(values, _CHECKS, axis=0)
+    off = np.abs(at_checks @ coefficients - values[_CHECKS]).max(axis=0)
+    return coefficients, np.maximum(off, np.abs(coefficients[-2:]).max(axis=0)), at_dense @ coefficients
+
+
+@cache
+def _matrices(count: int) -> tuple[Array, Array, Array]:
+    """Coefficients from the values at the nodes among so many places, and values at the checks and at ``DENSE`` from
+    coefficients."""
+    nodes = np.delete(MORE_PLACES[:count], _CHECKS)
+    fit, *values = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, MORE_PLACES[_CHECKS], DENSE))
+    return np.linalg.inv(fit), values[0], values[1]
