@@ -31,6 +31,7 @@ TOLERANCE = 1e-13
 
 _SAME_INSTANT = 1e-12  # in periods
 _ROWS_DIFFER = 2.0  # joint rates are differences of two rows
+_FEW = 2  # robots whose linear flows take no longer than waking other threads
 _MOST_STEPS = 2e5  # of the linear flow: ten seconds or so
 _MOST_WORK = 2e9  # steps times the cube of the states: likewise of many modules
 _MOST_NUMBERS = 1e8  # of the matrices of a period
@@ -111,7 +112,7 @@ class PlanarModel(ReadOnlyArrays):
         signs[0] = 1.0
         return read_only(np.diag(signs))
 
-    @property
+    @cached_property
     def symmetry(self) -> Array | None:
         """Reflection, if the right legs repeat the motion of the left legs half a period later; else None."""
         return self.reflection if self.use_symmetry and self.robot.gait.half_period_symmetric else None
@@ -208,7 +209,12 @@ class PlanarModel(ReadOnlyArrays):
         to_joint, from_joint = _joint_rates(models[0].modules)
         matrices = np.tile(from_joint, (len(models), 1, 1))
         errors = np.empty(len(models))
-        linear.propagate_batch(widths, upper, decay, frequency, models[0]._clock(t0, t1), matrices, errors)
+        clock = models[0]._clock(t0, t1)
+        if len(models) <= _FEW:
+            for i, matrix in enumerate(matrices):
+                errors[i], _ = linear.propagate(widths, upper[i], decay[i], frequency[i], clock, matrix)
+        else:
+            linear.propagate_batch(widths, upper, decay, frequency, clock, matrices, errors)
         return to_joint @ matrices, _ROWS_DIFFER * errors
 
     def can_flow_with(self, other: PlanarModel) -> bool:
