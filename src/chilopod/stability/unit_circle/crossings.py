@@ -246,13 +246,12 @@ class _Finder:
 
     def _root(self, event: Event, left: float, right: float) -> Root:
         reference = float(self.spectra.function(np.array([left, right]), event)[1].max())
-        within, narrowest = 0.1 * (right - left), _NARROW * max(abs(left), abs(right))
-        if within > narrowest:
+        within = 0.1 * (right - left)
+        if within > _NARROW * max(abs(left), abs(right)):
             error = float(self.spectra.function_error(np.array([left]), event)[0])
             wrong = float(np.exp(min(error - reference, 0.0)))
             # Between the two the function is nearly linear, if its signs there are certain.
             within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left) if wrong < _TELLING else 0.0
-        within = max(within, narrowest)
 
         def value(place: float) -> float:
             signs, logs = self.spectra.function(np.array([place]), event)

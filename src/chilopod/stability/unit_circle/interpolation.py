@@ -34,5 +34,5 @@ def _matrices(count: int) -> tuple[Array, Array, Array]:
     """Coefficients from the values at the nodes among so many places, and values at the checks and at ``DENSE`` from
     coefficients."""
     nodes = np.delete(MORE_PLACES[:count], _CHECKS)
-    fit, *values = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, MORE_PLACES[_CHECKS], DENSE))
-    return np.linalg.inv(fit), values[0], values[1]
+    fit, checks, dense = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, MORE_PLACES[_CHECKS], DENSE))
+    return np.asarray(np.linalg.inv(fit)), np.asarray(checks), np.asarray(dense)
