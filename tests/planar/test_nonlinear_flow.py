@@ -143,6 +143,14 @@ def test_rows_of_a_batch_do_not_see_each_other():
     assert model.flow_states(np.empty((0, 13)), 0.0, 0.6).shape == (0, 13)
 
 
+def test_joints_may_bend_as_far_as_they_like():
+    model = PlanarModel(PRESET)
+    states = np.array([state_of(model, seed, bend=3.0) for seed in range(3)])
+    assert np.abs(states[:, 3:8]).max() > 0.6 * np.pi
+    expected = [model.flow(state, 0.05, 0.35)[0] for state in states]
+    np.testing.assert_allclose(model.flow_states(states, 0.05, 0.35), expected, rtol=0, atol=1e-10)
+
+
 def test_the_number_of_threads_changes_no_bit():
     if numba.config.NUMBA_NUM_THREADS < 2:
         pytest.skip("one core")

@@ -67,6 +67,17 @@ def test_nothing_is_asked_outside_the_interval():
     assert max(asked) <= 1.0
 
 
+def test_twice_the_degree_resolves_a_smooth_function_without_a_cut():
+    asked = set()
+
+    def function(x):
+        asked.update(x.tolist())
+        return np.sign(np.exp(x) - 3.0), np.log(np.abs(np.exp(x) - 3.0))
+
+    assert len(find_zeros(function, -2.0, 3.0).changes) == 1
+    assert len(asked) == 19 + 2  # all places on the interval, and both ends of the doubtful part
+
+
 _DYADIC = st.sampled_from([0.0, 0.125, 0.25, 0.5, 0.75, 1.0])
 _NODE = st.integers(0, 8).map(lambda k: 0.5 - 0.5 * np.cos(np.pi * k / 8))
 _PLACE = st.one_of(_DYADIC, _NODE, st.floats(0.0, 1.0))

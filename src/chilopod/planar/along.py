@@ -14,7 +14,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.integrate import COMPLEX_STEP
 from chilopod.planar.drift import Drift
 from chilopod.planar.energy import foot_powers, foot_slip
-from chilopod.planar.model import PlanarModel, carry
+from chilopod.planar.model import PlanarModel, carry, carry_tangents
 
 NODES = 16
 """Gauss-Legendre nodes in every interval between two switches: after each one, motion settles within milliseconds."""
@@ -50,7 +50,7 @@ class FollowedModel(PlanarModel):
         state, left, right = x.astype(np.complex128), np.eye(self.dimension), np.eye(self.dimension)
         for start, end in zip(times, times[1:], strict=False):
             batch = np.ascontiguousarray(state + 1j * COMPLEX_STEP * left.T)  # numba would compile everything once more
-            carry([self], batch, start, end, tolerance)
+            carry_tangents(self, batch, start, end, tolerance)
             state, left = batch[0].real.astype(np.complex128), batch.imag.T / COMPLEX_STEP
             basis, upper, order = qr(left, mode="economic", pivoting=True)
             size = np.abs(np.diag(upper))

@@ -1,14 +1,13 @@
-"""Flow of the nonlinear planar model and its derivative, many robots at a time.
+"""Pieces of time between switches of the contact pattern, and the nonlinear flow of tangents through them.
 
-The compiled loop runs over robots; each is integrated from switch to switch of its contact pattern, so that the
-right-hand side is always smooth. A tangent is one more "robot" whose state has an imaginary part (see
-:mod:`chilopod.integrate`).
+Every tangent is carried together with its state, as the imaginary part of that (see :mod:`chilopod.integrate`), from
+switch to switch, so that the right-hand side is always smooth. States alone go through :mod:`chilopod.planar.stretch`.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
@@ -16,9 +15,8 @@ from numpy.typing import NDArray
 
 from chilopod.compiled import copy_into, parallel_njit
 from chilopod.errors import ParameterError
-from chilopod.frozen import Array
+from chilopod.frozen import Array, ComplexArray
 from chilopod.integrate import integrator
-from chilopod.planar.contact import MOMENTS
 from chilopod.planar.dynamics import SCRATCH, rhs
 
 if TYPE_CHECKING:
@@ -26,17 +24,6 @@ if TYPE_CHECKING:
 
 
 _integrate = integrator(rhs)
-
-
-class Chains(NamedTuple):
-    """Numbers of robots of one gait and size: scalars (see :mod:`chilopod.planar.dynamics`), shape (robots, 4);
-    stiffness and damping of the joints, N*m/rad and N*m*s/rad, shape (robots, N-1); contact moments at the start of the
-    contact interval of every piece, shape (robots, pieces, N, 8)."""
-
-    scalars: Any
-    stiffness: Any
-    damping: Any
-    moments: Any
 
 
 @lru_cache(maxsize=256)
@@ -59,58 +46,40 @@ def pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array
 
 
 def advance(
-    starts: Array, widths: Array, robots: Chains, states: Any, tolerance: float, nodes: Array | None = None
-) -> Any:
-    """Carry every row of ``states`` through all pieces of time, in place, on all cores.
+    starts: Array, widths: Array, robot: tuple[Array, Array, Array, Array], states: ComplexArray, tolerance: float
+) -> bool:
+    """Carry every row of ``states``, shape (states, 2N+1), through all pieces of time, in place, on all cores.
 
-    Pieces have start times in their contact intervals and durations, s, shape (pieces,). One robot serves all states,
-    or each state has its own; states have shape (states, 2N+1), or with poses behind (states, 2N+4), float64 or
-    complex128. The tolerance is relative to max(1, |x|). Nodes are parts of every piece, rising, 0 to 1.
-
-    Returns reduced states at the nodes, shape (states, pieces, nodes, 2N+1), None if a motion diverges. ParameterError
-    for inconsistent shapes, because compiled code would read beyond the arrays.
+    Pieces have start times in their contact intervals and durations, s, shape (pieces,). The robot is given by scalars,
+    stiffness and damping as the right-hand side takes them (see :mod:`chilopod.planar.dynamics`), and by the contact
+    moments at the start of the contact interval of every piece, shape (pieces, N, 8). The tolerance is relative to
+    max(1, |x|). Returns False if a motion diverges.
     """
-    count, (several, joints) = len(states), robots.stiffness.shape
-    fits = (
-        starts.shape == widths.shape
-        and robots.scalars.shape == (several, 4)
-        and robots.damping.shape == (several, joints)
-        and robots.moments.shape == (several, widths.size, joints + 1, MOMENTS)
-        and states.shape[1:] in ((2 * joints + 3,), (2 * joints + 6,))
-        and several in (1, count)
-    )
-    if not fits:
-        allowed = f"(any number, {2 * joints + 3} or {2 * joints + 6})"
-        raise ParameterError("has the wrong shape", field="states", value=states.shape, allowed=allowed)
-    nodes = np.empty(0) if nodes is None else nodes
-    recorded = np.empty((count, widths.size, nodes.size, 2 * joints + 3), states.dtype)
-    ok = np.ones(count, dtype=np.bool_)
-    if count:
-        _advance(starts, widths, robots, states, tolerance, nodes, recorded, ok)
-    return recorded if ok.all() else None
+    ok = np.ones(len(states), dtype=np.bool_)
+    _advance(starts, widths, *robot, states, tolerance, ok)
+    return bool(ok.all())
 
 
 @parallel_njit
 def _advance(
-    starts: Any, widths: Any, robots: Any, states: Any, tolerance: float, nodes: Any, recorded: Any, ok: Any
+    starts: Any,
+    widths: Any,
+    scalars: Any,
+    stiffness: Any,
+    damping: Any,
+    moments: Any,
+    states: Any,
+    tolerance: float,
+    ok: Any,
 ) -> None:
     for r in numba.prange(states.shape[0]):
-        p = min(np.intp(r), robots.scalars.shape[0] - 1)
         x = states[r].copy()
         work = np.empty((16, x.size), x.dtype)
-        scratch = np.empty((robots.moments.shape[2], SCRATCH), x.dtype)
+        scratch = np.empty((moments.shape[1], SCRATCH), x.dtype)
         h = 0.0
         for s in range(widths.size):
-            args = (robots.scalars[p], robots.stiffness[p], robots.damping[p], robots.moments[p, s], scratch)
-            t = starts[s]
-            for node in range(nodes.size + 1):
-                end = starts[s] + (widths[s] * nodes[node] if node < nodes.size else widths[s])
-                h, ok[r] = _integrate(args, x, t, end, h, tolerance, work)
-                if not ok[r]:
-                    break
-                t = end
-                if node < nodes.size:
-                    copy_into(recorded[r, s, node], x)
+            args = (scalars, stiffness, damping, moments[s], scratch)
+            h, ok[r] = _integrate(args, x, starts[s], starts[s] + widths[s], h, tolerance, work)
             if not ok[r]:
                 break
         copy_into(states[r], x)

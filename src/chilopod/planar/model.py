@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.engine.actuators import FROM, GOAL
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import Array, ReadOnlyArrays, read_only
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, read_only
 from chilopod.integrate import COMPLEX_STEP
-from chilopod.planar import linear
+from chilopod.planar import linear, stretch
 from chilopod.planar.contact import contact_moments
 from chilopod.planar.drift import Drift
 from chilopod.planar.dynamics import SCRATCH
 from chilopod.planar.dynamics import rhs as compiled_rhs
-from chilopod.planar.flow import Chains, advance, pieces
+from chilopod.planar.flow import advance, pieces
 
 if TYPE_CHECKING:
     from chilopod.gait import Gait, Schedule
@@ -30,6 +31,7 @@ TOLERANCE = 1e-13
 
 _SAME_INSTANT = 1e-12  # in periods
 _ROWS_DIFFER = 2.0  # joint rates are differences of two rows
+_FEW = 2  # robots whose linear flows take no longer than waking other threads
 _MOST_STEPS = 2e5  # of the linear flow: ten seconds or so
 _MOST_WORK = 2e9  # steps times the cube of the states: likewise of many modules
 _MOST_NUMBERS = 1e8  # of the matrices of a period
@@ -110,7 +112,7 @@ class PlanarModel(ReadOnlyArrays):
         signs[0] = 1.0
         return read_only(np.diag(signs))
 
-    @property
+    @cached_property
     def symmetry(self) -> Array | None:
         """Reflection, if the right legs repeat the motion of the left legs half a period later; else None."""
         return self.reflection if self.use_symmetry and self.robot.gait.half_period_symmetric else None
@@ -140,7 +142,7 @@ class PlanarModel(ReadOnlyArrays):
         n = self.dimension
         batch = np.tile(x.astype(np.complex128), (n, 1))
         batch += 1j * COMPLEX_STEP * np.eye(n)
-        carry([self], batch, t0, t1, self.tolerance)
+        carry_tangents(self, batch, t0, t1, self.tolerance)
         derivative = batch.imag.T / COMPLEX_STEP
         # Against finer steps the global error stays within some tens of the tolerance per step, times the growth of the
         # motion; the derivative is that of a motion with this error, which adds the growth once more.
@@ -160,8 +162,8 @@ class PlanarModel(ReadOnlyArrays):
         starts, _, interval = self._pieces(t, t + self.period)
         out = np.empty_like(x)
         scratch = np.empty((self.modules, SCRATCH))
-        scalars, stiffness, damping, moments = (part[0] for part in _chains([self], interval[:1]))
-        compiled_rhs(float(starts[0]), x, (scalars, stiffness, damping, moments[0], scratch), out)
+        *numbers, moments = _numbers(self, interval[:1])
+        compiled_rhs(float(starts[0]), x, (*numbers, moments[0], scratch), out)
         return out
 
     def drift(self, x: ArrayLike) -> Drift:
@@ -207,7 +209,12 @@ class PlanarModel(ReadOnlyArrays):
         to_joint, from_joint = _joint_rates(models[0].modules)
         matrices = np.tile(from_joint, (len(models), 1, 1))
         errors = np.empty(len(models))
-        linear.propagate_batch(widths, upper, decay, frequency, models[0]._clock(t0, t1), matrices, errors)
+        clock = models[0]._clock(t0, t1)
+        if len(models) <= _FEW:
+            for i, matrix in enumerate(matrices):
+                errors[i], _ = linear.propagate(widths, upper[i], decay[i], frequency[i], clock, matrix)
+        else:
+            linear.propagate_batch(widths, upper, decay, frequency, clock, matrices, errors)
         return to_joint @ matrices, _ROWS_DIFFER * errors
 
     def can_flow_with(self, other: PlanarModel) -> bool:
@@ -289,28 +296,71 @@ class PlanarModel(ReadOnlyArrays):
 
 
 def carry(
-    models: Sequence[PlanarModel], states: Any, t0: float, t1: float, tolerance: float, nodes: Array | None = None
-) -> Any:
-    """Carry states of robots of one gait and size in place, one robot for all states or one each; AnalysisError if a
-    motion diverges.
+    models: Sequence[PlanarModel], states: Array, t0: float, t1: float, tolerance: float, nodes: ArrayLike = ()
+) -> Array:
+    """Carry states of robots of one gait and size, shape (states, 2N+1) or with poses behind (states, 2N+4), in place
+    on all cores, one robot for all states or one each; AnalysisError if a motion diverges.
 
-    Returns what :func:`chilopod.planar.flow.advance` recorded at the nodes.
+    Nodes are parts of every piece between two switches, rising, 0 to 1. Returns the reduced states there, shape
+    (states, pieces, nodes, 2N+1).
     """
-    starts, widths, interval = models[0]._pieces(t0, t1)
-    recorded = advance(starts, widths, _chains(models, interval), states, tolerance, nodes)
-    if recorded is None:
-        raise AnalysisError(f"the motion must stay finite, but it diverges between {t0:g} s and {t1:g} s", field="x")
-    return recorded
+    first, (count, size) = models[0], states.shape
+    n, parts = first.dimension, np.append(nodes, 1.0)
+    if size not in (n, n + 3) or len(models) not in (1, count):
+        problem, allowed = "has the wrong shape", f"({len(models)} or any number, {n} or {n + 3})"
+        raise ParameterError(problem, field="states", value=states.shape, allowed=allowed)
+    starts, widths, interval = first._pieces(t0, t1)
+    ends = widths[:, None] * parts
+    begins = np.hstack([np.zeros((widths.size, 1)), ends[:, :-1]])
+    sample = np.full(ends.shape, -1)
+    sample[:, :-1] = np.arange(widths.size * (parts.size - 1)).reshape(widths.size, parts.size - 1)
+    record = np.empty((widths.size * (parts.size - 1), count, n + 3))
+    if count and widths.size:
+        whole, status = np.zeros((count, n + 3)), np.full(count, stretch.WALKING)
+        whole[:, :size] = states
+        times = np.zeros(ends.size), (starts[:, None] + begins).ravel(), (ends - begins).ravel()
+        numbers = np.repeat(interval, parts.size), sample.ravel()
+        pieces = stretch.Pieces(*times, *numbers, first.schedule.contact, first.schedule.stroke)
+        stretch.carry(
+            np.arange(count), pieces, _robots(models, count), tolerance, whole, np.zeros(count), status, record
+        )
+        if (status != stretch.WALKING).any():
+            raise _diverged(t0, t1)
+        states[:] = whole[:, :size]
+    return np.moveaxis(record[..., :n].reshape(widths.size, parts.size - 1, count, n), 2, 0)
 
 
-def _chains(models: Sequence[PlanarModel], interval: NDArray[np.intp]) -> Chains:
-    """Copies of the models' numbers as the compiled loop takes them: numba compiles once more for read-only arrays."""
-    return Chains(
-        np.concatenate([model.scalars for model in models]),
-        np.stack([model.stiffness for model in models]),
-        np.stack([model.damping for model in models]),
-        np.stack([model.moments(interval) for model in models]),
-    )
+def carry_tangents(model: PlanarModel, states: ComplexArray, t0: float, t1: float, tolerance: float) -> None:
+    """Carry states with a tangent each, shape (states, 2N+1), in place; AnalysisError if a motion diverges."""
+    starts, widths, interval = model._pieces(t0, t1)
+    if not advance(starts, widths, _numbers(model, interval), states, tolerance):
+        raise _diverged(t0, t1)
+
+
+def _diverged(t0: float, t1: float) -> AnalysisError:
+    return AnalysisError(f"the motion must stay finite, but it diverges between {t0:g} s and {t1:g} s", field="x")
+
+
+def _numbers(model: PlanarModel, interval: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
+    """Copies of the model's scalars, stiffness, damping and contact moments: numba compiles once more for read-only
+    arrays."""
+    return model.scalars[0].copy(), model.stiffness.copy(), model.damping.copy(), model.moments(interval)
+
+
+def _robots(models: Sequence[PlanarModel], count: int) -> stretch.Robots:
+    """The models' robots without commands, one for all states or one each."""
+
+    def each(values: Sequence[ArrayLike]) -> Array:
+        return np.repeat(np.array(values), count // len(models), axis=0)
+
+    robots = [model.robot for model in models]
+    feet = each([(robot.legs.forward_offset, robot.legs.half_width) for robot in robots])
+    friction = each([np.full((models[0].modules, 2), robot.ground.friction) for robot in robots])
+    damping = each([model.damping for model in models])
+    profile = np.zeros((7, *damping.shape))
+    profile[FROM] = profile[GOAL] = each([model.stiffness for model in models])
+    none, scalars = np.zeros_like(damping), each([model.scalars[0] for model in models])
+    return stretch.Robots(scalars, feet, damping, friction, profile, none, none, np.zeros((count, 2)), np.inf)
 
 
 @lru_cache(maxsize=32)

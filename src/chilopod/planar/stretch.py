@@ -62,7 +62,8 @@ class Robots(NamedTuple):
     ``scalars``, see ``dynamics.py``, has shape (robots, 4), ``feet`` (forward offset and half-width, m) and ``yaw`` (of
     the legs of module 1, rad) have shape (robots, 2), ``damping`` (N*m*s/rad) shape (robots, N-1), ``friction`` of
     every foot (N*s/m) shape (robots, N, 2). ``profile``, ``lag`` and ``torque`` are those of
-    :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1) and (robots, N-1).
+    :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1) and (robots, N-1). A robot ends
+    OUT_OF_RANGE with a joint beyond ``most_bent``, rad.
     """
 
     scalars: Any
@@ -73,6 +74,7 @@ class Robots(NamedTuple):
     lag: Any
     torque: Any
     yaw: Any
+    most_bent: float = MOST_BENT
 
 
 class _Lanes(NamedTuple):
@@ -203,7 +205,7 @@ def _carrier(width: int) -> Callable[..., bool]:
                     status[r] = DIVERGED
                 elif at.rejected[lane] or not at.last[lane]:
                     continue
-                elif _most_bent(lanes.x, joints, lane) > MOST_BENT:
+                elif _most_bent(lanes.x, joints, lane) > robots.most_bent:
                     status[r] = OUT_OF_RANGE
                 elif at.end[lane] < pieces.widths[s]:
                     begin = at.end[lane]

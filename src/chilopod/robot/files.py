@@ -114,6 +114,8 @@ def to_toml(table: Mapping[str, Any]) -> str:
 
 
 def _frozen(value: Any) -> Any:
+    if isinstance(value, str):  # the most common, and whether it is a Mapping takes long to find out
+        return value
     if isinstance(value, Mapping):
         return Table(value)
     if isinstance(value, list | tuple):

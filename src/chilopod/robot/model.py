@@ -326,7 +326,9 @@ class Robot(Description):
             changes["springs"] = self.springs.model_copy(
                 update={key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
             )
-        texts = {name: text for name, text in self.provenance.items() if spring_index(name, path) < joints}
+        texts = dict(self.provenance)
+        if joints != self.body.modules - 1:
+            texts = {name: text for name, text in texts.items() if spring_index(name, path) < joints}
         changes["provenance"] = Table({**texts, path: _OVERRIDDEN})
         return self.model_copy(update=changes)
 

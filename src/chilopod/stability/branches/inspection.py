@@ -33,8 +33,8 @@ from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step, predicted
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
+from chilopod.stability.unit_circle.interpolation import DEGREE, PLACES, interpolated
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, distances, factors
-from chilopod.stability.unit_circle.zeros import DEGREE, PLACES, interpolated
 
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
 _BUDGET = 400  # corrected orbits within one step

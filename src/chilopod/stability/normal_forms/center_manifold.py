@@ -198,11 +198,12 @@ class Manifold:
         n = at.state.size
         if n == (1 if at.real else 2):
             return value, error
-        random, worst = np.random.default_rng(0), 0.0
+        random = np.random.default_rng(0)
         directions = turns(at)
         largest = found.radius * radii()[0]
         z = largest * directions
         off = {each: np.abs(excess) + uncertain for each, (excess, uncertain) in self._excess(found).items()}
+        shifts, factors = [], []
         for _ in range(_DRAWS):
             wrong = {}
             for each, difference in off.items():
@@ -211,15 +212,17 @@ class Manifold:
             shift = displacements(at, wrong, z)
             ratios = np.abs(shift).max(axis=0) / found.size
             ratios = ratios[np.isfinite(ratios) & (ratios > 0.0)]
-            if not ratios.size:
-                continue
-            times = _WRONG / float(ratios.max())
-            image = images(self._mapped, at, displacements(at, self.curve, z) + times * shift)
-            if image is None:
-                return value, np.inf
-            harmonic = np.fft.fft(image @ at.left.conj())[1] / directions.size
-            worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest ** sum(powers)))
-        return value, error + _SURE * worst
+            if ratios.size:
+                factors.append(_WRONG / float(ratios.max()))
+                shifts.append(factors[-1] * shift)
+        if not shifts:
+            return value, error
+        image = images(self._mapped, at, displacements(at, self.curve, z) + np.array(shifts))
+        if image is None:
+            return value, np.inf
+        harmonics = np.fft.fft(image @ at.left.conj())[:, 1] / directions.size
+        moved = np.abs(harmonics - found.outermost[1]) / (np.array(factors) * largest ** sum(powers))
+        return value, error + _SURE * float(moved.max())
 
     def _excess(self, found: Sampled) -> dict[Powers, tuple[ComplexArray, Array]]:
         """Excess of H(W) over W(g) at every monomial of the manifold, with its error: shape (n,) both."""

@@ -293,7 +293,11 @@ def _orbit(samples: Samples, value: float) -> Orbit:
     """The orbit at a value, with error bounds."""
     sample = samples.at(np.array([value]))[0]
     system = samples.family(value)
-    return from_known(system, sample.orbit) if samples.known else bounded(system, sample.orbit, sample.image)
+    return (
+        from_known(system, sample.orbit, image=sample.image)
+        if samples.known
+        else bounded(system, sample.orbit, sample.image)
+    )
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:

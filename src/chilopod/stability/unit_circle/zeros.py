@@ -1,7 +1,8 @@
 """All zeros of an analytic function in an interval.
 
-The interval is cut until the function is a polynomial of degree eight on every piece, to a small part of its size
-there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to its own error. So every piece
+The interval is cut until the function is a polynomial of degree eight on every piece, or sixteen on a wide one, to a
+small part of its size there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to its own
+error. So every piece
 consists of parts with a certain sign and narrow parts where the function may vanish. Between opposite signs such a part
 contains one zero, if the polynomial is monotonic there and the function has these signs at both ends. Any other part,
 which may contain no zero, two, or a double one, is refined on its own scale, until the function has a sign there or is
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from chilopod.frozen import Array
+from chilopod.stability.unit_circle.interpolation import DEGREE, DENSE, MORE_PLACES, PLACES, interpolated
 
 Interval = tuple[float, float]
 SignedLog = Callable[[Array], tuple[Array, Array]]
@@ -27,6 +29,7 @@ SignedLog = Callable[[Array], tuple[Array, Array]]
 (k,), so that no size is too small or too large; NaN where the function cannot be evaluated."""
 
 _RESOLVED = 1e-4  # largest error of a piece's polynomial, relative to its largest value
+_PROMISING = 1e-2  # largest error at which twice the degree resolves the piece: the error is about squared
 _CLEAR = 4.0  # value, in errors, with a certain sign
 _ROUNDING = 32.0 * float(np.finfo(float).eps)  # rounding of any polynomial, relative to its largest value
 _NARROW = 0.05  # widest useful part without a certain sign, relative to its piece
@@ -39,18 +42,7 @@ _ULPS = 256.0  # width of the finest piece in units in the last place
 _WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # places in a part, and least relative slope for a simple zero
 _REAL = 1e-6  # largest imaginary part of a place where a level is just reached
 
-DEGREE = 8
-PLACES: Array = np.append(np.cos(np.pi * np.arange(DEGREE, -1, -1) / DEGREE), [-0.618, 0.137])
-"""Nodes of the polynomial, and the two places of the comparison."""
-
-DENSE = np.linspace(-1.0, 1.0, 65)
-"""Places where the polynomial is evaluated."""
-
-_FIT = np.linalg.inv(chebyshev.chebvander(PLACES[: DEGREE + 1], DEGREE))
-_AT_CHECKS = chebyshev.chebvander(PLACES[DEGREE + 1 :], DEGREE)
-_AT_DENSE = chebyshev.chebvander(DENSE, DEGREE)
-
-_DEGREES = np.arange(DEGREE + 1.0)
+_DEGREES = np.arange(2.0 * DEGREE + 1.0)
 _BULGE = _DEGREES**2 * (_DEGREES**2 - 1.0) / 3.0 * (DENSE[1] - DENSE[0]) ** 2 / 8.0
 """Largest bulge of each Chebyshev polynomial between neighbours of ``DENSE``, by its largest second derivative."""
 
@@ -63,14 +55,6 @@ class Zeros(NamedTuple):
     unresolved: tuple[Interval, ...]  # not polynomial: the function is not smooth there, or the budget was spent
     missing: tuple[Interval, ...]  # the function cannot be evaluated, or only in part
     spent: bool  # the budget ended the search
-
-
-def interpolated(values: Array) -> tuple[Array, Array, Array]:
-    """Chebyshev coefficients of the polynomial through the values of a function, or of several as columns, at
-    ``PLACES``; its error; and its values at ``DENSE``."""
-    coefficients: Array = _FIT @ values[: DEGREE + 1]
-    off = np.abs(_AT_CHECKS @ coefficients - values[DEGREE + 1 :]).max(axis=0)
-    return coefficients, np.maximum(off, np.abs(coefficients[-2:]).max(axis=0)), _AT_DENSE @ coefficients
 
 
 def between(low: float, high: float) -> str:
@@ -162,16 +146,23 @@ class _Search:
 
     def look(self, pieces: list[Interval]) -> list[Interval]:
         """Search some pieces together; return the remaining pieces."""
-        places = np.array([_places(a, b, PLACES) for a, b in pieces])
-        signs, logs = (part.reshape(places.shape) for part in self._ask(places.ravel()))
         left: list[Interval] = []
-        for (a, b), row_signs, row_logs in zip(pieces, signs, logs, strict=True):
-            parts = self._parts(a, b, row_signs, row_logs)
-            if parts:
-                self.put(parts)
-            else:
-                middle = 0.5 * a + 0.5 * b
-                left += [(a, middle), (middle, b)]
+        for wanted in (PLACES, MORE_PLACES):
+            places = np.array([_places(a, b, wanted) for a, b in pieces]).reshape(-1, wanted.size)
+            signs, logs = (part.reshape(places.shape) for part in self._ask(places.ravel()))
+            promising = []
+            for (a, b), row_signs, row_logs in zip(pieces, signs, logs, strict=True):
+                parts = self._parts(a, b, row_signs, row_logs)
+                if parts is None:
+                    promising.append((a, b))
+                elif parts:
+                    self.put(parts)
+                else:
+                    middle = 0.5 * a + 0.5 * b
+                    left += [(a, middle), (middle, b)]
+            if not promising:
+                break
+            pieces = promising
         return left
 
     def _ask(self, places: Array) -> tuple[Array, Array]:
@@ -185,8 +176,8 @@ class _Search:
         least = max(part * (0.5 * self.high - 0.5 * self.low), 0.5 * _ULPS * float(np.spacing(max(abs(a), abs(b)))))
         return 0.5 * b - 0.5 * a <= least
 
-    def _parts(self, a: float, b: float, signs: Array, logs: Array) -> list[_Part]:
-        """Parts of a piece; empty if it must be cut."""
+    def _parts(self, a: float, b: float, signs: Array, logs: Array) -> list[_Part] | None:
+        """Parts of a piece; None if more places promise them, empty if it must be cut."""
         absent = np.isnan(signs) | np.isnan(logs) | (logs == np.inf)
         if absent.any():
             return [_Part(a, b, _Kind.MISSING)] if absent.all() or self._fine(a, b, _HOLE) else []
@@ -195,14 +186,17 @@ class _Search:
             return [_Part(a, b, _Kind.ZERO)]
         coefficients, off, dense = interpolated(signs * np.exp(logs - reference))
         wrong = max(float(off), _ROUNDING)
-        if max(dense.min(), -dense.max()) > _CLEAR * wrong + float(np.abs(coefficients) @ _BULGE):
+        if max(dense.min(), -dense.max()) > _CLEAR * wrong + float(np.abs(coefficients) @ _BULGE[: coefficients.size]):
             return [_Part(a, b, _Kind.SIGN, float(np.sign(dense[0])))]
-        if self.skip is not None and self._fine(a, b, _DEEP) and self.skip(a, b):
+        deep = self._fine(a, b, _DEEP)
+        if self.skip is not None and deep and self.skip(a, b):
             return [_Part(a, b, _Kind.SKIPPED)]
         parts = self._cut(a, b, coefficients, wrong, reference)
         if wrong <= _RESOLVED and not any(_wide(part, a, b) for part in parts):
             return parts
-        if self.error is not None and self._fine(a, b, _DEEP):
+        if not deep and signs.size == PLACES.size and wrong <= _PROMISING:
+            return None
+        if self.error is not None and deep:
             noise = float(np.exp(min(self.error(_places(a, b, PLACES)).max() - reference, 0.0)))
             if _CLEAR * noise >= 1.0:
                 return [_Part(a, b, _Kind.ZERO)]
