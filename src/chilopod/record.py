@@ -164,6 +164,11 @@ class Samples:
         rows.flags.writeable = False
         return rows
 
+    def cut(self, count: int) -> None:
+        """Drop the rows from a number on."""
+        self._rows[count : self.count] = np.nan
+        self.count = min(self.count, count)
+
     def grown(self, count: int) -> Array:
         """Writable view of at least ``count`` rows, new ones NaN, valid until the next call."""
         if count > len(self._rows):

@@ -239,6 +239,18 @@ class Walk(Protocol):
         """
 
 
+@runtime_checkable
+class Prepares(Protocol):
+    """A walk that may be computed ahead of its time, in one piece; the results do not change."""
+
+    def prepare(self, until: float) -> None:
+        """Prepare for times up to ``until``, s, before which nothing will be commanded; the present time stays.
+
+        To :meth:`Walk.advance` up to there, to look at poses at samples of the record, and to :meth:`Walk.aim` and
+        :meth:`Walk.halt` there, then costs next to nothing. A command before ``until`` costs the preparation.
+        """
+
+
 def missing_parts(walk: object) -> list[str]:
     """Names of the attributes of :class:`Walk` that an object lacks."""
     return [name for name in vars(Walk) if not name.startswith("_") and not hasattr(walk, name)]

@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from heapq import merge
-from itertools import count, islice, takewhile
+from itertools import chain, count, islice, pairwise, takewhile
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.engine.arguments import as_array, as_number, check_time
-from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
+from chilopod.engine.contract import Command, Controller, Event, Observation, Prepares, Walk
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
@@ -163,7 +163,7 @@ def steer(
 
     pace = _Pace()
     since, thought = clock.perf_counter(), 0.0
-    for time, index, event in _instants(controller, gait, referee, begun, until):
+    for time, index, event, following in _instants(controller, gait, referee, begun, until):
         if time < begun:
             continue
         pace.advance(walk, time, tell)
@@ -187,6 +187,7 @@ def steer(
             error.field = _of(controller, error.field or "command")
             raise
         tell()
+        pace.prepare(walk, following)
     pace.advance(walk, until, tell)
     tell()
     for spent in _watching:
@@ -196,17 +197,20 @@ def steer(
 
 def _instants(
     controller: Controller | None, gait: Gait, referee: Referee | None, since: float, until: float
-) -> Iterator[tuple[float, int, Event | None]]:
+) -> Iterator[tuple[float, int, Event | None, float]]:
     """Instants before ``until`` (s) at which the controller or the referee observes, some of them before ``since``:
-    number of the event, and the event or None for the referee, which comes first."""
-    events: Iterator[tuple[float, int, Event | None]] = iter(())
+    number of the event, the event or None for the referee, which comes first, and time of the event after it, s, NaN
+    if it is the last."""
+    events: Iterator[tuple[float, int, Event | None, float]] = iter(())
     if controller is not None:
-        events = _numbered(controller, gait, since, until)
-    looks: Iterator[tuple[float, int, Event | None]] = iter(())
+        asked = _numbered(controller, gait, since, until)
+        last = np.nan, -1, Event("", 0.0, 0.0)
+        events = ((*each, after[0]) for each, after in pairwise(chain(asked, [last])))
+    looks: Iterator[tuple[float, int, Event | None, float]] = iter(())
     if referee is not None:
         every = referee.every
         times = (n * every for n in count(_whole(since, every)))
-        looks = ((time, -1, None) for time in takewhile(lambda time: time < until, times))
+        looks = ((time, -1, None, np.nan) for time in takewhile(lambda time: time < until, times))
     return merge(events, looks, key=lambda each: each[:2])
 
 
@@ -217,16 +221,22 @@ class _Pace:
     stretch: float = _FIRST
 
     def advance(self, walk: Walk, until: float, tell: Callable[[], None]) -> None:
-        there = walk.time + self.stretch
         # Avoid a last stretch of nearly zero length.
-        while there + 0.5 * self.stretch < until:
-            begun = clock.perf_counter()
-            walk.advance(there)
+        while walk.time + 1.5 * self.stretch < until:
+            self._measured(walk, walk.advance, walk.time + self.stretch)
             tell()
-            took = clock.perf_counter() - begun
+        self._measured(walk, walk.advance, until)
+
+    def prepare(self, walk: Walk, until: float) -> None:
+        if isinstance(walk, Prepares) and until <= walk.time + 1.5 * self.stretch:
+            self._measured(walk, walk.prepare, until)
+
+    def _measured(self, walk: Walk, go: Callable[[float], None], until: float) -> None:
+        length, begun = until - walk.time, clock.perf_counter()
+        go(until)
+        took = clock.perf_counter() - begun
+        if length > 0.5 * self.stretch:
             self.stretch = max(_SHORTEST, self.stretch * min(2.0, _MOMENT / max(took, 1e-9)))
-            there += self.stretch
-        walk.advance(until)
 
 
 def _answer(controller: Controller, event: Event, seen: Observation) -> Command:

@@ -70,9 +70,25 @@ class Timeline:
         which = np.array([number % (len(self._times) - 1)])
         return cut, cut - switch, until - cut, which, np.array([-1])
 
+    def all_pieces(self, until: float) -> tuple[Any, ...]:
+        """Pieces of :meth:`whole_pieces`, and that of :meth:`rest` behind them unless a cut is at the time."""
+        whole = self.whole_pieces(until)
+        if self.is_at_cut(until):
+            return whole
+        return tuple(np.concatenate(each) for each in zip(whole, self.rest(until), strict=True))
+
     def is_at_cut(self, time: float) -> bool:
         """True if a time to which :meth:`whole_pieces` went is that of the last cut."""
         return time <= self.cut + self._moment
+
+    def sample_at(self, time: float) -> int:
+        """Number of the sample that is the last cut up to a time from the present cut on; -1 if there is none."""
+        sample = round(time * self._rate)
+        at = sample / self._rate if self._rate > 0.0 else np.inf
+        if abs(at - time) > self._moment:
+            return -1
+        _, _, end = _interval_after(self._times, at + _SAME_INSTANT, int(self.position[1]))
+        return sample if end > time + self._moment else -1
 
     def cut_at(self, time: float) -> None:
         """Add a cut for a command, at a time to which :meth:`whole_pieces` went, unless it is one already."""
