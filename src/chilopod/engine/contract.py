@@ -240,14 +240,14 @@ class Walk(Protocol):
 
 
 @runtime_checkable
-class Prepares(Protocol):
+class Foresees(Protocol):
     """A walk that may be computed ahead of its time, in one piece; the results do not change."""
 
-    def prepare(self, until: float) -> None:
-        """Prepare for times up to ``until``, s, before which nothing will be commanded; the present time stays.
+    def foresee(self, until: float) -> None:
+        """Compute the walk up to ``until``, s, before which nothing will be commanded; the present time stays.
 
-        To :meth:`Walk.advance` up to there, to look at poses at samples of the record, and to :meth:`Walk.aim` and
-        :meth:`Walk.halt` there, then costs next to nothing. A command before ``until`` costs the preparation.
+        To :meth:`Walk.advance` up to there, and :meth:`Walk.pose`, :meth:`Walk.aim` and :meth:`Walk.halt` at samples of
+        the record, then cost next to nothing. Anything else before ``until``, a command too, lets the walk be computed once more.
         """
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.engine.arguments import as_array, as_number, check_time
-from chilopod.engine.contract import Command, Controller, Event, Observation, Prepares, Walk
+from chilopod.engine.contract import Command, Controller, Event, Observation, Foresees, Walk
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
@@ -161,12 +161,12 @@ def steer(
         for each in (progress, *(spent.progress for spent in _watching)):
             each(done, words)
 
-    pace = _Pace()
+    pace = _Pace(walk)
     since, thought = clock.perf_counter(), 0.0
     for time, index, event, following in _instants(controller, gait, referee, begun, until):
         if time < begun:
             continue
-        pace.advance(walk, time, tell)
+        pace.advance(time, tell)
         if event is None:
             if referee is not None and not referee.look(walk):
                 until = time
@@ -187,8 +187,8 @@ def steer(
             error.field = _of(controller, error.field or "command")
             raise
         tell()
-        pace.prepare(walk, following)
-    pace.advance(walk, until, tell)
+        pace.foresee(following)
+    pace.advance(until, tell)
     tell()
     for spent in _watching:
         spent.controller += thought
@@ -214,29 +214,30 @@ def _instants(
     return merge(events, looks, key=lambda each: each[:2])
 
 
-@dataclass
 class _Pace:
-    """Pace of a walk in short stretches, the next one ``stretch`` s long."""
+    """Pace of a walk in stretches that take about as long as a moment."""
 
-    stretch: float = _FIRST
+    def __init__(self, walk: Walk) -> None:
+        self._walk, self._stretch = walk, _FIRST  # and length of the next stretch, s
+        self._foresee = walk.foresee if isinstance(walk, Foresees) else None
 
-    def advance(self, walk: Walk, until: float, tell: Callable[[], None]) -> None:
+    def advance(self, until: float, tell: Callable[[], None]) -> None:
         # Avoid a last stretch of nearly zero length.
-        while walk.time + 1.5 * self.stretch < until:
-            self._measured(walk, walk.advance, walk.time + self.stretch)
+        while self._walk.time + 1.5 * self._stretch < until:
+            self._measured(self._walk.advance, self._walk.time + self._stretch)
             tell()
-        self._measured(walk, walk.advance, until)
+        self._measured(self._walk.advance, until)
 
-    def prepare(self, walk: Walk, until: float) -> None:
-        if isinstance(walk, Prepares) and until <= walk.time + 1.5 * self.stretch:
-            self._measured(walk, walk.prepare, until)
+    def foresee(self, until: float) -> None:
+        if self._foresee and until <= self._walk.time + 1.5 * self._stretch:
+            self._measured(self._foresee, until)
 
-    def _measured(self, walk: Walk, go: Callable[[float], None], until: float) -> None:
-        length, begun = until - walk.time, clock.perf_counter()
+    def _measured(self, go: Callable[[float], None], until: float) -> None:
+        length, begun = until - self._walk.time, clock.perf_counter()
         go(until)
         took = clock.perf_counter() - begun
-        if length > 0.5 * self.stretch:
-            self.stretch = max(_SHORTEST, self.stretch * min(2.0, _MOMENT / max(took, 1e-9)))
+        if length > 0.5 * self._stretch:
+            self._stretch = max(_SHORTEST, self._stretch * min(2.0, _MOMENT / max(took, 1e-9)))
 
 
 def _answer(controller: Controller, event: Event, seen: Observation) -> Command:

@@ -142,7 +142,7 @@ class PlanarWalk(BatchWalk):
         self._timeline = Timeline(schedule, record.rate if record else 0.0)
         self._states, self._step = states, np.zeros(len(robots))
         self._status = np.full(len(robots), stretch.WALKING)
-        # Copy of states, steps and statuses at the present time, or at a later one for which the walk is prepared.
+        # Copy of states, steps and statuses at the present time, or at a later one that is foreseen.
         self._here: tuple[Array, Array, NDArray[np.intp]] | None = None
         self._ahead: tuple[float, Array] | None = None  # that time, s, and the position of the timeline there
         self._samples = Samples(states.shape, self._expected_rows)
@@ -223,19 +223,18 @@ class PlanarWalk(BatchWalk):
         self._time = until
         if self._ahead is None or until > self._ahead[0]:
             self._ahead = self._here = None
-            self._carry(self._timeline.whole_pieces(until), self._states, self._step, self._status)
+            self._carry(self._timeline.pieces(until), self._states, self._step, self._status)
 
-    def prepare(self, until: float) -> None:
-        """See :class:`chilopod.engine.contract.Prepares`; nothing is prepared without a record, or if a robot fails."""
+    def foresee(self, until: float) -> None:
+        """See :class:`chilopod.engine.contract.Foresees`; nothing is kept without a record, or if a robot fails."""
         until = check_time(until, self._time)
-        check_size(self._record, until, self._states.size)
         self._settle()
         if self._record is None:
             return
         behind, here = self._timeline.position.copy(), (self._states.copy(), self._step.copy(), self._status.copy())
-        self._carry(self._timeline.all_pieces(until), *here)
+        self._carry(self._timeline.pieces(until, rest=True), *here)
         # Whether a robot failed before the last cut, or behind it, decides what is seen of it.
-        if np.array_equal(here[-1], self._status):
+        if (here[-1] == self._status).all():
             self._here, self._ahead = here, (until, self._timeline.position)
         self._timeline.position = behind
         if self._ahead is None:
@@ -288,18 +287,18 @@ class PlanarWalk(BatchWalk):
             return self._states, self._step, self._status
         if self._here is None:
             self._here = self._states.copy(), self._step.copy(), self._status.copy()
-            self._carry(self._timeline.rest(self._time), *self._here)
+            self._carry(self._timeline.pieces(self._time, rest=True), *self._here)
         return self._here
 
     def _settle(self) -> None:
-        """Drop what was prepared, and advance to the present time instead."""
+        """Drop what was foreseen, and advance to the present time instead."""
         if self._ahead is not None:
             self._ahead = self._here = None
-            self._carry(self._timeline.whole_pieces(self._time), self._states, self._step, self._status)
+            self._carry(self._timeline.pieces(self._time), self._states, self._step, self._status)
             self._samples.cut(self._timeline.samples)
 
     def _sample_ahead(self) -> int:
-        """Number of the sample at the present time if the walk is prepared for a later one, otherwise -1."""
+        """Number of the sample at the present time if a later one is foreseen, otherwise -1."""
         ahead = self._ahead is not None and self._time < self._ahead[0]
         return self._timeline.sample_at(self._time) if ahead else -1
 
@@ -333,5 +332,6 @@ class PlanarWalk(BatchWalk):
             actuators.joint_torque,
             actuators.leg_yaw,
         )
-        when = stretch.Pieces(*pieces, *self._feet)
+        begins, starts, widths, interval, sample = pieces
+        when = stretch.Pieces(begins, starts, widths, interval, sample, *self._feet)
         stretch.carry(rows, when, robots, self._tolerance, states, step, status, record)
