@@ -247,7 +247,7 @@ class Foresees(Protocol):
         """Compute the walk up to ``until``, s, before which nothing will be commanded; the present time stays.
 
         To :meth:`Walk.advance` up to there, and :meth:`Walk.pose`, :meth:`Walk.aim` and :meth:`Walk.halt` at samples of
-        the record, then cost next to nothing. Anything else before ``until``, a command too, lets the walk be computed once more.
+        the record, then cost next to nothing. After anything else before ``until`` the walk is computed once more.
         """
 
 

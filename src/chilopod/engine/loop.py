@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.engine.arguments import as_array, as_number, check_time
-from chilopod.engine.contract import Command, Controller, Event, Observation, Foresees, Walk
+from chilopod.engine.contract import Command, Controller, Event, Foresees, Observation, Walk
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
