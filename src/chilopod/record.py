@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -164,6 +164,11 @@ class Samples:
         rows.flags.writeable = False
         return rows
 
+    def cut(self, count: int) -> None:
+        """Drop the rows from a number on."""
+        self._rows[count : self.count] = np.nan
+        self.count = min(self.count, count)
+
     def grown(self, count: int) -> Array:
         """Writable view of at least ``count`` rows, new ones NaN, valid until the next call."""
         if count > len(self._rows):
@@ -246,19 +251,21 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
     target
         m, shape (robots, 2), (times, robots, 2) if they moved, or None.
     """
-    data["status"] = ("robot", np.array(statuses, dtype=object))
+    found: dict[str, Any] = {"status": ("robot", np.array(statuses, dtype=object))}
     if target is not None:
         over = ("time", "robot", "axis")[3 - target.ndim :]
-        data["target"] = (over, target.copy(), {"units": "m"})
+        found["target"] = (over, target.copy(), {"units": "m"})
         angle, away = bearing_and_distance(data.position.values, data.heading.values, target)
-        data["distance"] = (("time", "robot"), away, {"units": "m"})
-        data["bearing"] = (("time", "robot"), angle, {"units": "rad"})
+        found["distance"] = (("time", "robot"), away, {"units": "m"})
+        found["bearing"] = (("time", "robot"), angle, {"units": "rad"})
+    data.update(found)
     failed = np.isnan(data.heading.values)
     if failed.any():
-        for name, values in data.data_vars.items():
+        for name, values in data.variables.items():
             if values.dims[:2] == ("time", "robot") and not np.isnan(values.values[failed]).all():
-                data[name] = (values.dims, values.values.copy(), values.attrs)
-                data[name].values[failed] = np.nan
+                found[str(name)] = (values.dims, values.values.copy(), values.attrs)
+                found[str(name)][1][failed] = np.nan
+        data.update(found)
 
 
 def spring_work(data: xr.Dataset) -> xr.DataArray:

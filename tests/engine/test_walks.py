@@ -9,6 +9,7 @@ import threading
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from chilopod import load_robot, planar, twin
 from chilopod.engine import Command, Event, Status, Targets, steer
@@ -473,3 +474,47 @@ def test_events_that_never_end_are_refused():
 
     with pytest.raises(ParameterError, match=r"Endless.events.*must be fewer.*10000 in a gait cycle"):
         steer(planar.start(load_robot("aoi2022-planar")), 1.0, Endless())
+
+
+ASKED = {
+    "pose": lambda walk: walk.pose(),
+    "observe": lambda walk: walk.observe().joint_angles,
+    "states": lambda walk: walk.states(),
+    "aim": lambda walk: walk.aim((0.5, -1.0)),
+    "halt": lambda walk: (walk.halt(np.array([False, True])), walk.pose())[1],
+    "halt all": lambda walk: (walk.halt(np.array([False, True])), walk.halt(np.array([True, True])))[1],
+    "command": lambda walk: walk.command(Command(joint_torque=0.01 * np.ones(5))),
+    "torn": lambda walk: walk.command(TORN),
+    "record": lambda walk: walk.to_dataset().heading.values,
+    "status": lambda walk: [each.value for each in walk.status],
+}
+
+
+def foreseen(ask, time, until):
+    """A walk of two robots that is computed ahead from 0.33 s on, and asked at a time before."""
+    states = planar.initial_states(PLANAR, 0.02 * np.ones((2, 5)), [0.0, 0.3])
+    walk = planar.start(PLANAR, initial=states, target=(0.9, 0.4), record=Recording(rate=20.0))
+    walk.advance(0.33)
+    walk.command(Command(leg_yaw=[0.05, 0.05], within=0.1))
+    if until is not None:
+        walk.foresee(until)
+    for each in (0.35, time):
+        walk.advance(each)
+        walk.pose()
+    found, saved = ask(walk), planar.resume(walk.save()).to_dataset()
+    for each in (0.71, 1.3):
+        walk.advance(each)
+        walk.command(Command(joint_torque=-0.01 * np.ones(5)))
+    walk.advance(1.5)
+    return found, saved, walk.to_dataset()
+
+
+@pytest.mark.parametrize("time", [0.4, 0.47, 0.6, 0.71])  # at a sample, between, at a switch, at a command
+@pytest.mark.parametrize("ask", ASKED)
+def test_a_walk_computed_ahead_is_the_same_whatever_is_asked_on_the_way(ask, time):
+    found, *records = foreseen(ASKED[ask], time, None)
+    for until in (0.71, 1.0):
+        again, *others = foreseen(ASKED[ask], time, until)
+        np.testing.assert_array_equal(again, found)
+        for here, there in zip(others, records, strict=True):
+            xr.testing.assert_identical(here, there)

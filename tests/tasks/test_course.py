@@ -10,6 +10,7 @@ from chilopod import load_robot
 from chilopod.engine import Command, Event
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.gym.policies import BASELINES
+from chilopod.planar import PlanarWalk
 from chilopod.steering import (
     ON_COURSES,
     ON_THE_WAY,
@@ -57,6 +58,20 @@ def test_a_course_is_the_same_alone_and_among_others(ready, done):
         xr.testing.assert_identical(record, again)
     (alone,) = run(done.trials[1:])
     xr.testing.assert_identical(done.records[1], alone)
+
+
+def test_a_course_is_the_same_if_the_walk_stops_at_every_look(ready, monkeypatch):
+    foreseen = []
+    foresee = PlanarWalk.foresee
+    with monkeypatch.context() as patch:
+        patch.setattr(PlanarWalk, "foresee", lambda walk, until: (foresee(walk, until), foreseen.append(until))[0])
+        ahead = drive(ready, NEAR, seed=1, repeats=3)
+    assert len(foreseen) > 10
+    ends = np.concatenate([each.goal_end.values.ravel() for each in ahead.records])
+    assert not np.isin(ends, foreseen).any()  # targets end between two commands
+    monkeypatch.setattr(PlanarWalk, "foresee", lambda walk, until: None)
+    for here, there in zip(ahead.records, drive(ready, NEAR, seed=1, repeats=3).records, strict=True):
+        xr.testing.assert_identical(here, there)
 
 
 def test_courses_are_kept_and_read_again(ready, done, tmp_path, monkeypatch):

@@ -168,12 +168,15 @@ class Actuators:
             data["stiffness"] = (("time", *over), self._stiffness_over(data.time.values), {"units": "N*m/rad"})
         if not self._log:
             return
-        data.coords["event"] = ("event", np.array([each["event"] for each in self._log]), {"units": "s"})
-        data["within"] = ("event", np.array([each["within"] for each in self._log]))
-        data["command"] = (("event", "robot", "side"), self._logged("command"), {"units": "rad"})
+        data.coords["event"] = ("event", self._logged("event"), {"units": "s"})
+        found: dict[str, Any] = {
+            "within": ("event", self._logged("within")),
+            "command": (("event", "robot", "side"), self._logged("command"), {"units": "rad"}),
+        }
         if self.adjustable:
-            data["command_stiffness"] = (("event", *over), self._logged("command_stiffness"), {"units": "N*m/rad"})
-        data["command_torque"] = (("event", *over), self._logged("command_torque"), {"units": "N*m"})
+            found["command_stiffness"] = (("event", *over), self._logged("command_stiffness"), {"units": "N*m/rad"})
+        found["command_torque"] = (("event", *over), self._logged("command_torque"), {"units": "N*m"})
+        data.update(found)
 
     def leg_yaw_over(self, times: Array) -> Array:
         """Leg yaw on its ramps at any rising times of the walk, rad, shape (times, robots, 2)."""

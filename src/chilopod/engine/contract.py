@@ -239,6 +239,18 @@ class Walk(Protocol):
         """
 
 
+@runtime_checkable
+class Foresees(Protocol):
+    """A walk that may be computed ahead of its time, in one piece; the results do not change."""
+
+    def foresee(self, until: float) -> None:
+        """Compute the walk up to ``until``, s, before which nothing will be commanded; the present time stays.
+
+        To :meth:`Walk.advance` up to there, and :meth:`Walk.pose`, :meth:`Walk.aim` and :meth:`Walk.halt` at samples of
+        the record, then cost next to nothing. After anything else before ``until`` the walk is computed once more.
+        """
+
+
 def missing_parts(walk: object) -> list[str]:
     """Names of the attributes of :class:`Walk` that an object lacks."""
     return [name for name in vars(Walk) if not name.startswith("_") and not hasattr(walk, name)]

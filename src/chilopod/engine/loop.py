@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from heapq import merge
-from itertools import count, islice, takewhile
+from itertools import chain, count, islice, pairwise, takewhile
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.engine.arguments import as_array, as_number, check_time
-from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
+from chilopod.engine.contract import Command, Controller, Event, Foresees, Observation, Walk
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
@@ -161,12 +161,12 @@ def steer(
         for each in (progress, *(spent.progress for spent in _watching)):
             each(done, words)
 
-    pace = _Pace()
+    pace = _Pace(walk)
     since, thought = clock.perf_counter(), 0.0
-    for time, index, event in _instants(controller, gait, referee, begun, until):
+    for time, index, event, following in _instants(controller, gait, referee, begun, until):
         if time < begun:
             continue
-        pace.advance(walk, time, tell)
+        pace.advance(time, tell)
         if event is None:
             if referee is not None and not referee.look(walk):
                 until = time
@@ -187,7 +187,8 @@ def steer(
             error.field = _of(controller, error.field or "command")
             raise
         tell()
-    pace.advance(walk, until, tell)
+        pace.foresee(following)
+    pace.advance(until, tell)
     tell()
     for spent in _watching:
         spent.controller += thought
@@ -196,37 +197,47 @@ def steer(
 
 def _instants(
     controller: Controller | None, gait: Gait, referee: Referee | None, since: float, until: float
-) -> Iterator[tuple[float, int, Event | None]]:
+) -> Iterator[tuple[float, int, Event | None, float]]:
     """Instants before ``until`` (s) at which the controller or the referee observes, some of them before ``since``:
-    number of the event, and the event or None for the referee, which comes first."""
-    events: Iterator[tuple[float, int, Event | None]] = iter(())
+    number of the event, the event or None for the referee, which comes first, and time of the event after it, s, NaN
+    if it is the last."""
+    events: Iterator[tuple[float, int, Event | None, float]] = iter(())
     if controller is not None:
-        events = _numbered(controller, gait, since, until)
-    looks: Iterator[tuple[float, int, Event | None]] = iter(())
+        asked = _numbered(controller, gait, since, until)
+        last = np.nan, -1, Event("", 0.0, 0.0)
+        events = ((*each, after[0]) for each, after in pairwise(chain(asked, [last])))
+    looks: Iterator[tuple[float, int, Event | None, float]] = iter(())
     if referee is not None:
         every = referee.every
         times = (n * every for n in count(_whole(since, every)))
-        looks = ((time, -1, None) for time in takewhile(lambda time: time < until, times))
+        looks = ((time, -1, None, np.nan) for time in takewhile(lambda time: time < until, times))
     return merge(events, looks, key=lambda each: each[:2])
 
 
-@dataclass
 class _Pace:
-    """Pace of a walk in short stretches, the next one ``stretch`` s long."""
+    """Pace of a walk in stretches that take about as long as a moment."""
 
-    stretch: float = _FIRST
+    def __init__(self, walk: Walk) -> None:
+        self._walk, self._stretch = walk, _FIRST  # and length of the next stretch, s
+        self._foresee = walk.foresee if isinstance(walk, Foresees) else None
 
-    def advance(self, walk: Walk, until: float, tell: Callable[[], None]) -> None:
-        there = walk.time + self.stretch
+    def advance(self, until: float, tell: Callable[[], None]) -> None:
         # Avoid a last stretch of nearly zero length.
-        while there + 0.5 * self.stretch < until:
-            begun = clock.perf_counter()
-            walk.advance(there)
+        while self._walk.time + 1.5 * self._stretch < until:
+            self._measured(self._walk.advance, self._walk.time + self._stretch)
             tell()
-            took = clock.perf_counter() - begun
-            self.stretch = max(_SHORTEST, self.stretch * min(2.0, _MOMENT / max(took, 1e-9)))
-            there += self.stretch
-        walk.advance(until)
+        self._measured(self._walk.advance, until)
+
+    def foresee(self, until: float) -> None:
+        if self._foresee and until <= self._walk.time + 1.5 * self._stretch:
+            self._measured(self._foresee, until)
+
+    def _measured(self, go: Callable[[float], None], until: float) -> None:
+        length, begun = until - self._walk.time, clock.perf_counter()
+        go(until)
+        took = clock.perf_counter() - begun
+        if length > 0.5 * self._stretch:
+            self._stretch = max(_SHORTEST, self._stretch * min(2.0, _MOMENT / max(took, 1e-9)))
 
 
 def _answer(controller: Controller, event: Event, seen: Observation) -> Command:

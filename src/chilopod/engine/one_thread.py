@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from threading import get_ident
 from typing import Any, Final, TypeVar
 
-from chilopod.engine.contract import Walk
+from chilopod.engine.contract import Foresees, Walk
 from chilopod.errors import ThreadError
 
 _Kind = TypeVar("_Kind", bound=type)
 
 _VERBS: Final = tuple(
-    name for name, each in vars(Walk).items() if callable(each) and not isinstance(each, type) and name[0] != "_"
+    name
+    for name, each in {**vars(Walk), **vars(Foresees)}.items()
+    if callable(each) and not isinstance(each, type) and name[0] != "_"
 )
 _INSIDE: Final = "_thread_inside"
 
 
 def one_thread(kind: _Kind) -> _Kind:
-    """Make a class of walks refuse a thread while another thread runs a method of :class:`Walk`.
+    """Make a class of walks refuse a thread while another thread runs a method of :class:`Walk` or :class:`Foresees`.
 
     Threads may take turns: no thread owns a walk between two calls. A method may call others.
     """
-    for name in _VERBS:
+    for name in filter(partial(hasattr, kind), _VERBS):
         setattr(kind, name, _alone(name, getattr(kind, name)))
     return kind
 

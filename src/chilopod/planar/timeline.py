@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.compiled import njit
 from chilopod.engine.arguments import BEGINNING
@@ -47,35 +46,43 @@ class Timeline:
         """Number of samples up to the last cut, with that at time 0."""
         return int(self.position[2])
 
-    def whole_pieces(self, until: float) -> tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]]:
+    def pieces(self, until: float, rest: bool = False) -> tuple[Any, ...]:
         """Go on to the last cut up to a time.
 
         Returns for every piece between two cuts its begin (s), the same relative to its contact interval (s), its
-        duration (s), the number of the interval in the period, and the number of the sample at its end, or -1.
+        duration (s), the number of the interval in the period, and the number of the sample at its end, or -1. With
+        ``rest`` there follows the piece from the last cut to the time, without a sample, unless they are the same.
         """
         # Upper bound on the number of cuts: the switches and samples in between.
         span = max(until - self.cut, 0.0)
         intervals = len(self._times) - 1
-        most = int((span / self._times[-1] + 2.0) * intervals + span * self._rate) + 3
+        most = int((span / self._times[-1] + 2.0) * intervals + span * self._rate) + 4
         pieces = np.empty((3, most))
         numbers = np.empty((2, most), dtype=np.intp)
         count = _whole_pieces(self._times, self._rate, until + self._moment, self.position, pieces, numbers)
+        if rest and not self.is_at_cut(until):
+            number, switch, _ = _interval_after(self._times, self.cut, int(self.position[1]))
+            pieces[:, count] = self.cut, self.cut - switch, until - self.cut
+            numbers[:, count] = number % intervals, -1
+            count += 1
         begins, starts, widths = pieces[:, :count]
         return begins, starts, widths, numbers[0, :count], numbers[1, :count]
 
-    def rest(self, until: float) -> tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]]:
-        """Piece from the last cut to the later end of :meth:`whole_pieces`, without a sample at its end."""
-        number, switch, _ = _interval_after(self._times, self.cut, int(self.position[1]))
-        cut = self.position[:1].copy()
-        which = np.array([number % (len(self._times) - 1)])
-        return cut, cut - switch, until - cut, which, np.array([-1])
-
     def is_at_cut(self, time: float) -> bool:
-        """True if a time to which :meth:`whole_pieces` went is that of the last cut."""
+        """True if a time to which :meth:`pieces` went is that of the last cut."""
         return time <= self.cut + self._moment
 
+    def sample_at(self, time: float) -> int:
+        """Number of the sample that is the last cut up to a time from the present cut on; -1 if there is none."""
+        sample = round(time * self._rate)
+        at = sample / self._rate if self._rate > 0.0 else np.inf
+        if abs(at - time) > self._moment:
+            return -1
+        _, _, end = _interval_after(self._times, at + _SAME_INSTANT, int(self.position[1]))
+        return sample if end > time + self._moment else -1
+
     def cut_at(self, time: float) -> None:
-        """Add a cut for a command, at a time to which :meth:`whole_pieces` went, unless it is one already."""
+        """Add a cut for a command, at a time to which :meth:`pieces` went, unless it is one already."""
         if not self.is_at_cut(time):
             self.position[0] = time
 

@@ -142,7 +142,9 @@ class PlanarWalk(BatchWalk):
         self._timeline = Timeline(schedule, record.rate if record else 0.0)
         self._states, self._step = states, np.zeros(len(robots))
         self._status = np.full(len(robots), stretch.WALKING)
+        # Copy of states, steps and statuses at the present time, or at a later one that is foreseen.
         self._here: tuple[Array, Array, NDArray[np.intp]] | None = None
+        self._ahead: tuple[float, Array] | None = None  # that time, s, and the position of the timeline there
         self._samples = Samples(states.shape, self._expected_rows)
         if record:
             self._samples.grown(1)[0] = states
@@ -160,15 +162,23 @@ class PlanarWalk(BatchWalk):
         return self._observation(bearing, distance, states[:, 3 : n + 2])
 
     def pose(self) -> Array:
-        return self._seen(2 * self._modules + 1)
+        first, sample = 2 * self._modules + 1, self._sample_ahead()
+        if sample < 0:
+            return self._seen(first)
+        pose = self._samples.grown(0)[sample, :, first:].copy()
+        pose[self._status != stretch.WALKING] = np.nan
+        return pose
 
     def aim(self, target: ArrayLike) -> None:
         self._targets.move(self._time, target)
 
     def halt(self, which: NDArray[np.bool_]) -> None:
-        marked = as_marks("which", which, len(self._robots))
-        for final, here in zip((self._states, self._step, self._status), self._now(), strict=True):
-            final[marked] = here[marked]
+        marked, sample = as_marks("which", which, len(self._robots)), self._sample_ahead()
+        if sample < 0:
+            for final, here in zip((self._states, self._step, self._status), self._now(), strict=True):
+                final[marked] = here[marked]
+        else:
+            self._samples.grown(0)[sample + 1 :, marked] = np.nan
         marked &= self._status == stretch.WALKING
         self._status[marked] = stretch.HALTED
         if self._here is not None:
@@ -202,17 +212,36 @@ class PlanarWalk(BatchWalk):
         here = self._now()
         self._actuators.command(self._time, command, here[-1] == stretch.WALKING)
         self._states, self._step, self._status = here
+        if self._ahead is not None:
+            self._timeline.position, self._ahead = self._ahead[1], None
         self._timeline.cut_at(self._time)
         self._here = None
 
     def advance(self, until: float) -> None:
         until = check_time(until, self._time)
         check_size(self._record, until, self._states.size)
-        pieces = self._timeline.whole_pieces(until)
-        self._time, self._here = until, None
-        self._carry(pieces, self._states, self._step, self._status)
+        self._time = until
+        if self._ahead is None or until > self._ahead[0]:
+            self._ahead = self._here = None
+            self._carry(self._timeline.pieces(until), self._states, self._step, self._status)
+
+    def foresee(self, until: float) -> None:
+        """See :class:`chilopod.engine.contract.Foresees`; nothing is kept without a record, or if a robot fails."""
+        until = check_time(until, self._time)
+        self._settle()
+        if self._record is None:
+            return
+        behind, here = self._timeline.position.copy(), (self._states.copy(), self._step.copy(), self._status.copy())
+        self._carry(self._timeline.pieces(until, rest=True), *here)
+        # Whether a robot failed before the last cut, or behind it, decides what is seen of it.
+        if (here[-1] == self._status).all():
+            self._here, self._ahead = here, (until, self._timeline.position)
+        self._timeline.position = behind
+        if self._ahead is None:
+            self._samples.cut(self._timeline.samples)
 
     def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        self._settle()
         return {}, {
             "states": self._states,
             "step": self._step,
@@ -230,6 +259,7 @@ class PlanarWalk(BatchWalk):
 
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
         """Record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
+        self._settle()
         rate = self._record.rate if self._record else 1.0
         # A sample that follows the present within rounding is taken already, but does not count yet.
         count = min(self._timeline.samples, len(self._record.samples(self._time)) if self._record else 0)
@@ -250,12 +280,27 @@ class PlanarWalk(BatchWalk):
 
     def _now(self) -> tuple[Array, Array, NDArray[np.intp]]:
         """States, steps and statuses at the present time; a copy unless there is a cut."""
+        if self._ahead is not None and self._here is not None and self._time == self._ahead[0]:
+            return self._here
+        self._settle()
         if self._timeline.is_at_cut(self._time):
             return self._states, self._step, self._status
         if self._here is None:
             self._here = self._states.copy(), self._step.copy(), self._status.copy()
-            self._carry(self._timeline.rest(self._time), *self._here)
+            self._carry(self._timeline.pieces(self._time, rest=True), *self._here)
         return self._here
+
+    def _settle(self) -> None:
+        """Drop what was foreseen, and advance to the present time instead."""
+        if self._ahead is not None:
+            self._ahead = self._here = None
+            self._carry(self._timeline.pieces(self._time), self._states, self._step, self._status)
+            self._samples.cut(self._timeline.samples)
+
+    def _sample_ahead(self) -> int:
+        """Number of the sample at the present time if a later one is foreseen, otherwise -1."""
+        ahead = self._ahead is not None and self._time < self._ahead[0]
+        return self._timeline.sample_at(self._time) if ahead else -1
 
     def _seen(self, first: int = 0) -> Array:
         """Copy of the states at the present time from a column on, NaN for robots that no longer walk."""
@@ -266,7 +311,7 @@ class PlanarWalk(BatchWalk):
 
     def _carry(
         self,
-        pieces: tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]],
+        pieces: tuple[Any, ...],
         states: Array,
         step: Array,
         status: NDArray[np.intp],
@@ -287,5 +332,6 @@ class PlanarWalk(BatchWalk):
             actuators.joint_torque,
             actuators.leg_yaw,
         )
-        when = stretch.Pieces(*pieces, *self._feet)
+        begins, starts, widths, interval, sample = pieces
+        when = stretch.Pieces(begins, starts, widths, interval, sample, *self._feet)
         stretch.carry(rows, when, robots, self._tolerance, states, step, status, record)

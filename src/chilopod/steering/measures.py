@@ -61,8 +61,8 @@ def add_measures(data: xr.Dataset, period: float) -> None:
             _drive_work(commands[commanded[0]], seen[commanded], torques[commanded]),
         )
         found[:, robot] = [np.interp(end, *so_far) - np.interp(begin, *so_far) for so_far in sums]
-    for (name, unit), values in zip(_UNITS.items(), found, strict=True):
-        data[f"goal_{name}"] = (("robot", "goal"), values, {"units": unit})
+    units = zip(_UNITS.items(), found, strict=True)
+    data.update({f"goal_{name}": (("robot", "goal"), values, {"units": unit}) for (name, unit), values in units})
 
 
 def _so_far(times: Array, steps: Array) -> tuple[Array, Array]:

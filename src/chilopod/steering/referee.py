@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,22 +183,25 @@ class CourseReferee:
         self._judge(busy & ~stopped & self._seen_once, walk.time, Verdict.LATE)
         self._judge(busy & ~stopped & ~self._seen_once, walk.time, Verdict.UNSEEN)
         over = ("robot", "goal")
-        data.coords["goal"] = np.arange(1, self._places.shape[1] + 1)
-        data["goal_place"] = ((*over, "axis"), self._places, {"units": "m"})
+        found: dict[str, Any] = {"goal_place": ((*over, "axis"), self._places, {"units": "m"})}
         for name, values, unit in (
             ("begin", self._begin, "s"),
             ("end", self._end, "s"),
             ("shortest", shortest_path(self._seen_from, self._common.tightest), "m"),
             ("nearest", self._nearest, "m"),
         ):
-            data[f"goal_{name}"] = (over, values, {"units": unit})
-        data["goal_verdict"] = (over, self._verdicts)
+            found[f"goal_{name}"] = (over, values, {"units": unit})
+        found["goal_verdict"] = (over, self._verdicts)
         for name, (dims, unit) in _KEPT.items():
             shown = np.array([getattr(each, name) for each in self._log])
             if len(shown):
-                data[f"seen_{name}"] = (("event", "robot", *dims), shown, {"units": unit})
+                found[f"seen_{name}"] = (("event", "robot", *dims), shown, {"units": unit})
+        data.coords["goal"] = np.arange(1, self._places.shape[1] + 1)
+        data.update(found)
 
     def _judge(self, which: NDArray[np.bool_], now: float, verdict: Verdict) -> None:
+        if not which.any():
+            return
         robots = np.flatnonzero(which)
         present = robots, self._number[robots]
         self._end[present], self._nearest[present], self._verdicts[present] = now, self._least[robots], verdict.label

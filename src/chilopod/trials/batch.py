@@ -131,7 +131,7 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
         view = data.isel(own, missing_dims="ignore")
         # Numbers that lie otherwise in memory are added up in another order: sums have the same bits whether a walk was
         # one of many, alone, or read.
-        record = view.copy(data={name: np.ascontiguousarray(each.values) for name, each in view.data_vars.items()})
+        record = view.copy(data={name: np.ascontiguousarray(view.variables[name].values) for name in view.data_vars})
         record.attrs |= {"duration": float(ends[index]), "robot": file_text(trial.robot), "trial": trial.text}
         records.append(record)
     return records
