@@ -58,9 +58,10 @@ def Speed(times: float) -> Set:
 
 @dataclass(frozen=True)
 class Target(Wish):
-    """Target on the floor, m; None for no target."""
+    """Target on the floor, m; None for no target. By hand no strategy steers there."""
 
     place: tuple[float, float] | None
+    by_hand: bool = False
 
 
 @dataclass(frozen=True)
