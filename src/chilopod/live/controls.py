@@ -94,8 +94,7 @@ class Controls:
         self._tasks(gui, preset)
         self._targets(gui)
         self._joints(gui)
-        with gui.add_folder("Curves over time"):
-            self.plots = Plots(gui, self._file.body.modules - 1)
+        self.plots = Plots(gui, self._file.body.modules - 1)
         self._recording(gui)
         self._link = gui.add_html("")
         self._keys(gui)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from html import escape
 from textwrap import wrap
 from typing import Any, Final
@@ -49,7 +50,7 @@ def drawn(theory: Theory, stiffest: float, trail: list[tuple[float, float]]) -> 
     known = [*(bends[theory.stable] if len(bends) else ()), *(abs(bend) for _, bend in trail)]
     most = float(np.clip(1.2 * max(known, default=0.0), _LEAST, _MOST))
     place = _Place(stiffest, most)
-    parts = [*_axes(place), *_branches(theory, bends, place, stiffest)]
+    parts = [*_axes(place), *_branches(theory, bends, place)]
     points = " ".join("{:.1f},{:.1f}".format(*place(*each)) for each in trail)
     parts.append(f'<polyline points="{points}" fill="none" stroke="{SCENE["path"]}" opacity="0.5"/>')
     if trail and np.isfinite(trail[-1]).all():
@@ -61,11 +62,12 @@ def drawn(theory: Theory, stiffest: float, trail: list[tuple[float, float]]) -> 
     )
 
 
+@dataclass(frozen=True)
 class _Place:
     """Pixels of springs (N*m/rad) and bends (deg)."""
 
-    def __init__(self, stiffest: float, most: float) -> None:
-        self.most, self.stiffest = most, stiffest
+    stiffest: float
+    most: float
 
     def __call__(self, spring: float, bend: float) -> tuple[float, float]:
         x = _LEFT + (_RIGHT - _LEFT) * min(spring / self.stiffest, 1.0)
@@ -79,7 +81,7 @@ def _bends(theory: Theory) -> Array:
     return np.rad2deg((theory.robot.body.modules - 1) * theory.robot.module_length / theory.radii)
 
 
-def _branches(theory: Theory, bends: Array, place: _Place, stiffest: float) -> list[str]:
+def _branches(theory: Theory, bends: Array, place: _Place) -> list[str]:
     fork = theory.pitchfork
     if fork is None:
         return [
@@ -87,7 +89,7 @@ def _branches(theory: Theory, bends: Array, place: _Place, stiffest: float) -> l
             for row, line in enumerate(wrap(theory.remark, _LETTERS))
         ]
     parts = [
-        _line([place(fork, 0.0), place(stiffest, 0.0)], _STABLE),
+        _line([place(fork, 0.0), place(place.stiffest, 0.0)], _STABLE),
         _line([place(0.0, 0.0), place(fork, 0.0)], _UNSTABLE),
         _text(place(fork, 0.0)[0] + 6.0, place(fork, 0.0)[1] - 7.0, f"pitchfork {_in_unit(fork):.3g}", "start"),
     ]

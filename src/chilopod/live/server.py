@@ -149,13 +149,11 @@ class Live:
         server, seen, session = self._server, self.seen, self._session
         title = f"{seen.robot.name}, {seen.robot.body.modules} modules, {session.engine}"
         self._view = View(server, self._body.places(seen), session.file)
-        calls = Calls(
-            self._follow,
-            self._recorder,
-            lambda name: self._errand(partial(self._choose, name)),
-            lambda name: self._errand(partial(self._begin_challenge, name)),
-            lambda given: self._errand(partial(self._answer, given)),
+        later = (
+            lambda word, do=do: self._errand(partial(do, word))
+            for do in (self._choose, self._begin_challenge, self._answer)
         )
+        calls = Calls(self._follow, self._recorder, *later)
         self._controls = Controls(server, session, title, self._preset, calls)
         self._plots, self._pitchfork = self._controls.plots, self._controls.pitchfork
         server.gui.main_panel.dock_right()
@@ -224,7 +222,7 @@ class Live:
             walked.add(now, seen.time)
             if self._challenge:
                 self._challenge.look(seen)
-            self._plots.add(seen, self._shown())
+            self._plots.add(seen)
             self._at_server(partial(self._show, self._body.places(seen), now - plotted > _PLOTS, walked.value))
             if now - plotted > _PLOTS:
                 plotted = now
