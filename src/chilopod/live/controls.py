@@ -127,7 +127,9 @@ class Controls:
 
     def show_challenge(self, challenge: Challenge | None) -> None:
         """Show a challenge, what came of it so far, and its answers."""
-        content = f"{challenge.task}\n\n**{challenge.said}**" if challenge else ""
+        content = challenge.task if challenge else ""
+        if challenge and challenge.said:
+            content += f"\n\n**{challenge.said}**"
         if self._task.content != content:
             self._task.content, self._task.visible = content, bool(content)
         answers = challenge.answers if challenge and challenge.asks else ()

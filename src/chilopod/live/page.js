@@ -38,7 +38,10 @@
   addEventListener("DOMContentLoaded", () => {
     const canvas = document.createElement("canvas");
     if (!canvas.getContext("webgl2")) { setTimeout(withoutWebGL, 0); return; }
+    let full = false;  // at first the sheet is empty, and the picture must not take its room
     const sheets = new ResizeObserver(([{ target }]) => {
+      full ||= target.offsetHeight > 0.3 * innerHeight;
+      if (!full) return;
       document.documentElement.style.setProperty("--sheet", `${target.offsetHeight}px`);
     });
     let watched = null;

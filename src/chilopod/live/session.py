@@ -341,7 +341,7 @@ class Session:
         self._reached = self._before + self._walk.time
         self._walk.aim(self._target)
 
-    def _steered(self) -> tuple[Controller, str]:
+    def _steered(self) -> tuple[Controller | None, str]:
         """Controller of the strategy that is set, or of leg yaw where it needs an unknown law, and its name."""
         strategy = ON_THE_WAY[self.settings.strategy]
         if strategy.needs_law and self.law is None:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
@@ -300,7 +301,7 @@ class FilmPanel:
         self.swinging = _dot("white", COLORS["air"], foot, thin)
         self.standing = _dot(COLORS["ink"], COLORS["ink"], foot, thin)
         moving = (self.lines, self.legs, self.modules, self.path, self.swinging, self.standing)
-        self.artists = (*moving[:4], self.joints, *moving[4:], self.spring)
+        self.artists: tuple[Artist, ...] = (*moving[:4], self.joints, *moving[4:], self.spring)
         if self.follow:  # targets move over the picture, too
             self.artists = (self.lines, *chain.from_iterable(self.rings), *self.artists[1:])
         for artist in moving:
