@@ -41,7 +41,7 @@ def test_an_address_leads_to_its_settings_and_they_lead_to_it():
         ("strategy=varible", "did you mean 'variable'"),
         ("robot=nine+modules", "must be a preset"),
         ("frction=1", "did you mean 'friction'"),
-        (urlencode({"x" * 5000: "y" * 5000}), "is no setting"),
+        (urlencode({"x" * 5000: "y" * 5000}), "must be a setting"),
     ],
 )
 def test_nonsense_in_an_address_is_one_line_and_changes_nothing(asked, part):

@@ -94,7 +94,7 @@ def _branches(theory: Theory, bends: Array, place: _Place) -> list[str]:
         _text(place(fork, 0.0)[0] + 6.0, place(fork, 0.0)[1] - 7.0, f"pitchfork {_in_unit(fork):.3g}", "start"),
     ]
     if theory.remark:
-        parts.append(_text(_RIGHT, _BOTTOM - 6.0, escape(theory.remark), "end"))
+        parts.append(_text(_RIGHT, _BOTTOM - 21.0, escape(theory.remark), "end"))
     for side in (1.0, -1.0):
         points = [place(*each) for each in zip(theory.springs, side * bends, strict=True)]
         for first, last in _stretches(theory.stable):
@@ -124,7 +124,7 @@ def _axes(place: _Place) -> list[str]:
     parts += [
         _text(middle, below, "first spring (N·mm/deg); dashed: unstable", "middle"),
         _text(_RIGHT, _TOP + 11.0, "bent to the left", "end"),
-        _text(_LEFT + 4.0, _BOTTOM - 6.0, "to the right", "start"),
+        _text(_RIGHT, _BOTTOM - 5.0, "bent to the right", "end"),
     ]
     return parts
 

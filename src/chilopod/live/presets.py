@@ -86,7 +86,9 @@ def read(asked: str, sliders: Mapping[str, Slider]) -> tuple[list[wishes.Wish], 
             elif key != "robot" and key not in _OTHERS:
                 key = key[:_LONGEST]
                 near = nearest_name(key, allowed)
-                raise ParameterError("is no setting", field=key, value=text[:_LONGEST], allowed="", nearest=near)
+                raise ParameterError(
+                    "must be a setting", field=key, value=text[:_LONGEST], allowed=", ".join(allowed), nearest=near
+                )
         except ParameterError as error:
             wrong.append(str(error))
     # The walk begins anew with everything else as it is asked for.

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
 import io
 import math
 import queue
-import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -19,12 +17,13 @@ from typing import Any
 import xarray as xr
 
 from chilopod.engine import engine_named
-from chilopod.errors import ChilopodError, ParameterError, in_words
+from chilopod.errors import ChilopodError, in_words
 from chilopod.extras import needs
 from chilopod.live import wishes
 from chilopod.live.body import Body, FlatBody, Placed
 from chilopod.live.challenges import CHALLENGES, Challenge
 from chilopod.live.pictures import from_above
+from chilopod.live.ports import free_port
 from chilopod.live.presets import OWN, PRESETS, preset_of, query, read
 from chilopod.live.session import SPEED, Session
 from chilopod.live.state import Settings, but_springs
@@ -113,7 +112,7 @@ class Live:
         self._wants_record: viser.ClientHandle | None = None
         self.frames, self.busy, self._wished = 0, 0.0, False
         self.gate = Gate(host, token)
-        free = _free_port(host, port)
+        free = free_port(host, port)
         with _quiet():
             self._server = self.gate.open(free)
         self._preset, self._own = OWN, (robot, engine)
@@ -479,22 +478,3 @@ def _body(robot: Robot, engine: str) -> Body:
 def _quiet() -> contextlib.AbstractContextManager[object]:
     """Silence of viser, which would print where it listens and that it ends."""
     return contextlib.redirect_stdout(io.StringIO())
-
-
-def _free_port(host: str, port: int) -> int:
-    """Make sure that the page can listen at a port, and nowhere else."""
-    wishes.check_port(port)
-    try:
-        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, socket.SOCK_STREAM) as trial:
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            trial.bind(address)
-            free: int = trial.getsockname()[1]
-            return free
-    except (OSError, UnicodeError) as error:
-        if not isinstance(error, OSError) or isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
-            problem, allowed = "must be an address of this machine", "an address or a name of it, or 0.0.0.0 for all"
-            raise ParameterError(problem, field="host", value=host, allowed=allowed) from error
-        raise ParameterError(
-            f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
-        ) from error
