@@ -29,7 +29,6 @@ def picture(page: Page, live: Live) -> bytes:
         live.wish(wish)
     page.get_by_text("Settled on").first.wait_for(timeout=PATIENCE)
     live.wish(wishes.Speed(1.0))
-    page.locator(".mantine-Notification-closeButton").first.click()
     page.wait_for_timeout(1500)
     written = io.BytesIO()
     Image.open(io.BytesIO(page.screenshot())).convert("RGB").save(written, "WEBP", quality=80, method=6)

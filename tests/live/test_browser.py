@@ -68,13 +68,13 @@ def opened(page, live):
 
 
 @contextmanager
-def visit(chromium, live):
-    page = chromium.new_page(viewport={"width": 800, "height": 500})
+def visit(chromium, live, width=800, height=500, query=""):
+    page = chromium.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(PATIENCE)
     page.asked = []
     page.on("request", lambda request: page.asked.append(request.url))
     try:
-        page.goto(live.address)
+        page.goto(f"{live.address}/{query}")
         page.get_by_text("first spring", exact=True).first.wait_for()
         yield page
     finally:
@@ -139,7 +139,7 @@ def test_a_click_on_the_floor_is_walked_to(opened):
 
 
 def joint_in(page):
-    """Where on the page a yaw joint stands still: the largest orange spot between curves, words and notifications."""
+    """Where on the page a yaw joint stands still: the largest purple spot below notifications and beside words."""
     found = before = None
     while found is None or found != before:
         before = found
@@ -147,11 +147,11 @@ def joint_in(page):
         red, green, blue = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), float).transpose(
             2, 0, 1
         )
-        orange = (red > 150.0) & (green > 0.5 * red) & (green < 0.85 * red) & (blue < 0.35 * red)
-        orange[:200] = orange[:, :310] = orange[:, 940:] = False
-        spots, count = ndimage.label(orange)
-        sizes = ndimage.sum_labels(orange, spots, np.arange(1, count + 1))
-        found = tuple(ndimage.center_of_mass(orange, spots, 1 + np.argmax(sizes))) if count else None
+        purple = (red > 1.2 * green) & (red > 1.1 * blue) & (blue > 1.1 * green) & (red > 120.0)
+        purple[:200] = purple[:, 920:] = False
+        spots, count = ndimage.label(purple)
+        sizes = ndimage.sum_labels(purple, spots, np.arange(1, count + 1))
+        found = tuple(ndimage.center_of_mass(purple, spots, 1 + np.argmax(sizes))) if count else None
     return found[::-1]
 
 
@@ -180,6 +180,10 @@ def test_keys_do_what_controls_do(opened, live):
     read(opened, "first spring softer, stiffer")
     opened.locator("body").press("h")
     opened.get_by_text("first spring softer, stiffer").wait_for(state="hidden")
+    opened.locator("body").press("h")
+    read(opened, "first spring softer, stiffer")
+    opened.keyboard.press("Escape")
+    opened.get_by_text("first spring softer, stiffer").wait_for(state="hidden")
     opened.locator("body").press("z")
     read(opened, r"its first spring, 37\.3 N")
     opened.locator("body").press("Space")
@@ -188,6 +192,28 @@ def test_keys_do_what_controls_do(opened, live):
     read(opened, r"On its way to the target, 1\.[23]\d m off")
     opened.locator("body").press("l")
     assert live.gate.refused == refused  # the page itself gets through
+
+
+def test_the_address_sets_the_walk_and_says_what_of_it_is_wrong(chromium, live):
+    with visit(chromium, live, query="?k1=9&seed=3&friction=77") as page:
+        read(page, r"In the address: friction = 77: is out of range \(0\.3 to 3\)|In the address: friction = 77")
+        read(page, r"first spring, 9 N")
+        read(page, r"s, seed 3")
+        link = page.locator("[data-copy]").get_attribute("data-copy")
+        assert link == f"{live.address}/?k1=9&seed=3"
+
+
+def test_nothing_covers_the_robot(opened):
+    for width, height in ((390, 800), (1280, 800), (800, 500)):
+        opened.set_viewport_size({"width": width, "height": height})
+        opened.wait_for_function(
+            "([width]) => { const size = document.querySelector('canvas[data-engine]').getBoundingClientRect();"
+            " return size.height > 100 && size.width > 300 && size.width <= width }",
+            arg=[width],
+        )
+        canvas = opened.locator("canvas[data-engine]").bounding_box()
+        words = opened.get_by_text("Soften the").bounding_box()
+        assert words["x"] >= canvas["x"] + canvas["width"] - 1 or words["y"] >= canvas["y"] + canvas["height"] - 1
 
 
 def test_nonsense_in_a_field_is_refused_in_a_line(opened):

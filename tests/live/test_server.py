@@ -208,12 +208,13 @@ def test_what_is_used_of_viser_is_still_there(page):
     assert len(server.gui._gui_input_handle_from_uuid) > 20
     assert len(server.gui._command_handle_from_uuid) > 20
     assert server.scene.get_handle_by_name("/world/pin")._impl.drag_cb
-    slider = next(iter(server.gui._gui_input_handle_from_uuid.values()))
-    assert isinstance(slider, viser.GuiSliderHandle)
+    handles = server.gui._gui_input_handle_from_uuid.values()
+    slider = next(each for each in handles if isinstance(each, viser.GuiSliderHandle))
     assert (slider.disabled, slider.visible) == (False, True)
     for good in (live_clients._CAMERA, live_clients._CLICK, live_clients._DRAG):
         assert msgspec.convert(good, gate._KINDS[good["type"]])
-    assert gate._scripts().count("'sha256-") == 2  # not 'unsafe-inline'
+    assert gate._scripts().count("'sha256-") == 3  # not 'unsafe-inline'
+    assert b"<title>chilopod live</title>" in gate._page()
 
 
 def test_a_viser_that_listens_in_another_way_is_not_used(monkeypatch):
@@ -236,6 +237,46 @@ def test_an_answer_is_for_no_frame_and_for_no_other_page(page):
     assert "unsafe" not in policy.partition("style-src")[0].replace("'wasm-unsafe-eval'", "")
     assert headers["X-Content-Type-Options"] == "nosniff"
     assert headers["Referrer-Policy"] == "no-referrer"
+
+
+def asked(page, query, **headers):
+    """What the gate takes from the address of a request."""
+    told = {f"Sec-Fetch-{name}": value for name, value in headers.items()}
+    request = urllib.request.Request(f"{page.address}/?{query}", headers=told)
+    with urllib.request.urlopen(request, timeout=30.0):
+        return page.gate.asked()
+
+
+def test_an_address_is_obeyed_only_if_a_person_opened_it(page):
+    assert asked(page, "k1=8", Site="none", Dest="document") == ("k1=8", True)
+    assert asked(page, "k1=8", Site="cross-site", Dest="document") == ("k1=8", False)
+    assert asked(page, "k1=8", Site="cross-site", Dest="image") == ("", False)
+    assert asked(page, "k1=8") == ("", False)
+    page._open_address("k1=8", False)  # from another web site
+    page._session.obey()
+    assert page._session.settings.robot == PLANAR.override("springs.adjustable", True)
+
+
+def test_a_browser_without_webgl_has_pictures(page):
+    with urllib.request.urlopen(f"{page.address}/picture.svg", timeout=30.0) as answer:
+        assert answer.headers["Content-Type"] == "image/svg+xml"
+        drawn = answer.read().decode()
+    assert drawn.count("<rect") == 6 + 12 + 1  # modules, feet, ground
+    assert "seed 1" in drawn
+
+
+def test_another_preset_is_another_robot(page):
+    page._errand(lambda: page._choose("ten modules"))
+    end = time.monotonic() + 60.0
+    while page.seen.robot.body.modules != 10 or page._link is None:
+        assert time.monotonic() < end
+        assert page.failure is None
+        time.sleep(0.05)
+    page._errand(lambda: page._choose("as started"))
+    while page.seen.robot.body.modules != 6:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    assert page._query().startswith("seed=")
 
 
 def test_a_flood_of_messages_is_slowed_down(page):

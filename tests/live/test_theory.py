@@ -27,7 +27,9 @@ def test_the_pitchfork_is_told_before_the_branch(told):
     first = next(each for each in told if each.pitchfork is not None)
     assert first.law is None
     assert first.settled(stiffness(8.0)) is None
-    assert "curved walks" in first.remark
+    assert "computing the branch" in first.remark
+    assert first.computing
+    assert not told[-1].computing
 
 
 def test_growth_changes_its_sign_at_the_pitchfork(told):

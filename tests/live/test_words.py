@@ -1,6 +1,8 @@
 """The sentences that say what is seen."""
 
+import re
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -43,13 +45,16 @@ def test_every_state_has_its_sentence(begun):
     assert "fades by 18 % a second" in said(begun, rate=-0.2)
     assert "The curve of 0.40 m straightens" in said(begun, **curve(0.4), turning=-0.1)
     assert "The curve of 0.40 m will straighten" in said(begun, **curve(0.4), turning=0.1)
-    grows = said(begun, rate=0.125, **soft(8.0))
+    begun.box.put(wishes.Spring(0, stiffness(8.0)))
+    begun.obey()
+    grows = said(begun, rate=0.125)
     assert "the smallest bend grows by 13 % a second, to 0.32 m in the end" in grows
     assert "tightens towards the branch's 0.32 m" in said(begun, **soft(8.0), **curve(0.9), turning=0.1)
     assert "0.20 m to the right, widens" in said(begun, **soft(8.0), **curve(0.2, 1.0), turning=-0.1)
     assert said(begun, **soft(8.0), **curve(0.33), turning=0.001).startswith("Settled on a curve of 0.33 m to the left")
     assert "no settled curve is known" in said(begun, **soft(3.0))
-    assert "not known: it is computed" in said(begun, Theory(remark="it is computed"))
+    assert "not known yet: it is computed" in said(begun, Theory(remark="it is computed", computing=True))
+    assert "no pitchfork in the first spring to show: a fold" in said(begun, Theory(remark="a fold"))
     pulled = said(begun, pulled=np.array([0.0, 0.1, 0.0, 0.0, 0.0]), **curve(0.9))
     assert pulled == "Joint 2 is pulled aside, and it walks a curve of 0.90 m to the left as long as that lasts."
     assert said(begun, pulled=np.array([0.0, 0.1, 0.0, 0.0, -0.1])).startswith("Joints 2, 5 are pulled aside")
@@ -101,3 +106,45 @@ def test_targets_and_pauses_are_said_first(begun):
     first, second, *_ = sentences(begun.seen(), begun.settings, THEORY, None)
     assert first.startswith("Paused")
     assert second.startswith("On its way to the target, 2.00 m off")
+
+
+_SPRINGS, _BODIES = (41.0, 8.0, 3.0), ({}, curve(0.33), curve(0.2, 1.0))
+_KNOWN = (THEORY, Theory(remark="computing the pitchfork", computing=True), Theory(remark="a fold comes first"))
+_DOING = ("walks", "grows", "fades", "paused", "pulled", "aimed", "by hand")
+
+
+@pytest.mark.parametrize(("spring", "body", "theory", "doing"), [*product(_SPRINGS, _BODIES, _KNOWN, _DOING)])
+def test_the_words_are_right_in_every_state(spring, body, theory, doing):
+    session = Session(PLANAR)
+    session.box.put(wishes.Spring(0, stiffness(spring)))
+    if doing in ("aimed", "by hand"):
+        session.box.put(wishes.Target((2.0, 0.5), by_hand=doing == "by hand"))
+    if doing == "paused":
+        session.box.put(wishes.Pause(True))
+    session.obey()
+    rate = {"grows": 0.2, "fades": -0.2}.get(doing)
+    pulled = {"pulled": np.array([0.1, 0.0, 0.0, 0.0, 0.0])} if doing == "pulled" else {}
+    seen, growth = (
+        replace(session.seen(), **body, **pulled),
+        None if rate is None else Growth(session.settings.robot, rate),
+    )
+    each = sentences(seen, session.settings, theory, growth)
+    text, bent, soft_one = " ".join(each), bool(body), theory is THEORY and spring < 12.0
+    assert all(re.fullmatch(r"[A-Z].*\.", sentence) for sentence in each)
+    assert not re.search(r"\b(nan|inf|None)\b|  |\.\.", text)
+    assert text.startswith("Paused") == (doing == "paused")
+    assert ("On its way to the target" in text) == (doing == "aimed")
+    assert ("nothing but you steers" in text) == (doing == "by hand")
+    assert ("pulled" in text) == (doing == "pulled")
+    quiet = doing not in ("aimed", "pulled")
+    assert ("Past the pitchfork" in text) == (soft_one and quiet)
+    assert ("Straight and stable" in text) == (
+        theory is THEORY and spring > 12.0 and quiet and not bent and rate != 0.2
+    )
+    assert ("unstable" in text) <= (rate == 0.2 or (soft_one and not bent))
+    assert ("Settled on" in text) <= (spring == 8.0 and body is _BODIES[1])
+    if re.search("to the (left|right)", text):
+        assert bent
+        assert f"to the {'left' if body['mean_angles'].sum() < 0.0 else 'right'}" in text
+    if theory is not THEORY:
+        assert (theory.remark in text) == quiet

@@ -61,6 +61,16 @@ def test_the_poster_is_a_frame_of_the_last_third():
     assert 2 / 3 <= nearest / (len(frames) - 1) < 1
 
 
+def test_a_film_that_follows_shows_its_robots_large():
+    """Side by side, and however far they walk."""
+
+    def sky(**how) -> int:
+        picture = imread(io.BytesIO(poster(walk(0.0, 0.5, duration=20.0), titles=["a", "b"], heading="h", **how)))
+        return int((np.abs(picture[30:-40, :, :3] - to_rgb(style.SKY)).max(axis=-1) < 0.1).sum())
+
+    assert sky(follow=True) > 3 * sky()
+
+
 def test_robot_that_never_started():
     record = walk(0.0, 0.3, duration=0.4, stops=[(1, 0.0)], targets=[[0.3, 0.0], [np.nan, np.nan]])
     film = filmed(record, titles=["x" * 200, "b"], heading="y" * 200, size=(240, 240))

@@ -41,7 +41,14 @@ def near(pixels, color, far=60.0):
 
 def look(pose, **more):
     stands = np.ones((N, 2), bool)
-    rest = {"walks": True, "path": np.zeros((0, 2)), "target": None, "radius": 0.15, "arrived": False}
+    rest = {
+        "springs": np.ones(N - 1),
+        "walks": True,
+        "path": np.zeros((0, 2)),
+        "target": None,
+        "radius": 0.15,
+        "arrived": False,
+    }
     return Look(pose=pose, stands=stands, **{**rest, **more})
 
 

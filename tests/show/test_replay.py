@@ -126,3 +126,19 @@ def test_written_page_is_not_replaced_unasked(tmp_path):
     assert (tmp_path / "walk.html").read_text(encoding="utf-8") == shown.html
     with pytest.raises(OutputError):
         shown.write(tmp_path / "walk.html")
+
+
+def test_springs_are_as_the_record_has_them():
+    """One value of a spring that stays, and the page says what a first spring is that steers."""
+    record = walk(0.0, 0.3, duration=2.0, stops=[(1, 1.0)])
+    springs = np.ones((record.sizes["time"], 2, record.sizes["joint"]))
+    springs[:, 0, 0] = np.linspace(0.2, 1.0, len(springs))
+    springs[record.time.values > 1.0, 1] = np.nan
+    record["stiffness"] = (("time", "robot", "joint"), springs)
+    robots = json.loads(Page(replay(record, titles=["a", "b"]).html).data)["robots"]
+    steps = [[np.frombuffer(base64.b64decode(each), "<u2") / 65535 for each in robot["springs"]] for robot in robots]
+    assert [robot["steers"] for robot in robots] == [True, False]
+    assert steps[0][0][[0, -1]] == pytest.approx([0.2, 1.0], abs=1e-4)
+    assert [len(each) for each in steps[0][1:] + steps[1]] == [1] * (2 * record.sizes["joint"] - 1)
+    constant = json.loads(Page(replay(record.drop_vars("stiffness"), titles=["a", "b"]).html).data)["robots"]
+    assert not any(robot["steers"] for robot in constant)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import EngineOption, ForceOption, SetOption, choices, free, read_robot, reading, with_options
-from chilopod.live.wishes import LARGEST_SEED, check_port
+from chilopod.live.ports import check_port
+from chilopod.live.wishes import LARGEST_SEED
 
 if TYPE_CHECKING:
     from chilopod.live import Live

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import dataclass
 from functools import partial
-from itertools import groupby
+from html import escape
+from itertools import groupby, zip_longest
 from typing import Any, Final
 from weakref import WeakKeyDictionary
 
@@ -14,6 +16,10 @@ import numpy as np
 import viser
 
 from chilopod.live import wishes
+from chilopod.live.challenges import CHALLENGES, Challenge
+from chilopod.live.pitchfork import Pitchfork
+from chilopod.live.plots import Plots
+from chilopod.live.presets import PRESETS
 from chilopod.live.session import Session
 from chilopod.live.sliders import Slider
 from chilopod.live.state import Seen, Settings
@@ -23,6 +29,9 @@ from chilopod.steering.target import FARTHEST
 _PULL = 0.5  # rad by which a key or button pulls a joint, held by its spring
 _A_LENGTH = 2.0  # rad of pull where a joint is dragged aside by the length of a module
 _TURN = 15.0  # deg of bearing, at a key
+
+_ANSWERS = 3  # buttons for answers to a challenge
+_NO_CHALLENGE, _ONE_CYCLE, _ANEW = "none", "One cycle", "Begin anew"
 
 _KEYS: Final = (
     ("Z, X", "first spring softer, stiffer"),
@@ -37,42 +46,57 @@ _KEYS: Final = (
     ("1 to 9, J, K", "choose a joint; pull it left, right for half a second"),
     ("C", "begin or end a recording"),
     ("M", "follow the robot, or not"),
-    ("H", "this help"),
+    ("H, Esc", "this help; close it"),
 )
 HELP = "| key | |\n|---|---|\n" + "\n".join(f"| {key} | {what} |" for key, what in _KEYS)
 
 
-class Controls:
-    """Controls of a page.
+@dataclass(frozen=True)
+class Calls:
+    """Functions that the controls call, each in a thread of the server."""
 
-    ``on_follow`` is called with True if the picture is to follow the robot, ``on_record`` with the browser that wants a
-    recording to begin or end.
-    """
+    follow: Callable[[bool], None]  # with True if the picture is to follow the robot
+    record: Callable[[viser.ClientHandle | None], None]  # with the browser that wants a recording to begin or end
+    choose: Callable[[str], None]  # with the name of another preset
+    challenge: Callable[[str], None]  # with the name of a challenge, or that of none
+    answer: Callable[[str], None]  # with an answer to the challenge
+
+
+class Controls:
+    """Controls of a page with a title and the name of its preset."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         session: Session,
         title: str,
-        on_follow: Callable[[bool], None],
-        on_record: Callable[[viser.ClientHandle | None], None],
+        preset: str,
+        calls: Calls,
     ) -> None:
         self._server, self._put, self._settings = server, session.box.put, session.settings
-        self._file, self._on_record = session.file, on_record
+        self._file, self._calls = session.file, calls
         self._seen: Seen = session.seen()
         self._helped: WeakKeyDictionary[viser.ClientHandle, Any] = WeakKeyDictionary()
         gui = server.gui
         gui.add_markdown(
-            f"**{title}**\n\nDrag the **first spring** below the pitchfork and watch it bend. **Click the floor**: it "
-            "goes there. **Drag a joint** (orange). Press **H** for keys."
+            f"**{title}**. Soften the **first spring** until it bends, **click the floor**, **drag a joint** (purple). "
+            "**H**: keys."
         )
         self.words = gui.add_markdown("")
+        self._task = gui.add_markdown("", visible=False)
+        self._answers: list[Any] = [gui.add_button("-", visible=False) for _ in range(_ANSWERS)]
+        for button in self._answers:
+            button.on_click(lambda event: calls.answer(event.target.label))
+        self.pitchfork = Pitchfork(gui, next(iter(session.sliders.values())).limits[1])
         self._rows, self._sliders = session.sliders, dict[str, Any]()
         self._slide(gui)
         self._walking(gui)
+        self._tasks(gui, preset)
         self._targets(gui)
         self._joints(gui)
-        self._recording(gui, on_follow)
+        self.plots = Plots(gui, self._file.body.modules - 1)
+        self._recording(gui)
+        self._link = gui.add_html("")
         self._keys(gui)
 
     def reflect(self, settings: Settings, seen: Seen) -> None:
@@ -80,7 +104,7 @@ class Controls:
         before, self._settings, self._seen = self._settings, settings, seen
         if settings == before:
             return
-        self._pause.label = "Go on (space)" if settings.paused else "Pause (space)"
+        self._walks.options = _walking_options(settings.paused)
         self._record.label = "End the recording (C)" if settings.recording else "Record (C)"
         self._seed.value = settings.seed
 
@@ -93,6 +117,25 @@ class Controls:
             if not row.moves:
                 self._sliders[name].value = row.at_page(row.read(now))
         self._seed.value, self._strategy.value = now.seed, now.strategy
+
+    def show_link(self, address: str) -> None:
+        """Show the address that leads to the present settings."""
+        text = escape(address, quote=True)
+        content = f'<div class="chilopod-link">{text} <button type="button" data-copy="{text}">Copy</button></div>'
+        if self._link.content != content:
+            self._link.content = content
+
+    def show_challenge(self, challenge: Challenge | None) -> None:
+        """Show a challenge, what came of it so far, and its answers."""
+        content = challenge.task if challenge else ""
+        if challenge and challenge.said:
+            content += f"\n\n**{challenge.said}**"
+        if self._task.content != content:
+            self._task.content, self._task.visible = content, bool(content)
+        answers = challenge.answers if challenge and challenge.asks else ()
+        for button, answer in zip_longest(self._answers, answers):
+            if button.visible != bool(answer):
+                button.label, button.visible = answer or button.label, bool(answer)
 
     def fail(self, why: str) -> None:
         """Say that nothing goes on here."""
@@ -120,12 +163,19 @@ class Controls:
         return slider
 
     def _walking(self, gui: viser.GuiApi) -> None:
-        self._pause = gui.add_button("Pause (space)")
-        self._pause.on_click(lambda _: self._toggle_pause())
-        gui.add_button("One gait cycle (N)").on_click(lambda _: self._put(wishes.Step(1.0)))
+        hint = "Keys: space, N, R (with the next seed)"
+        self._walks: Any = gui.add_button_group("walk", _walking_options(self._settings.paused), hint=hint)
+        self._walks.on_click(lambda _: self._walk(self._walks.value))
         hint, largest = "Seed of the start and of the nudges", wishes.LARGEST_SEED
         self._seed: Any = gui.add_number("seed", self._settings.seed, min=0, max=largest, step=1, hint=hint)
-        gui.add_button("Begin anew (R)").on_click(lambda _: self._put(wishes.Reset(self._seed.value)))
+
+    def _tasks(self, gui: viser.GuiApi, preset: str) -> None:
+        """Presets and challenges."""
+        robot: Any = gui.add_dropdown("robot", list(PRESETS), initial_value=preset, hint="Robots and floors to choose")
+        robot.on_update(lambda _: self._calls.choose(robot.value))
+        names, hint = [_NO_CHALLENGE, *CHALLENGES], "A task, and a check of what you did"
+        challenge: Any = gui.add_dropdown("challenge", names, initial_value=_NO_CHALLENGE, hint=hint)
+        challenge.on_update(lambda _: self._calls.challenge(challenge.value))
 
     def _targets(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Target", expand_by_default=False):
@@ -146,11 +196,11 @@ class Controls:
             for name, way in (("Left (J)", 1.0), ("Right (K)", -1.0)):
                 gui.add_button(name).on_click(partial(self._pull, way))
 
-    def _recording(self, gui: viser.GuiApi, on_follow: Callable[[bool], None]) -> None:
+    def _recording(self, gui: viser.GuiApi) -> None:
         self._record = gui.add_button("Record (C)", hint="Recording as a netCDF file, and as a page that plays it")
         self._record.on_click(lambda event: self._toggle_record(event.client))
         self._follow: Any = gui.add_checkbox("follow the robot (M)", True)
-        self._follow.on_update(lambda _: on_follow(self._follow.value))
+        self._follow.on_update(lambda _: self._calls.follow(self._follow.value))
 
     def _keys(self, gui: viser.GuiApi) -> None:
         def key(label: str, hotkey: Any, do: Callable[..., object], *to: object, shift: bool = False) -> None:
@@ -187,6 +237,14 @@ class Controls:
         joint = int(self._joint.value) - 1
         self._put(wishes.Pull(joint, way * _PULL * self._file.springs.stiffness[joint], self._file.gait.period))
 
+    def _walk(self, what: str) -> None:
+        if what == _ONE_CYCLE:
+            self._put(wishes.Step(1.0))
+        elif what == _ANEW:
+            self._put(wishes.Reset(self._seed.value))
+        else:
+            self._toggle_pause()
+
     def _toggle_pause(self) -> None:
         self._put(wishes.Pause(not self._settings.paused))
 
@@ -209,7 +267,7 @@ class Controls:
         self._strategy.value = names[(names.index(self._strategy.value) + 1) % len(names)]
 
     async def _help(self, event: viser.CommandEvent) -> None:
-        """Show the keys to the browser that asked, or hide them; Escape does not reach viser's windows."""
+        """Show the keys to the browser that asked, or hide them; the page's own script lets Escape press Close."""
         if event.client is None:
             return
         before = self._helped.pop(event.client, None)
@@ -223,8 +281,12 @@ class Controls:
         self._helped[event.client] = modal
 
     def _toggle_record(self, client: viser.ClientHandle | None) -> None:
-        self._on_record(client)
+        self._calls.record(client)
         self._put(wishes.Record(not self._settings.recording))
+
+
+def _walking_options(paused: bool) -> tuple[str, ...]:
+    return "Go on" if paused else "Pause", _ONE_CYCLE, _ANEW
 
 
 async def _do(do: Callable[..., object], *to: object) -> None:

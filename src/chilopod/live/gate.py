@@ -10,17 +10,22 @@ from __future__ import annotations
 import asyncio
 import base64
 import dataclasses
+import gzip
 import hashlib
 import hmac
 import ipaddress
 import logging
+import math
 import re
 import reprlib
 import secrets
 import socket
 import threading
+from collections.abc import Callable
 from functools import cache, partial
+from importlib.resources import files
 from pathlib import Path
+from time import monotonic
 from types import SimpleNamespace
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -32,6 +37,7 @@ import zstandard
 from viser import _messages
 from viser.infra import _infra
 from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 _LARGEST = 16_384  # bytes of a message; those of viser's client have a few hundred
@@ -40,6 +46,7 @@ _AT_ONCE = 1.0  # s of messages that may come at once
 _MOST = 250  # browsers
 _FARTHEST = 1e16  # in any unit, of any number; seeds go up to 9e15
 _LONGEST = 200  # characters of any text
+_LOADING = 60.0  # s from the request of a page to the first word of its scripts
 _LOG = logging.getLogger("chilopod.live")
 _PATCHING = threading.Lock()
 _HOST = re.compile(r"([a-z0-9._-]+|\[[0-9a-f:.]+\])(:\d+)?", re.IGNORECASE)
@@ -72,7 +79,8 @@ class Gate:
         self._host, self._local = host, _is_local(host)
         self._token = None if self._local and not token else secrets.token_urlsafe(24)
         self.refused = 0
-        self._serves = False
+        self.pictures: Callable[[], bytes] | None = None  #: SVG of the walk for a browser without WebGL
+        self._serves, self._asked = False, (-math.inf, "", False)
         self._viser: viser.ViserServer | None = None
 
     def link(self, port: int) -> str:
@@ -81,6 +89,12 @@ class Gate:
         host = "localhost" if self._local else socket.gethostname() if everywhere else self._host
         address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
         return address if self._token is None else f"{address}/?token={self._token}"
+
+    def asked(self) -> tuple[str, bool]:
+        """Settings in the address of a page that has just been opened, once, and True if a person opened it there and
+        not another web site."""
+        (time, query, by_hand), self._asked = self._asked, (-math.inf, "", False)
+        return (query, by_hand) if monotonic() - time < _LOADING else ("", False)
 
     def open(self, port: int) -> viser.ViserServer:
         """Listen at a free port; not at all with a viser that listens in another way, and would ask nobody."""
@@ -115,7 +129,7 @@ class Gate:
             response, host = connection.respond(403, f"chilopod live refuses a request {why}.\n"), ""
         else:
             try:
-                response = answer(connection, request)
+                response = self._own(request) or answer(connection, request)
             except (ValueError, OSError, LookupError):  # a path or a header that is none
                 response = connection.respond(400, "chilopod live cannot read this request.\n")
         if response is not None:
@@ -124,6 +138,23 @@ class Gate:
                 cookie = f"{_cookie(connection)}={self._token}"
                 response.headers["Set-Cookie"] = f"{cookie}; HttpOnly; SameSite=Strict; Path=/"
         return response
+
+    def _own(self, request: Request) -> Response | None:
+        """Answer of our own: the page with what viser's lacks, and pictures of the walk."""
+        path, _, query = request.path.partition("?")
+        if request.headers.get("Upgrade") or path not in ("/", "/index.html", "/picture.svg"):
+            return None
+        if path == "/picture.svg":
+            body, kind = self.pictures() if self.pictures else b"", "image/svg+xml"
+        else:
+            body, kind = _page(), "text/html; charset=utf-8"
+            site, to = (request.headers.get(f"Sec-Fetch-{each}") for each in ("Site", "Dest"))
+            if to == "document" or self._token is not None:  # not a picture or a script of another page
+                self._asked = monotonic(), query, site in ("none", "same-origin") or self._token is not None
+        packed = "gzip" in request.headers.get("Accept-Encoding", "")
+        told = {"Content-Type": kind, "Content-Encoding": "gzip" if packed else "identity"}
+        body = (_packed() if path != "/picture.svg" else gzip.compress(body, 1)) if packed else body
+        return Response(200, "OK", Headers({**told, "Content-Length": str(len(body))}), body)
 
     def _unwelcome(self, connection: ServerConnection, request: Request, host: str) -> str | None:
         """Reason to refuse a request."""
@@ -243,7 +274,7 @@ def _takes(handle: Any, value: Any) -> bool:
         return isinstance(value, bool)
     if isinstance(handle, viser.GuiButtonHandle):
         return value is True
-    if isinstance(handle, viser.GuiDropdownHandle):
+    if isinstance(handle, viser.GuiDropdownHandle | viser.GuiButtonGroupHandle):
         return value in handle.options
     if not isinstance(handle, viser.GuiSliderHandle | viser.GuiNumberHandle) or None in (handle.min, handle.max):
         return False
@@ -269,19 +300,40 @@ def _only(values: list[str]) -> str | None:
 
 
 def _policy(host: str) -> str:
-    """Content policy of a page: its own two scripts, nothing from elsewhere, and no frame of another site."""
+    """Content policy of a page: viser's two scripts and ours, nothing from elsewhere, no frame of another site."""
     return (
         f"default-src 'none'; script-src {_scripts()} 'wasm-unsafe-eval'; worker-src blob:; "
-        "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
+        "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; "
         f"connect-src 'self' data: blob: {f'ws://{host}' if host else ''}; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
 
 
 @cache
+def _page() -> bytes:
+    """Viser's page with our styles and our script in front of its own."""
+    ours = f"<style>{_file('page.css')}</style><script>{_file('page.js')}</script><title>chilopod live</title>"
+    return _index().replace("<title>Viser</title>", ours).encode()
+
+
+@cache
+def _packed() -> bytes:
+    return gzip.compress(_page())
+
+
+def _file(name: str) -> str:
+    return files("chilopod.live").joinpath(name).read_text(encoding="utf-8")
+
+
+def _index() -> str:
+    return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
+
+
+@cache
 def _scripts() -> str:
-    """Hashes of viser's two scripts: one that unpacks, and the unpacked one (from five digits of 88 for four bytes)."""
-    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
+    """Hashes of viser's two scripts, one that unpacks, and the unpacked one (from five digits of 88 for four bytes),
+    and of ours."""
+    page = _index()
     digits = {digit: place for place, digit in enumerate(sorted({*map(chr, range(33, 127))} - {*"\"&'<>`"}))}
     packed = bytearray()
     try:
@@ -296,5 +348,5 @@ def _scripts() -> str:
         code = zstandard.ZstdDecompressor().decompress(packed)[int(styles) :]
     except (ValueError, LookupError, zstandard.ZstdError):
         return "'unsafe-inline'"  # the page is made otherwise
-    hashes = (hashlib.sha256(each).digest() for each in (unpacking.encode(), code))
+    hashes = (hashlib.sha256(each).digest() for each in (unpacking.encode(), code, _file("page.js").encode()))
     return " ".join(f"'sha256-{base64.b64encode(each).decode()}'" for each in hashes)

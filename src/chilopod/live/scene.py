@@ -1,7 +1,7 @@
 """The robot, the floor, the way it came and the target in the browser's three-dimensional picture.
 
 Everything is made once; a frame only moves it. The picture is cheap enough for a browser that draws without a graphics
-card: no shadows, and the floor is a few lines, as a shaded one costs more than all the rest.
+card: shadows are flat boxes, and the floor is one small picture without light, which costs a tenth of a shaded one.
 """
 
 from __future__ import annotations
@@ -18,12 +18,19 @@ from numpy.typing import NDArray
 from chilopod.frozen import Array
 from chilopod.live.body import KINDS, Placed
 from chilopod.live.state import Seen
-from chilopod.show.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION
+from chilopod.robot import Robot
+from chilopod.show.style import SCENE, springs
 from chilopod.steering import ARRIVAL_RADIUS
 
 WORLD = "/world"
-_FLOOR_LINES = 9  # each way
+_TILES = 12  # each way, an even number
+_TILE = 0.25  # side of a tile over the length of the robot
+_PIXELS = 16  # of a side of a tile
+_TILE_COLORS, _SHADE = ("#f6f7f8", "#e4e7ea"), "#bcc1c7"
+_SHADOW, _ON_FLOOR = 0.002, 0.004  # m above the floor: shadows; paths and targets
 _WAY = 300  # points of the way that it came
+_EYE = np.array([-0.5, -0.68, 0.68])  # place of the eye over the length of the robot
+_NARROW = 1.3  # width of a picture over its height below which the eye moves back
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0]])
 
 
@@ -36,23 +43,23 @@ def _lit(color: str) -> NDArray[np.uint8]:
     return np.rint(255.0 * (np.array(_rgb(color)) / 255.0) ** 2.2).astype(np.uint8)
 
 
-_COLORS = {"box": _lit(SKY), "rod": _lit(GREY), "ball": _lit(BLACK), "pin": _lit(ORANGE)}
-_FRONT = _lit(VERMILLION)
+_COLORS = {"box": _lit(SCENE["body"]), "rod": _lit(SCENE["air"]), "ball": _lit("#ffffff"), "pin": _lit(SCENE["spring"])}
+_FRONT, _STANDING, _TARGET = (_lit(SCENE[name]) for name in ("edge", "ink", "target"))
 
 
 class View:
-    """View in three dimensions of a robot with a length (m) and the first positions of its parts."""
+    """View in three dimensions of a robot of a file, and the first positions of its parts."""
 
-    def __init__(self, server: viser.ViserServer, placed: Mapping[str, Placed], length: float) -> None:
+    def __init__(self, server: viser.ViserServer, placed: Mapping[str, Placed], file: Robot) -> None:
+        length, self._stiffest = file.body.length, max(file.springs.stiffness)
         scene = server.scene
         scene.world_axes.visible = False
         scene.configure_default_lights(True, cast_shadow=False)
         self.follow = True
-        self._step = 0.5 * length
+        self._tile = _TILE * length
         self._world = scene.add_frame(WORLD, show_axes=False)
-        self._floor = scene.add_line_segments(
-            f"{WORLD}/floor", _lines(self._step, _FLOOR_LINES), (205, 205, 205), thickness=1.0, thickness_units="screen"
-        )
+        side = _TILES * self._tile
+        self._floor = scene.add_image(f"{WORLD}/floor", _tiles(), side, side, cast_shadow=False, receive_shadow=False)
         plain: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
         self._batches = {
             kind: scene.add_batched_meshes_simple(
@@ -67,8 +74,18 @@ class View:
             )
             for kind in KINDS
         }
+        count = len(placed["box"].centres)
+        self._shadows = scene.add_batched_meshes_simple(
+            f"{WORLD}/shadows",
+            *_mesh("box"),
+            np.tile(_UPRIGHT, (count, 1)),
+            placed["box"].centres,
+            batched_scales=placed["box"].scales * (1.0, 1.0, 0.0) + (0.0, 0.0, 1e-4),
+            batched_colors=np.tile(_lit(_SHADE), (count, 1)),
+            **plain,
+        )
         self._way = scene.add_line_segments(
-            f"{WORLD}/way", np.zeros((_WAY - 1, 2, 3)), _rgb(BLUE), thickness=2.0, thickness_units="screen"
+            f"{WORLD}/way", np.zeros((_WAY - 1, 2, 3)), _rgb(SCENE["path"]), thickness=2.5, thickness_units="screen"
         )
         self._points: deque[Array] = deque(maxlen=_WAY)
         self._apart = 0.02 * length
@@ -78,13 +95,13 @@ class View:
             np.tile(_UPRIGHT, (2, 1)),
             np.zeros((2, 3)),
             batched_scales=np.array([[ARRIVAL_RADIUS, ARRIVAL_RADIUS, 0.002], [0.01, 0.01, 0.3]]),
-            batched_colors=np.tile(_FRONT, (2, 1)),
+            batched_colors=np.tile(_TARGET, (2, 1)),
             opacity=0.6,
             visible=False,
             **plain,
         )
-        server.initial_camera.position = (-0.9 * length, -1.0 * length, 0.9 * length)
-        server.initial_camera.look_at = (0.1 * length, 0.0, 0.0)
+        self._eye = length * _EYE
+        server.initial_camera.position, server.initial_camera.look_at = tuple(self._eye), (0.0, 0.0, 0.0)
 
     @property
     def pins(self) -> Any:
@@ -96,7 +113,12 @@ class View:
         """Position of the floor's origin in the picture, m, (3,)."""
         return np.array(self._world.position)
 
-    def forget_way(self) -> None:
+    def fit(self, camera: viser.CameraHandle) -> None:
+        """Move the eye of a browser back where its picture is too narrow for the robot."""
+        camera.position = tuple(self._eye * max(1.0, _NARROW / camera.aspect))
+        camera.look_at = (0.0, 0.0, 0.0)  # which moves along with the position
+
+    def forget(self) -> None:
         """Forget the path."""
         self._points.clear()
 
@@ -110,18 +132,37 @@ class View:
             batch.batched_wxyzs = here.turns.astype(np.float32)
             if kind == "rod":
                 batch.batched_scales = here.scales.astype(np.float32)
+        self._dress(placed["pin"], seen)
+        self._shade(placed["box"])
         centre = placed["box"].centres.mean(axis=0)
         centre[2] = 0.0
-        self._floor.position = np.round(centre / self._step) * self._step
+        self._floor.position = np.round(centre / (2.0 * self._tile)) * 2.0 * self._tile
         self._world.position = -centre if self.follow else np.zeros(3)
         self._show_way(placed["box"].centres[0])
         if seen.target is not None:
             x, y = seen.target
-            self._target.batched_positions = np.array([[x, y, 0.001], [x, y, 0.15]], dtype=np.float32)
+            self._target.batched_positions = np.array([[x, y, _ON_FLOOR], [x, y, 0.15]], dtype=np.float32)
         self._target.visible = seen.target is not None
 
+    def _dress(self, pins: Placed, seen: Seen) -> None:
+        """Springs thin and light when soft, and standing feet dark."""
+        gait, feet = seen.robot.gait, self._batches["ball"]
+        widths, colors = springs(seen.stiffness / self._stiffest)
+        _update(self.pins, "batched_scales", (pins.scales * widths[:, None] ** np.array([1, 1, 0])).astype(np.float32))
+        _update(self.pins, "batched_colors", np.rint(255.0 * colors**2.2).astype(np.uint8))
+        stands = gait.stands(gait.phases(seen.clock, seen.robot.body.modules) % 1.0).ravel()
+        _update(feet, "batched_colors", np.where(stands[:, None], _STANDING, _COLORS["ball"]).astype(np.uint8))
+
+    def _shade(self, boxes: Placed) -> None:
+        """Shadows below the modules, straight down."""
+        places, (w, z) = boxes.centres.copy(), (boxes.turns[:, 0], boxes.turns[:, 3])
+        places[:, 2] = _SHADOW
+        about_z = np.stack([w, 0 * w, 0 * w, z], axis=1) / np.maximum(np.hypot(w, z), 1e-9)[:, None]
+        self._shadows.batched_positions = places.astype(np.float32)
+        self._shadows.batched_wxyzs = about_z.astype(np.float32)
+
     def _show_way(self, front: Array) -> None:
-        point = np.array([front[0], front[1], 0.002])
+        point = np.array([front[0], front[1], _ON_FLOOR])
         if self._points and np.hypot(*(point - self._points[-1])[:2]) < self._apart:
             return
         self._points.append(point)
@@ -138,11 +179,20 @@ def floor_place(origin: Array, start: tuple[float, ...], direction: tuple[float,
     return float(x), float(y)
 
 
-def _lines(step: float, count: int) -> Array:
-    at = step * (np.arange(count) - count // 2)
-    end = np.full(count, at[-1])
-    along = np.stack([np.stack([at, -end, 0 * at], axis=1), np.stack([at, end, 0 * at], axis=1)], axis=1)
-    return np.concatenate([along, along[:, :, [1, 0, 2]]])
+def _update(handle: Any, name: str, value: NDArray[Any]) -> None:
+    """Send a property to browsers if it has changed."""
+    if not np.array_equal(getattr(handle, name), value):
+        setattr(handle, name, value)
+
+
+def _tiles() -> NDArray[np.uint8]:
+    """Picture of the floor, which fades towards its edges."""
+    pixels = _TILES * _PIXELS
+    rows, columns = np.indices((pixels, pixels))
+    colors = np.array([_rgb(color) for color in _TILE_COLORS])[(rows // _PIXELS + columns // _PIXELS) % 2]
+    away = np.hypot(rows + 0.5 - 0.5 * pixels, columns + 0.5 - 0.5 * pixels) / (0.5 * pixels)
+    seen = 255.0 * np.clip((1.0 - away) / 0.3, 0.0, 1.0)
+    return np.concatenate([colors, seen[..., None]], axis=2).astype(np.uint8)
 
 
 def _mesh(kind: str) -> tuple[Any, Any]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
 import io
 import math
-import socket
+import queue
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -18,12 +17,16 @@ from typing import Any
 import xarray as xr
 
 from chilopod.engine import engine_named
-from chilopod.errors import ChilopodError, ParameterError, in_words
+from chilopod.errors import ChilopodError, in_words
 from chilopod.extras import needs
 from chilopod.live import wishes
 from chilopod.live.body import Body, FlatBody, Placed
-from chilopod.live.session import Session
-from chilopod.live.state import but_springs
+from chilopod.live.challenges import CHALLENGES, Challenge
+from chilopod.live.pictures import from_above
+from chilopod.live.ports import free_port
+from chilopod.live.presets import OWN, PRESETS, preset_of, query, read
+from chilopod.live.session import SPEED, Session
+from chilopod.live.state import Settings, but_springs
 from chilopod.live.theory import Beside, Growth, Theory
 from chilopod.live.words import sentences
 from chilopod.netcdf import netcdf
@@ -33,15 +36,16 @@ needs("viser", extra="live")
 
 import viser  # noqa: E402  (there, as has just been seen)
 
-from chilopod.live.controls import Controls  # noqa: E402
+from chilopod.live.controls import Calls, Controls  # noqa: E402
 from chilopod.live.gate import Gate  # noqa: E402
-from chilopod.live.plots import Plots  # noqa: E402
 from chilopod.live.scene import View, floor_place  # noqa: E402
 
 _FRAME = 1.0 / 25.0  # s; with more, a browser without a graphics card falls behind, and answers later
 _SOONEST = 0.01  # s from one frame to the next that a wish brings on
 _BEHIND = 0.1  # s that may be made up for
 _PLOTS = 0.25  # s from one drawing of the plots and sentences to the next
+_LOOKS_AGAIN = 2.0  # s after a picture in which a browser without WebGL asks for the next one
+_PANEL = 340  # px
 _ALONE = 0.1  # s from one look to the next while no browser watches
 
 
@@ -108,36 +112,54 @@ class Live:
         self._wants_record: viser.ClientHandle | None = None
         self.frames, self.busy, self._wished = 0, 0.0, False
         self.gate = Gate(host, token)
-        free = _free_port(host, port)
+        free = free_port(host, port)
         with _quiet():
             self._server = self.gate.open(free)
+        self._preset, self._own = OWN, (robot, engine)
+        self._challenge: Challenge | None = None
+        self._errands: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._looked = -math.inf  # time of the last picture for a browser without WebGL
         self._beside = Beside(engine)
         try:
-            # The first steps ever are compiled, which takes a while: better before anybody looks.
-            Session(robot, engine).walk_on(1.5 * robot.gait.period)
-            self._build(f"{robot.name}, {robot.body.modules} modules, {engine}")
+            self._server.gui.configure_theme(show_share_button=False, show_logo=False)
+            self._server.gui.set_panel_label("chilopod live")
+            self._server.scene.on_click()(self._clicked)
+            self._server.on_client_connect(self._greet)
+            self.gate.pictures = self._picture
+            self._compile(robot, engine)
+            self._furnish()
         except BaseException:
             self.close()
             raise
         self.address = self.gate.link(self._server.get_port())
+        self._link = self.address.partition("/?")[0]
         self.failure: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="chilopod walk", daemon=True)
         self._thread.start()
 
-    def _build(self, title: str) -> None:
-        server, seen = self._server, self.seen
-        server.gui.configure_theme(show_share_button=False, show_logo=False)
-        server.gui.set_panel_label("chilopod live")
-        self._view = View(server, self._body.places(seen), seen.robot.body.length)
-        self._controls = Controls(server, self._session, title, self._follow, self._recorder)
-        panel = server.gui.add_panel()
-        with panel.add_tab("Curves"):
-            self._plots = Plots(server.gui, len(seen.joint_angles))
-        panel.dock_left()
-        panel.set_width(300)
+    def _compile(self, robot: Robot, engine: str) -> None:
+        """Walk the first steps ever, which are compiled, before anybody wants to see them; and say so."""
+        note = self._server.gui.add_markdown(f"**Compiling** {robot.name}, once on this machine: up to half a minute.")
+        Session(robot, engine).walk_on(1.5 * robot.gait.period)
+        note.remove()
+
+    def _furnish(self) -> None:
+        """Everything of a page that is made for its robot."""
+        server, seen, session = self._server, self.seen, self._session
+        title = f"{seen.robot.name}, {seen.robot.body.modules} modules, {session.engine}"
+        self._view = View(server, self._body.places(seen), session.file)
+        later = (
+            lambda word, do=do: self._errand(partial(do, word))
+            for do in (self._choose, self._begin_challenge, self._answer)
+        )
+        calls = Calls(self._follow, self._recorder, *later)
+        self._controls = Controls(server, session, title, self._preset, calls)
+        self._plots, self._pitchfork = self._controls.plots, self._controls.pitchfork
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(_PANEL)
+        for client in server.get_clients().values():
+            self._view.fit(client.camera)
         self._view.pins.on_drag("left")(self._dragged)
-        server.scene.on_click()(self._clicked)
-        server.on_client_connect(self._send_undelivered)
 
     def wish(self, wish: wishes.Wish) -> None:
         """Leave a wish, from any thread, as the page does."""
@@ -181,13 +203,15 @@ class Live:
             self._ended.set()
 
     def _walk(self) -> None:
-        session, last, plotted, walked = self._session, time.perf_counter(), -math.inf, _Rate()
+        last, plotted, walked = time.perf_counter(), -math.inf, _Rate()
         self._ask()
         while not self._over.wait(max(0.0, last + _SOONEST - time.perf_counter())):
-            session.box.wait(max(0.0, last + _FRAME - time.perf_counter()))
+            self._session.box.wait(max(0.0, last + _FRAME - time.perf_counter()))
             now = time.perf_counter()
             passed, last = min(now - last, _BEHIND), now
-            watched = bool(self._server.get_clients())
+            watched = bool(self._server.get_clients()) or now - self._looked < _LOOKS_AGAIN
+            self._run_errands()
+            session = self._session
             if self._obey():
                 plotted = -math.inf
             settings = session.settings
@@ -195,7 +219,9 @@ class Live:
                 session.walk_on(passed * settings.speed)
             seen = self.seen = session.seen()
             walked.add(now, seen.time)
-            self._plots.add(seen, self._theory)
+            if self._challenge:
+                self._challenge.look(seen)
+            self._plots.add(seen)
             self._at_server(partial(self._show, self._body.places(seen), now - plotted > _PLOTS, walked.value))
             if now - plotted > _PLOTS:
                 plotted = now
@@ -223,8 +249,11 @@ class Live:
             self._view.show(placed, self.seen)
             self._controls.reflect(self._session.settings, self.seen)
             if all_of_it:
-                self._tell(rate)
-                self._plots.show(self.seen, self._theory)
+                self._controls.words.content = self._words(rate)
+                self._plots.show()
+                self._pitchfork.show(self.seen, self._shown())
+                self._controls.show_challenge(self._challenge)
+                self._controls.show_link(f"{self._link}/?{self._query()}")
 
     def _obey(self) -> bool:
         """Grant wishes and take answers; True if there was a wish."""
@@ -235,8 +264,8 @@ class Live:
             if session.settings.robot != before.robot:
                 self._ask(before.robot)
             if session.seen().time < self.seen.time:
-                self._view.forget_way()
-                self._plots.forget()
+                for each in (self._view, self._plots, self._pitchfork):
+                    each.forget()
         messages = session.messages()
         for sentence in messages:
             self._at_server(partial(self._notify, sentence))
@@ -262,19 +291,98 @@ class Live:
         # The theory is of any first spring.
         parts = [(each.springs.stiffness[1:], *but_springs(each)) for each in (robot, before) if each is not None]
         if before is None or parts[0] != parts[1]:
-            self._theory = Theory(remark="it is being computed")
+            self._theory = Theory(remark="computing the pitchfork", computing=True)
             self._session.law = None
             self._beside.ask(robot)
 
-    def _tell(self, rate: float) -> None:
-        session, seen = self._session, self.seen
-        words = sentences(seen, session.settings, self._theory, self._growth)
+    def _shown(self) -> Theory:
+        """Theory as far as a challenge allows."""
+        hidden = self._challenge is not None and self._challenge.hides and not self._challenge.done
+        return Theory(remark="hidden until you have found it", computing=True) if hidden else self._theory
+
+    def _words(self, rate: float) -> str:
+        session, seen, shown = self._session, self.seen, self._shown()
+        words = sentences(seen, session.settings, shown, self._growth if shown is self._theory else None)
         settings = session.settings
         slow = "" if settings.paused or rate > 0.8 * settings.speed else f", as fast as it goes: {rate:.1f} times"
         recording = ", recording" if settings.recording else ""
-        text = f"{' '.join(words)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
-        if self._controls.words.content != text:
-            self._controls.words.content = text
+        return f"{' '.join(words)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
+
+    # -- presets, challenges and addresses, in the thread of the walk
+
+    def _errand(self, do: Callable[[], None]) -> None:
+        self._errands.put(do)
+        self._session.box.wake()
+
+    def _run_errands(self) -> None:
+        while not self._errands.empty():
+            self._errands.get()()
+
+    def _choose(self, name: str) -> None:
+        """Another robot, or the same with the settings of a preset; the page is made anew for it."""
+        preset, before = PRESETS[name], self._session
+        robot, engine = (preset.load(), preset.engine) if preset.robot else self._own
+        before.stop_recording()
+        self._keep()
+        strategy, seed = before.settings.strategy, before.settings.seed
+        self._preset, self._challenge = name, None
+        self._at_server(self._clear)
+        self._compile(robot, engine)
+        self._session = Session(robot, engine, seed=seed, strategy=strategy)
+        self._session.box = before.box
+        self.seen, self._body = self._session.seen(), _body(robot, engine)
+        self._at_server(self._furnish)
+        if engine != before.engine:
+            self._beside.close()
+            self._beside = Beside(engine)
+        for wish in read(preset.settings, self._session.sliders)[0]:
+            self.wish(wish)
+        self._ask()
+
+    def _clear(self) -> None:
+        self._server.gui.reset()
+        self._server.scene.reset()
+
+    def _query(self) -> str:
+        """Part of an address that leads to the present settings."""
+        file = Settings(self._session.file, 1.0, "", SPEED, False, 0, False)
+        return query(self._session.settings, file, self._session.sliders, self._preset)
+
+    def _open_address(self, asked: str, by_hand: bool) -> None:
+        """Grant what an address asks for; not if another web site led there."""
+        if not by_hand:
+            told, _ = read(asked, self._session.sliders)
+            if told:
+                self._at_server(partial(self._notify, "Another page led here: press Enter in the address to apply it."))
+            return
+        preset = preset_of(asked)
+        if preset is not None and preset != self._preset:
+            self._choose(preset)
+        told, wrong = read(asked, self._session.sliders)
+        for wish in told:
+            self.wish(wish)
+        if wrong:
+            self._at_server(partial(self._notify, wrong))
+
+    def _begin_challenge(self, name: str) -> None:
+        kind = CHALLENGES.get(name)
+        self._challenge = kind() if kind else None
+        first = self._challenge.begin(self.seen) if self._challenge else wishes.Target(None)
+        if first is not None:
+            self.wish(first)
+
+    def _answer(self, given: str) -> None:
+        if self._challenge:
+            self._challenge.answer(given, self.seen, self._theory)
+
+    def _picture(self) -> bytes:
+        """Picture of the walk for a browser without WebGL; settings of its address hold from the next one on."""
+        self._looked = time.perf_counter()
+        asked, by_hand = self.gate.asked()
+        if asked:
+            self._errand(partial(self._open_address, asked, by_hand))
+        seen = self.seen
+        return from_above(self._body.places(seen), seen.robot.body.length, self._words(math.inf))
 
     # -- recordings
 
@@ -309,6 +417,14 @@ class Live:
         for client in clients.values():
             client.send_file_download(f"{name}.nc", content, save_immediately=True)
             client.send_file_download(f"{name}.html", page.encode(), save_immediately=True)
+
+    async def _greet(self, client: viser.ClientHandle) -> None:
+        """Fit the picture into a browser's window, obey its address, and give it what waits for one."""
+        self._view.fit(client.camera)
+        asked, by_hand = self.gate.asked()
+        if asked:
+            self._errand(partial(self._open_address, asked, by_hand))
+        await self._send_undelivered(client)
 
     async def _send_undelivered(self, client: viser.ClientHandle) -> None:
         """Give a browser the recordings that ended while none was connected."""
@@ -362,22 +478,3 @@ def _body(robot: Robot, engine: str) -> Body:
 def _quiet() -> contextlib.AbstractContextManager[object]:
     """Silence of viser, which would print where it listens and that it ends."""
     return contextlib.redirect_stdout(io.StringIO())
-
-
-def _free_port(host: str, port: int) -> int:
-    """Make sure that the page can listen at a port, and nowhere else."""
-    wishes.check_port(port)
-    try:
-        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, socket.SOCK_STREAM) as trial:
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            trial.bind(address)
-            free: int = trial.getsockname()[1]
-            return free
-    except (OSError, UnicodeError) as error:
-        if not isinstance(error, OSError) or isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
-            problem, allowed = "must be an address of this machine", "an address or a name of it, or 0.0.0.0 for all"
-            raise ParameterError(problem, field="host", value=host, allowed=allowed) from error
-        raise ParameterError(
-            f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
-        ) from error

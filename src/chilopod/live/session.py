@@ -35,7 +35,7 @@ from chilopod.trials import Disturbance
 LOOKS = 6
 """Number of samples in a gait cycle, for means over the cycle."""
 
-_SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
+SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
 _NUDGE = math.radians(0.5)  # standard deviation of what a nudge turns a joint by, held by its spring
 _START = Disturbance()  # of joints and heading at the start, as in trials
 _STRONGEST = 1.0  # rad by which a pull turns a joint, held by its spring
@@ -91,7 +91,7 @@ class Session:
         self.file = robot.override("springs.adjustable", True)
         self._engine.common(self.file)
         strategy = strategy_named(strategy, ON_THE_WAY).name
-        self.settings = Settings(self.file, 1.0, strategy, _SPEED, False, as_seed(seed), False)
+        self.settings = Settings(self.file, 1.0, strategy, SPEED, False, as_seed(seed), False)
         self.sliders = sliders_of(self.file)
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
@@ -287,11 +287,11 @@ class Session:
         match wish:
             case wishes.Set(slider, value):
                 self._set(slider, value)
-            case wishes.Target(place):
-                self._aim(place)
+            case wishes.Target(place, by_hand):
+                self._aim(place, by_hand)
             case wishes.Steering(strategy):
                 self.settings = replace(self.settings, strategy=strategy_named(strategy, ON_THE_WAY).name)
-                if self._target is not None:
+                if self._steering:
                     self._aim(self._target)
             case wishes.Pull(joint, torque, time):
                 self._pull_at(joint, torque, time)
@@ -327,23 +327,27 @@ class Session:
         else:
             self._set_springs()
 
-    def _aim(self, place: tuple[float, float] | None) -> None:
+    def _aim(self, place: tuple[float, float] | None, by_hand: bool = False) -> None:
         if place is None:
             if self._target is not None:
                 self._let_go()
             return
         x, y = (as_finite("target", each) for each in place)
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
-        strategy = ON_THE_WAY[self.settings.strategy]
-        if strategy.needs_law and self.law is None:
-            self._messages.append(f"the radius law is not known (yet): leg yaw alone steers, not {strategy.name}")
-            strategy = LEG_YAW
-        controller, steering = strategy.prepare(self.settings.robot, self.law).controller, strategy.name
+        controller, steering = (None, "") if by_hand else self._steered()
         if self._target is not None:
             self._let_go()
         self._target, self._controller, self._steering = (x, y), controller, steering
         self._reached = self._before + self._walk.time
         self._walk.aim(self._target)
+
+    def _steered(self) -> tuple[Controller | None, str]:
+        """Controller of the strategy that is set, or of leg yaw where it needs an unknown law, and its name."""
+        strategy = ON_THE_WAY[self.settings.strategy]
+        if strategy.needs_law and self.law is None:
+            self._messages.append(f"the radius law is not known (yet): leg yaw alone steers, not {strategy.name}")
+            strategy = LEG_YAW
+        return strategy.prepare(self.settings.robot, self.law).controller, strategy.name
 
     def _pull_at(self, joint: int, torque: float, time: float) -> None:
         own = self.file.springs.stiffness

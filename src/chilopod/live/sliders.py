@@ -24,6 +24,7 @@ class Slider:
     """A number of the walk that can be changed while it goes on."""
 
     name: str  # in wishes; of a number of the robot file its path there
+    key: str  # in an address
     label: str  # words beside the slider
     hint: str  # words that appear where the mouse rests on it
     unit: str  # at the page
@@ -54,6 +55,7 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
         *_springs(file),
         Slider(
             name="friction",
+            key="friction",
             label="friction",
             hint="Friction of the floor, relative to the robot file",
             unit="",
@@ -66,6 +68,7 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
         ),
         _of_robot(
             "gait.stride",
+            key="stride",
             label="stride",
             hint="Length of every step, cm",
             unit="cm",
@@ -77,6 +80,7 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
         ),
         Slider(
             name="speed",
+            key="speed",
             label="speed",
             hint="Seconds of walking that one second shows",
             unit="",
@@ -115,6 +119,7 @@ def _springs(file: Robot) -> list[Slider]:
     names = tuple(f"{ALL}[{joint}]" for joint in range(len(own.stiffness)))
     first = _of_robot(
         names[0],
+        key="k1",
         label="first spring",
         hint="Stiffness of joint 1 (the paper's k1), N·mm/deg",
         keys=(("Z", "First spring softer"), ("X", "First spring stiffer")),
@@ -122,6 +127,7 @@ def _springs(file: Robot) -> list[Slider]:
     )
     together = _of_robot(
         ALL,
+        key="k",
         label="all springs",
         hint="Stiffness of all joints, N·mm/deg",
         read=lambda settings: float(np.mean(settings.robot.springs.stiffness)),
@@ -132,7 +138,14 @@ def _springs(file: Robot) -> list[Slider]:
     )
     folder = "Each spring (N·mm/deg)"
     others = (
-        _of_robot(name, label=f"spring {joint}", hint=f"Stiffness of joint {joint}, N·mm/deg", folder=folder, **look)
+        _of_robot(
+            name,
+            key=f"k{joint}",
+            label=f"spring {joint}",
+            hint=f"Stiffness of joint {joint}, N·mm/deg",
+            folder=folder,
+            **look,
+        )
         for joint, name in enumerate(names[1:], 2)
     )
     return [first, together, *others]

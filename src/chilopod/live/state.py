@@ -30,7 +30,7 @@ class Seen:
     turning: float  #: rate at which the sum of their sizes grows, rad/s
     pulled: Array  #: torques by which somebody pulls at joints, N*m, (N-1,)
     target: tuple[float, float] | None  #: m
-    steering: str  #: name of the strategy that steers there: leg yaw while those of springs are not known; else ""
+    steering: str  #: name of the strategy that steers there: leg yaw while those of springs are not known; "" for none
     state: Array  #: as ``initial`` of the engine's ``start`` takes it, (n,)
 
     @property

@@ -40,6 +40,7 @@ class Theory:
     stable: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # True if the walk is stable
     law: RadiusLaw | None = None  # radius law of the springs, for strategies
     remark: str = ""
+    computing: bool = False  # True if more is to come
 
     def settled(self, spring: float) -> float | None:
         """Radius of the stable walk with a first spring (N*m/rad), m: infinite if it is the straight one; None where
@@ -55,10 +56,12 @@ class Theory:
 
 @dataclass(frozen=True)
 class Growth:
-    """Rate (1/s) at which a small bend of a robot's straight walk grows: the largest real part of all exponents."""
+    """Rate (1/s) at which a small bend of a robot's straight walk grows, the largest real part of all exponents, and
+    frequency (rad/s) at which it sways."""
 
     robot: Robot
     rate: float
+    sways: float = 0.0
 
 
 def growth_of(robot: Robot) -> Growth:
@@ -66,7 +69,8 @@ def growth_of(robot: Robot) -> Growth:
     from chilopod.analysis import straight_walk
 
     exponents = straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"]
-    return Growth(robot, max(real for real, _ in exponents))
+    rate, sways = max(exponents)
+    return Growth(robot, rate, abs(sways))
 
 
 def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> None:
@@ -74,7 +78,7 @@ def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> 
 
     In an engine whose walks are not those of the planar theory, some are walked. The first spring does not matter.
     """
-    known = Theory(robot)
+    known = Theory(robot, computing=True)
     try:
         if engine_named(engine).traits.exact:
             _exact(known, callback)
@@ -84,12 +88,12 @@ def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> 
             law = radius_law(
                 robot,
                 engine,
-                progress=lambda done, words: callback(replace(known, remark=_share(done, "how it turns"))),
+                progress=lambda done, words: callback(replace(known, remark=_share(done))),
             )
             stable = np.ones(len(law.values), dtype=np.bool_)
             callback(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
     except ChilopodError as error:
-        callback(replace(known, remark=error.problem))
+        callback(replace(known, remark=error.problem, computing=False))
 
 
 def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
@@ -101,13 +105,13 @@ def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
     assert robot is not None
     # As the radius law has it, but for the first spring, which is what varies.
     low, high = (part * max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]) for part in _BETWEEN)
-    callback(replace(known, remark="looking for the pitchfork"))
+    callback(replace(known, remark="computing the pitchfork"))
     loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
     known = replace(known, pitchfork=loss.point.value)
-    callback(replace(known, remark="following the curved walks"))
+    callback(replace(known, remark=_share(0.0)))
 
     def follow(done: float, words: str) -> None:
-        callback(replace(known, remark=_share(done, "following the curved walks")))
+        callback(replace(known, remark=_share(done)))
 
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=follow)
     possible = walks.verdict.values != Status.OUT_OF_RANGE.label
@@ -116,6 +120,7 @@ def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
         springs=walks.parameter_si.values[possible],
         radii=walks.axis_radius.values[possible],
         stable=walks.stable.values[possible],
+        computing=False,
     )
     try:
         law = RadiusLaw.of_branch(known.springs, known.radii, known.stable, robot.unit_of(K1))
@@ -125,8 +130,8 @@ def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
     callback(known)
 
 
-def _share(done: float, what: str) -> str:
-    return f"{what}: {100.0 * done:.0f} %"
+def _share(done: float) -> str:
+    return f"computing the branch: {100.0 * done:.0f} %"
 
 
 class Beside:

@@ -7,8 +7,6 @@ import threading
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from chilopod.errors import ParameterError
-
 LARGEST_SEED = 2**53 - 1
 """Largest whole number that a browser holds exactly."""
 
@@ -58,9 +56,10 @@ def Speed(times: float) -> Set:
 
 @dataclass(frozen=True)
 class Target(Wish):
-    """Target on the floor, m; None for no target."""
+    """Target on the floor, m; None for no target. By hand no strategy steers there."""
 
     place: tuple[float, float] | None
+    by_hand: bool = False
 
 
 @dataclass(frozen=True)
@@ -138,9 +137,3 @@ class Box:
             wishes = list(self._waiting.values())
             self._waiting.clear()
         return wishes
-
-
-def check_port(port: int) -> None:
-    """Refuse a number that is not a port with a ParameterError."""
-    if not 0 <= port < 65536:
-        raise ParameterError("must be a port", field="port", value=port, allowed="1 to 65535, or 0 for any free port")

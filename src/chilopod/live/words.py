@@ -37,16 +37,20 @@ def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | N
     if seen.target is not None:
         x, y = seen.target
         away = math.hypot(x - seen.pose[0], y - seen.pose[1])
-        said.append(f"On its way to the target, {away:.2f} m off, with the strategy {seen.steering}.")
-        said += _held(seen, settings)
+        if seen.steering:
+            said.append(f"On its way to the target, {away:.2f} m off, with the strategy {seen.steering}.")
+            said += _held(seen, settings)
+        else:
+            said.append(f"The target is {away:.2f} m off, and nothing but you steers.")
     if seen.pulled.any():
         pulled = [str(joint + 1) for joint in np.flatnonzero(seen.pulled)]
         who = f"Joint {pulled[0]} is" if len(pulled) == 1 else f"Joints {', '.join(pulled)} are"
         return [*said, f"{who} pulled aside, and it walks {_arc(seen)} as long as that lasts."]
-    if seen.target is not None:
+    if seen.steering:
         # Who steers makes the curve, not the spring: what the straight or the curved walk would do is not to be seen.
         return [*said, f"Steered, it walks {_arc(seen)}."]
-    said.append(_bend(seen, theory, growth if growth is not None and growth.robot == settings.robot else None))
+    set_to = np.allclose(seen.stiffness, settings.robot.springs.stiffness)  # springs may be on their way
+    said.append(_bend(seen, theory, growth if growth and set_to and growth.robot == settings.robot else None))
     return said
 
 
@@ -62,10 +66,12 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     k1 = float(seen.stiffness[0])
     radius, side, bent, arc = radius_of(seen), _side(seen), seen.bend > _STRAIGHT, _arc(seen)
     if theory.pitchfork is None:
-        return f"It walks {arc}. Where the straight walk gives way is not known: {theory.remark or 'not asked yet'}."
+        return _without_pitchfork(seen, theory, growth)
     fork, settled = f"the pitchfork at {spring_text(theory.pitchfork)}", theory.settled(k1)
     if k1 >= theory.pitchfork:
         stiff = f"its first spring, {spring_text(k1)}, is stiffer than {fork}"
+        if growth and growth.rate > 0.0:
+            return f"It walks {arc}. Though {stiff}, the straight walk is unstable: {_grows(growth)}."
         if bent:
             now = "straightens" if seen.turning < 0.0 else "will straighten"
             return f"The curve of {radius:.2f} m {now}: {stiff}."
@@ -83,6 +89,23 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
             f"{soft}: the straight walk is unstable, and the smallest bend grows{speed}, to {settled:.2f} m in the end."
         )
     return f"{soft}. The curve, {radius:.2f} m to the {side}, {_moving(radius, settled, seen)}."
+
+
+def _without_pitchfork(seen: Seen, theory: Theory, growth: Growth | None) -> str:
+    """Sentences on a robot whose pitchfork is not known yet, or that has none."""
+    walks = f"It walks {_arc(seen)}."
+    if growth:
+        stable = growth.rate <= 0.0
+        now = f"what disturbs it fades by {_percent(growth)} a second" if stable else _grows(growth)
+        walks += f" The straight walk is {'stable' if stable else 'unstable'}: {now}."
+    if theory.computing:
+        return f"{walks} Where it gives way is not known yet: {theory.remark or 'computing the pitchfork'}."
+    return f"{walks} It has no pitchfork in the first spring to show: {theory.remark or 'nothing was computed'}."
+
+
+def _grows(growth: Growth) -> str:
+    """Growth of an unstable straight walk, in words."""
+    return f"{'a sway from side to side' if growth.sways else 'the smallest bend'} grows by {_percent(growth)} a second"
 
 
 def _moving(radius: float, settled: float, seen: Seen) -> str:

@@ -64,6 +64,14 @@ def _movies(
     names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
     titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))
     return [
-        Movie(f"{prefix}movie-1", "One spring decides how the robot walks", titles[:3], together(records[:3]), 2.0),
+        Movie(
+            f"{prefix}movie-1",
+            "One spring decides how the robot walks",
+            titles[:3],
+            together(records[:3]),
+            2.0,
+            size=(1280, 400),
+            follow=True,
+        ),
         Movie(f"{prefix}movie-2", f"Turning to a target, {TASK_A}", titles[3:], together(records[3:]), 1.0),
     ]

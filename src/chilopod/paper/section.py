@@ -78,6 +78,7 @@ class Movie:
     speed: float  # seconds of the walks per second of the film
     stills: tuple[float, ...] = ()  # moments of it that are pictured in three dimensions, s; none of a film from above
     size: tuple[int, int] = (1280, 320)  # of a film from above, pixels; that of three panels in a row
+    follow: bool = False  # True if every panel follows its robot, from near
 
 
 def nothing(*found: object) -> Sequence[Any]:

@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.style import context as styled
+from numpy.typing import NDArray
 
 # Okabe and Ito (2008), told apart with every common colour vision; its yellow is too pale on white.
 BLACK: Final = "#1a1a1a"
@@ -35,8 +38,12 @@ SCENE: Final = {
     "air": GREY,
     "path": ORANGE,
     "target": GREEN,
+    "spring": PURPLE,
 }
-"""Colours of films and replays."""
+"""Colours of films, replays and live pages: module 1 has that of edges."""
+
+THIN: Final = 0.3
+"""Width of the softest spring in pictures, relative to that of the stiffest."""
 
 SMALL: Final = 9.0
 """Size of the smallest text, pt."""
@@ -68,6 +75,14 @@ _RC: Final[Any] = {
     "savefig.facecolor": "white",
     "svg.fonttype": "path",  # looks the same where the font is not installed
 }
+
+
+def springs(shares: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Widths (...), relative to that of the stiffest, and colours (..., 3) of springs in pictures: thin and light when
+    soft. Shares are stiffnesses relative to the stiffest one, shape (...), cut at 1."""
+    shares = np.clip(np.nan_to_num(shares), 0.0, 1.0)
+    color = np.array(to_rgb(SCENE["spring"]))
+    return THIN + (1.0 - THIN) * shares, 1.0 + (THIN + (1.0 - THIN) * shares)[..., None] * (color - 1.0)
 
 
 @dataclass(frozen=True)

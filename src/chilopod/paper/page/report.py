@@ -261,7 +261,12 @@ def write_movie(shown: Movie, folder: Path) -> Film:
     ``NAME.png`` where it can be rendered."""
     solid = "pose" in shown.record
     replay(shown.record, titles=shown.titles, heading=shown.heading).write(folder / f"{shown.name}.html", replace=True)
-    look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
+    look: dict[str, Any] = {
+        "titles": shown.titles,
+        "heading": shown.heading,
+        "speed": shown.speed,
+        "follow": shown.follow,
+    }
     file, first, encoded = folder / f"{shown.name}.mp4", folder / f"{shown.name}-poster.png", has_encoder()
     rendered = encoded and solid and _rendered(first, lambda: poster_3d(shown.record, **look))
     if encoded and not (rendered and _rendered(file, lambda: film_3d(shown.record, **look))):

@@ -79,9 +79,11 @@ def _floor(axes: Axes, done: Turn) -> None:
         end = float(record.time[np.isfinite(record.heading.values[:, 0])][-1])
     draw_spines(axes, body_frames(record.isel(robot=[0]), np.linspace(0.0, end, _STILLS)).spine[:, 0])
     axes.add_patch(
-        Circle((float(target[0]), float(target[1])), ARRIVAL_RADIUS, fill=False, ec=style.VERMILLION, lw=1.5)
+        Circle((float(target[0]), float(target[1])), ARRIVAL_RADIUS, fill=False, ec=style.SCENE["target"], lw=1.5)
     )
-    axes.plot(*target, "+", color=style.VERMILLION, markersize=9, markeredgewidth=2, label="target", linestyle="none")
+    axes.plot(
+        *target, "+", color=style.SCENE["target"], markersize=9, markeredgewidth=2, label="target", linestyle="none"
+    )
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.legend(loc="best")
     style.grid(axes)

@@ -117,7 +117,7 @@
 
   function colors() {
     const style = getComputedStyle(document.documentElement);
-    return Object.fromEntries(["ink", "soft", "line", "grid", "paper", "body", "edge", "path", "target"]
+    return Object.fromEntries(["ink", "soft", "line", "grid", "paper", "body", "edge", "path", "target", "spring"]
       .map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
@@ -192,7 +192,7 @@
     });
   }
 
-  // A spring as a ring: thick when it is stiff, thin when it is soft.
+  // A spring as a ring: thin and light when it is soft.
   function drawSpring(context, ink, modules, joint, X, Y, zoom) {
     const [x, y, heading] = modules[joint], half = 0.5 * data.length;
     const share = Math.min(robot.springs[joint] / data.range[1], 1);
@@ -201,7 +201,9 @@
     context.arc(px, py, 0.022 * zoom, 0, 2 * Math.PI);
     context.fillStyle = ink.paper;
     context.fill();
-    ring(context, px, py, 0.022 * zoom, joint === 0 ? ink.path : ink.ink, 1 + 5 * share);
+    context.globalAlpha = 0.3 + 0.7 * share;
+    ring(context, px, py, 0.022 * zoom, ink.spring, 6 * (0.3 + 0.7 * share));
+    context.globalAlpha = 1;
   }
 
   function scaleBar(context, ink, height, zoom) {

@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
@@ -21,14 +23,19 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from chilopod import units
 from chilopod.errors import OutputError, ParameterError
 from chilopod.frozen import Array
 from chilopod.show import style
 from chilopod.show.scene.encoder import ENCODER, encoded, has_encoder
-from chilopod.show.scene.frames import Outcome, Scene, scene
+from chilopod.show.scene.frames import Floor, Outcome, Scene, close, scene
 from chilopod.show.scene.outline import SLIMNESS
 from chilopod.show.style import SCENE as COLORS
+from chilopod.show.words import spring
 
+CALM: Final = 12
+"""Frames before and after over which a camera that follows is held."""
+SPRING: Final = "N*mm/deg"
 _SMALLEST, LARGEST = 240, 4096
 _SLOWEST, FASTEST = 0.01, 1000.0  # s of a walk in one of a film
 PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
@@ -45,12 +52,13 @@ def filmed(
     fps: int = 25,
     speed: float = 1.0,
     size: tuple[int, int] = (960, 480),
+    follow: bool = False,
 ) -> bytes:
     """A record as a film, H.264 in mp4: browsers and presentations play it before it is loaded whole.
 
     Titles of its robots are by label or in their order (:mod:`chilopod.show.scene.frames`), the heading is above all
     panels. ``fps`` are frames per second of the film, ``speed`` seconds of the walk per second of it, and ``size`` its
-    width and height, even pixels.
+    width and height, even pixels. Every panel follows its robot, or all show the same floor with all of all walks.
 
     Raises
     ------
@@ -60,7 +68,7 @@ def filmed(
         If PyAV was built without its H.264 encoder.
     """
     times = frame_times(record, size, fps, speed)
-    return encoded(_frames(scene(record, titles, times), heading, size, speed), fps, size)
+    return encoded(_frames(scene(record, titles, times), heading, size, speed, follow), fps, size)
 
 
 def poster(
@@ -70,11 +78,12 @@ def poster(
     heading: str,
     speed: float = 1.0,
     size: tuple[int, int] = (960, 480),
+    follow: bool = False,
 ) -> bytes:
     """Frame of the film of :func:`filmed` in its last third, as PNG, with errors likewise."""
     shown = scene(record, titles, frame_times(record, size, 25, speed))
     with style.house_style():
-        return telling(Stage(shown, heading, size, speed))
+        return telling(Stage(shown, heading, size, speed, follow))
 
 
 def telling(stage: Stage) -> bytes:
@@ -102,10 +111,12 @@ def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: floa
     return times
 
 
-def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> Iterator[NDArray[np.uint8]]:
+def _frames(
+    shown: Scene, heading: str, size: tuple[int, int], speed: float, follow: bool
+) -> Iterator[NDArray[np.uint8]]:
     """Every frame, (height, width, 4); the next one overwrites it."""
     with style.house_style():
-        stage = Stage(shown, heading, size, speed)
+        stage = Stage(shown, heading, size, speed, follow)
         for index in range(len(shown.frames.time)):
             yield stage.drawn(index)
 
@@ -113,8 +124,9 @@ def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> 
 class Stage:
     """Frames of the panels: moving parts are drawn anew over the fixed ones."""
 
-    def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float) -> None:
-        self.shown, self.size = shown, size
+    def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float, follow: bool = False) -> None:
+        self.shown, self.size, self.follow = shown, size, follow
+        self.floor = close(shown.frames) if follow else shown.floor
         self.font = max(12.0, min(size[1] / 32.0, size[0] / 48.0))
         self.figure = Figure(figsize=(size[0] / PIXEL, size[1] / PIXEL), dpi=PIXEL)
         self.canvas: Any = FigureCanvasAgg(self.figure)  # matplotlib does not say what its methods take and give
@@ -174,6 +186,7 @@ class Stage:
             Patch(fc=COLORS["body"], ec=COLORS["edge"], label="other modules"),
             _dot(COLORS["ink"], COLORS["ink"], 0.6 * self.font, label="standing foot"),
             _dot("white", COLORS["air"], 0.6 * self.font, label="foot in the air"),
+            _dot("white", COLORS["spring"], 0.6 * self.font, 2.5, label="spring (thin: soft)"),
             Line2D([], [], color=COLORS["path"], label="path of module 1"),
         ]
         if any(self.shown.aims):
@@ -229,7 +242,7 @@ class Stage:
 
     def _layout(self, width: float, height: float, longest: float) -> tuple[float, float, int, int]:
         """Width and height of a panel, columns, and lines of a caption: one if there is room for title and outcome."""
-        floor, count = self.shown.floor, len(self.shown.titles)
+        floor, count = self.floor, len(self.shown.titles)
         aspect = (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
         for lines in (1, 2):
             sizes = []
@@ -247,23 +260,22 @@ class Stage:
         """Panel below a place; sizes in pixels."""
         box = (at[0], at[1] - size[1], *size)
         axes = self.figure.add_axes(tuple(np.array(box) / np.tile(self.size, 2)))
-        floor = self.shown.floor
-        return FilmPanel(self.shown, index, axes, size[0] / (floor.x1 - floor.x0), self.font, outcome)
+        return FilmPanel(self, index, axes, size[0] / (self.floor.x1 - self.floor.x0), outcome)
 
 
 class FilmPanel:
     """One robot on its floor; `zoom` in pixels per metre."""
 
-    def __init__(self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text) -> None:
-        self.shown, self.robot, self.label = shown, robot, label
+    def __init__(self, stage: Stage, robot: int, axes: Axes, zoom: float, label: Text) -> None:
+        shown, font = stage.shown, stage.font
+        self.shown, self.robot, self.label, self.axes, self.follow = shown, robot, label, axes, stage.follow
         self.outcome, self.outcome_text = shown.outcomes[robot], label.get_text()
         self.rings: list[tuple[Circle, Line2D]] = []
-        floor, frames = shown.floor, shown.frames
-        axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1), xticks=[], yticks=[])
+        self.floor, frames = stage.floor, shown.frames
+        axes.set(xticks=[], yticks=[])
         axes.spines[:].set(visible=True, color=COLORS["grid"])
-        for draw, low, high in ((axes.axvline, floor.x0, floor.x1), (axes.axhline, floor.y0, floor.y1)):
-            for line in np.arange(math.ceil(low / floor.grid), high / floor.grid):
-                draw(line * floor.grid, color=COLORS["grid"], lw=1.0)
+        self.lines = LineCollection([], colors=COLORS["grid"], linewidths=1.0, zorder=0)
+        self._look_at(self.floor)
         self._scale_bar(axes, zoom, font)
         for aim in shown.aims[robot]:
             ring = Circle(aim.place, shown.arrival_radius, ec=COLORS["target"], lw=1.5)
@@ -273,7 +285,7 @@ class FilmPanel:
 
         length = frames.robot.module_length
         thin = max(0.8, min(1.5, 0.02 * length * zoom))
-        foot, joint = 2.0 * max(2.0, 0.055 * length * zoom), 2.0 * max(1.5, 0.05 * length * zoom)
+        foot, joint = 2.0 * max(2.0, 0.055 * length * zoom), 2.0 * max(2.0, 0.06 * length * zoom)
         n = frames.robot.body.modules
         self.outline = _outline(length)
         offset, side = frames.robot.legs.forward_offset, 0.5 * SLIMNESS * length
@@ -283,14 +295,20 @@ class FilmPanel:
         )
         self.legs = LineCollection([], linewidths=thin)
         self.path = Line2D([], [], color=COLORS["path"], lw=2.0)
-        self.joints = _dot("white", COLORS["ink"], joint, thin)
+        self.ring = max(2.0, 0.06 * length * zoom)
+        self.joints = axes.scatter([], [], s=joint**2, facecolors="white", zorder=4)
+        self.spring = axes.text(0.985, 0.03, "", transform=axes.transAxes, ha="right", fontsize=max(12.0, 0.85 * font))
         self.swinging = _dot("white", COLORS["air"], foot, thin)
         self.standing = _dot(COLORS["ink"], COLORS["ink"], foot, thin)
-        self.artists = (self.legs, self.modules, self.path, self.joints, self.swinging, self.standing)
-        for artist in self.artists:
-            artist.set_animated(True)
+        moving = (self.lines, self.legs, self.modules, self.path, self.swinging, self.standing)
+        self.artists: tuple[Artist, ...] = (*moving[:4], self.joints, *moving[4:], self.spring)
+        if self.follow:  # targets move over the picture, too
+            self.artists = (self.lines, *chain.from_iterable(self.rings), *self.artists[1:])
+        for artist in moving:
             axes.add_artist(artist)
-            artist.set_clip_path(axes.patch)
+        for each in self.artists:
+            each.set_animated(True)
+            each.set_clip_path(axes.patch)
 
     def known(self, now: float) -> tuple[object, ...]:
         """Key of the content that :meth:`tell` shows: the outcome, and of each target that has begun its own."""
@@ -318,7 +336,10 @@ class FilmPanel:
         frames, robot = self.shown.frames, self.robot
         spine, centres, stands = frames.spine[index, robot], frames.centres[index, robot], frames.stands[index, robot]
         if np.isnan(spine).any():
-            return ()
+            return (self.lines,)
+        if self.follow:
+            around = slice(max(0, index - CALM), index + CALM + 1)
+            self._look_at(self.floor.around(np.nanmean(frames.spine[around, robot], axis=(0, 1))))
         headings, feet = frames.headings[index, robot], frames.feet[index, robot]
         self.modules.set_verts(list(_on_modules(centres, headings, self.outline)))
         self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind != "stopped" else 0.45)
@@ -326,20 +347,38 @@ class FilmPanel:
         self.legs.set_segments(list(np.stack([hips, feet], axis=-2).reshape(-1, 2, 2)))
         self.legs.set_color([COLORS["ink"] if each else COLORS["air"] for each in stands.ravel()])
         self.path.set_data(*frames.centres[: index + 1, robot, 0].T)
-        self.joints.set_data(*spine[1:-1].T)
+        widths, colors = style.springs(self.shown.shares[index, robot])
+        self.joints.set_offsets(spine[1:-1])
+        self.joints.set(linewidths=self.ring * widths, edgecolors=colors)
+        if self.shown.steers(robot):
+            self.spring.set_text(f"k₁ = {spring(units.from_si(float(self.shown.springs[index, robot, 0]), SPRING), 3)}")
         self.standing.set_data(*feet[stands].T)
         self.swinging.set_data(*feet[~stands].T)
         return self.artists
 
+    def _look_at(self, floor: Floor) -> None:
+        """Show a piece of the floor."""
+        self.axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1))
+        x, y = (
+            floor.grid * np.arange(math.ceil(low / floor.grid), high / floor.grid)
+            for low, high in ((floor.x0, floor.x1), (floor.y0, floor.y1))
+        )
+        upright, level = ([(at, floor.y0), (at, floor.y1)] for at in x), ([(floor.x0, at), (floor.x1, at)] for at in y)
+        self.lines.set_segments([*upright, *level])
+
     def _scale_bar(self, axes: Axes, zoom: float, font: float) -> None:
-        floor = self.shown.floor
+        floor = self.floor
         bar = floor.grid if (floor.x1 - floor.x0) > 1.6 * floor.grid else 0.1 * floor.grid
-        x, y = floor.x0 + 12.0 / zoom, floor.y0 + 0.9 * font / zoom
-        axes.plot([x, x + bar], [y, y], color=COLORS["ink"], lw=3.0, solid_capstyle="butt")
-        axes.plot([x, x + bar], [y, y], "|", color=COLORS["ink"], ms=11.0, mew=1.5)
+        # Of the panel, not of the floor, which may move.
+        wide, tall = floor.x1 - floor.x0, floor.y1 - floor.y0
+        x, y, bar_end = 12.0 / zoom / wide, 0.9 * font / zoom / tall, (12.0 / zoom + bar) / wide
+        look: dict[str, Any] = {"color": COLORS["ink"], "transform": axes.transAxes}
+        axes.plot([x, bar_end], [y, y], lw=3.0, solid_capstyle="butt", **look)
+        axes.plot([x, bar_end], [y, y], "|", ms=11.0, mew=1.5, **look)
         halo = [withStroke(linewidth=4.0, foreground="white")]
         small = max(12.0, 0.85 * font)
-        axes.text(x + bar + 6.0 / zoom, y, f"{bar:g} m", va="center_baseline", fontsize=small, path_effects=halo)
+        look |= {"va": "center_baseline", "fontsize": small, "path_effects": halo}
+        axes.text(bar_end + 6.0 / zoom / wide, y, f"{bar:g} m", **look)
 
 
 def caption_of(outcome: Outcome) -> str:

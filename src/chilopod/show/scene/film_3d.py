@@ -22,7 +22,7 @@ from chilopod.frozen import Array
 from chilopod.show import style
 from chilopod.show.scene.aims import places_of
 from chilopod.show.scene.encoder import encoded
-from chilopod.show.scene.film import APART, GAP, LARGEST, PIXEL, FilmPanel, Stage, frame_times, telling
+from chilopod.show.scene.film import APART, CALM, GAP, LARGEST, PIXEL, FilmPanel, Stage, frame_times, telling
 from chilopod.show.scene.frames import Scene, scene
 from chilopod.show.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
@@ -30,7 +30,6 @@ from chilopod.twin import gl
 _TALL: Final = 0.15  # m above the floor that pictures leave room for, more than any robot's back
 _BESIDE: Final = 0.1  # m to the side of the middle of the body, likewise
 _POLE: Final = 0.42  # m, likewise for the pole
-_CALM: Final = 12  # frames before and after over which a camera that follows is held
 _PICTURE: Final = (640, 400)
 _MOST_PICTURES: Final = 60
 _NARROWEST, _LOWEST = 120, 80
@@ -68,11 +67,12 @@ def poster_3d(
     heading: str,
     speed: float = 1.0,
     size: tuple[int, int] = (1440, 400),
+    follow: bool = False,
 ) -> bytes:
     """Frame of the film of :func:`film_3d` in its last third, as PNG, with errors likewise."""
     walks = _Walks(record, titles, frame_times(record, size, 25, speed))
     with gl.context(*size), style.house_style():
-        stage = _Stage3D(walks, heading, size, speed, False)
+        stage = _Stage3D(walks, heading, size, speed, follow)
         try:
             return telling(stage)
         finally:
@@ -142,7 +142,7 @@ class _Walks:
         """View of everything, or of the surroundings of a robot at a time."""
         frames, floor = self.shown.frames, self.shown.floor
         if robot is not None:
-            around = slice(max(0, index - _CALM), index + _CALM + 1)
+            around = slice(max(0, index - CALM), index + CALM + 1)
             middle = frames.spine[around, robot].mean(axis=(0, 1))
             reach = 0.55 * frames.robot.body.length
             places = middle + reach * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
@@ -176,6 +176,7 @@ class _Walks:
             target=np.array(begun[-1].place) if begun else None,
             radius=shown.arrival_radius,
             arrived=bool(begun) and begun[-1].is_reached(now),
+            springs=shown.shares[index, robot],
         )
 
 
@@ -183,9 +184,9 @@ class _Stage3D(Stage):
     """A film's heading, clock and key around panels in three dimensions."""
 
     def __init__(self, walks: _Walks, heading: str, size: tuple[int, int], speed: float, follow: bool) -> None:
-        self.walks, self.follow = walks, follow
+        self.walks = walks
         self.studio: Studio
-        super().__init__(walks.shown, heading, size, speed)
+        super().__init__(walks.shown, heading, size, speed, follow)
         note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
         renderer = self.canvas.get_renderer()
         key = self.figure.legends[0].get_window_extent(renderer)

@@ -149,6 +149,12 @@ class Floor:
     y1: float
     grid: float
 
+    def around(self, middle: Array) -> Floor:
+        """Floor of this size around a place, m, (2,)."""
+        half = 0.5 * np.array([self.x1 - self.x0, self.y1 - self.y0])
+        (x0, y0), (x1, y1) = middle - half, middle + half
+        return Floor(float(x0), float(x1), float(y0), float(y1), self.grid)
+
     def span(self) -> tuple[Array, float]:
         """Middle of positions on a page, and their largest distance from it, m: the floor with a margin of its size."""
         middle = np.array([0.5 * (self.x0 + self.x1), 0.5 * (self.y0 + self.y1)])
@@ -166,6 +172,16 @@ class Scene:
     outcomes: tuple[Outcome, ...]
     aims: tuple[tuple[Aim, ...], ...]
     arrival_radius: float
+    springs: Array  #: of the yaw joints, N*m/rad, (T, R, N-1)
+
+    @property
+    def shares(self) -> Array:
+        """Springs relative to the stiffest of all, (T, R, N-1)."""
+        return self.springs / max(float(np.nanmax(self.springs, initial=0.0)), 1e-300)
+
+    def steers(self, robot: int) -> bool:
+        """True if the first spring of a robot changes."""
+        return bool(np.ptp(self.springs[:, robot, 0]) > 1e-9 * self.springs[0, robot, 0])
 
     def begun(self, robot: int, now: float) -> tuple[Aim, ...]:
         """Past and present targets of a robot at a time, s."""
@@ -185,7 +201,22 @@ def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: 
         tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(aims)),
         aims,
         radius,
+        _springs(record, frames),
     )
+
+
+def _springs(record: xr.Dataset, frames: BodyFrames) -> Array:
+    """Springs at the times of frames, as they were last once a robot stopped; those of its robot without a record."""
+    shape = (len(frames.time), record.sizes["robot"], record.sizes["joint"])
+    if "stiffness" not in record:
+        return np.broadcast_to(np.array(frames.robot.springs.stiffness), shape)
+    recorded = record["stiffness"]
+    if "time" not in recorded.dims:
+        return np.broadcast_to(recorded.transpose(..., "joint").values, shape)
+    times = record["time"].values.astype(np.float64)
+    found = _interpolated(recorded.transpose("time", "robot", "joint").values, times, frames.time)
+    rows = np.where(np.isfinite(found), np.arange(len(found))[:, None, None], 0)
+    return np.take_along_axis(found, np.maximum.accumulate(rows, axis=0), axis=0)
 
 
 def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tuple[str, ...]:
@@ -235,6 +266,16 @@ def _floor(frames: BodyFrames, aims: Array, radius: float) -> Floor:
     size = np.array([max(size[0], _TALLEST * size[1]), max(size[1], size[0] / _FLATTEST)])
     (x0, y0), (x1, y1) = middle - 0.5 * size, middle + 0.5 * size
     return Floor(float(x0), float(x1), float(y0), float(y1), _grid(float(size.max())))
+
+
+def close(frames: BodyFrames) -> Floor:
+    """The smallest floor that, moved along, has every body at every time, with a module's length to spare."""
+    size = np.ptp(frames.spine, axis=2)
+    size = size[np.isfinite(size).all(axis=-1)]
+    wide, tall = np.max(size, axis=0, initial=0.0) + frames.robot.module_length
+    wide = max(wide, _TALLEST * tall)
+    tall = max(tall, wide / _FLATTEST)
+    return Floor(0.0, float(wide), 0.0, float(tall), _grid(float(max(wide, tall))))
 
 
 def _grid(extent: float) -> float:

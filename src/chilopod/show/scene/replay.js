@@ -69,7 +69,7 @@
       const feet = drawModules(context, robot, frame, on, zoom);
       context.globalAlpha = 1;
       drawPath(context, robot, frame, X, Y);
-      drawJointsAndFeet(context, feet, on, zoom);
+      drawJointsAndFeet(context, robot, frame, feet, on, zoom);
     }
     drawScaleBar(context, robot, zoom);
   }
@@ -164,10 +164,11 @@
     return feet;
   }
 
-  function drawJointsAndFeet(context, feet, on, zoom) {
+  function drawJointsAndFeet(context, robot, frame, feet, on, zoom) {
     const length = body.length * zoom, line = thin(zoom), dot = Math.max(2, 0.055 * length);
     for (let joint = 1; joint < body.modules; joint++) {
-      disc(context, on(joint), Math.max(1.5, 0.05 * length), "white", colors.ink, line);
+      const { width, color } = player.spring(robot, joint - 1, frame);
+      disc(context, on(joint), Math.max(2, 0.06 * length), "white", color, width * Math.max(2, 0.06 * length));
     }
     for (const [stands, foot] of feet) {
       disc(context, foot, dot, stands ? colors.ink : "white", stands ? colors.ink : colors.air, line);

@@ -12,12 +12,15 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 from jinja2 import Environment, FunctionLoader, StrictUndefined
+from numpy.typing import NDArray
 
+from chilopod import units
+from chilopod.frozen import Array
 from chilopod.output import write_atomic
 from chilopod.show.scene.frames import Scene, robot_of, scene
 from chilopod.show.scene.outline import SLIMNESS
 from chilopod.show.scene.packing import LARGEST, encoded, packed
-from chilopod.show.style import SCENE
+from chilopod.show.style import SCENE, THIN
 
 SHOWN: Final = 6
 """Walks of a replay: more are hard to tell apart."""
@@ -104,14 +107,19 @@ def _page(name: str, shown: Scene, heading: str, view: str, data: Mapping[str, A
         {
             "outcome": {"text": outcome.text, "kind": outcome.kind, "time": outcome.time},
             "aims": [{"place": aim.place, "since": aim.since, "reached": aim.reached} for aim in aims],
+            "springs": [encoded(_in_steps(shares)) for shares in springs.T],
+            "steers": shown.steers(index),
             **more,
         }
-        for outcome, aims, more in zip(shown.outcomes, shown.aims, data["robots"], strict=True)
+        for index, (outcome, aims, springs, more) in enumerate(
+            zip(shown.outcomes, shown.aims, shown.shares.swapaxes(0, 1), data["robots"], strict=True)
+        )
     ]
     common = {
         "time": {"start": float(time[0]), "step": float(np.diff(time[:2]).sum()), "count": len(time)},
         "floor": {"x0": floor.x0, "x1": floor.x1, "y0": floor.y0, "y1": floor.y1, "grid": floor.grid},
         "colors": SCENE,
+        "springs": {"thin": THIN, "stiffest": units.from_si(float(np.nanmax(shown.springs, initial=0.0)), "N*mm/deg")},
         "arrivalRadius": shown.arrival_radius,
     }
     return environment.get_template(name).render(
@@ -123,6 +131,12 @@ def _page(name: str, shown: Scene, heading: str, view: str, data: Mapping[str, A
         data={**common, **data, "robots": robots},
         **words,
     )
+
+
+def _in_steps(shares: Array) -> NDArray[np.uint16]:
+    """Shares of a spring over time as whole numbers of 16 bits, only one if it does not change."""
+    steps = np.rint(65535.0 * np.clip(np.nan_to_num(shares), 0.0, 1.0)).astype("<u2")
+    return steps if np.ptp(steps) else steps[:1]
 
 
 def _flat(shown: Scene) -> dict[str, Any]:

@@ -170,8 +170,14 @@
   }
 
   function dressed(robot, now) {
+    const frame = Math.max(0, Math.min(time.count - 1, Math.floor((now - time.start) / time.step + 1e-6)));
+    let joint = 0;
     return poses.at(robot.raw, now).map((matrix, i) => {
       const { kind, size, role } = shapes[i];
+      if (role === "joint") {
+        const { width, color } = player.spring(robot, joint++, frame);
+        return { kind, size, matrix: matrix.map((each, at) => at < 8 ? width * each : each), color };
+      }
       const lies = matrix[14] < size[0] + TOUCHING;
       return { kind, size, matrix, color: role === "foot" ? (lies ? colors.ink : "#ffffff") : ROLES[role] };
     });

@@ -10,6 +10,7 @@ function replayPlayer(data, aspect) {
   const byId = (id) => document.getElementById(id);
   const play = byId("play"), scrub = byId("scrub"), clock = byId("clock"), speed = byId("speed");
   const follow = byId("follow"), panels = byId("panels");
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const last = time.count - 1;
   const end = time.start + last * time.step;
   const robots = data.robots.map((robot, index) => {
@@ -22,6 +23,16 @@ function replayPlayer(data, aspect) {
     };
   });
 
+  for (const robot of robots) robot.springs = robot.springs.map((each) => new Uint16Array(bytes(each).buffer));
+
+  // Stiffness of a spring relative to the stiffest of all, and what it looks like: thin and light when soft.
+  function spring(robot, joint, frame) {
+    const steps = robot.springs[joint], share = steps[Math.min(frame, steps.length - 1)] / 65535;
+    const width = data.springs.thin + (1 - data.springs.thin) * share;
+    const channels = [1, 3, 5].map((at) => 255 + width * (parseInt(data.colors.spring.slice(at, at + 2), 16) - 255));
+    return { share, width, color: `#${channels.map((each) => Math.round(each).toString(16).padStart(2, "0")).join("")}` };
+  }
+
   let now = time.start, playing = false, previous = 0, waiting = false, draw = () => {};
 
   function show() {
@@ -32,7 +43,9 @@ function replayPlayer(data, aspect) {
     for (const robot of robots) {
       draw(robot, frame, now);
       const known = now >= robot.outcome.time - 0.5 * time.step;
-      robot.label.textContent = known ? robot.outcome.text : "walking";
+      const first = robot.steers ? (data.springs.stiffest * spring(robot, 0, frame).share).toPrecision(3) : "";
+      const softness = first ? `, k₁ = ${first} N·mm/deg` : "";
+      robot.label.textContent = (known ? robot.outcome.text : "walking") + softness;
       robot.label.className = `outcome ${known ? robot.outcome.kind : ""}`;
     }
   }
@@ -125,6 +138,5 @@ function replayPlayer(data, aspect) {
     if (!asked && !matchMedia("(prefers-reduced-motion: reduce)").matches) setPlaying(true);
   }
 
-  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  return { robots, follow, actions, bytes, redraw, start };
+  return { robots, follow, actions, bytes, spring, redraw, start };
 }

@@ -74,6 +74,7 @@ class Look:
     target: Array | None  # its place, m, (2,)
     radius: float  # of arrival, m
     arrived: bool  # True if the target has been reached
+    springs: Array  # of the yaw joints, relative to the stiffest of all, (N-1,)
 
 
 class Studio:
@@ -92,6 +93,8 @@ class Studio:
                 for i in range(count)
             ]
         )
+        self.springs = [int(self.model.geom(f"spring{i}").id) for i in range(1, count)]
+        self.thick: Array = self.model.geom_size[self.springs, 0].copy()
         self.of_robot = np.flatnonzero(self.model.body_rootid[self.model.geom_bodyid] == self.modules[0])
         self.colors: Array = self.model.geom_rgba[:, :3].astype(np.float64)
         self.scene = mujoco.MjvScene(self.model, self.model.ngeom + count + _MOST_PIECES + 100)
@@ -117,6 +120,8 @@ class Studio:
                 raise ParameterError("does not go with its robot", field="pose", value=look.pose.size, allowed=allowed)
             data.qpos[:] = look.pose
         strength = 1.0 if look.walks else _PALE
+        widths, self.colors[self.springs] = style.springs(look.springs)
+        model.geom_size[self.springs, 0] = self.thick * widths
         stands, swings = to_rgb(COLORS["ink"]), to_rgb(COLORS["air"])
         self.colors[self.shins] = np.where(look.stands[..., None, None], stands, swings)
         model.geom_rgba[self.of_robot, :3] = (_BRIGHT + strength * (self.colors - _BRIGHT))[self.of_robot]
@@ -250,8 +255,8 @@ def _add_dress(spec: Any, robot: Robot) -> None:
     for i in range(robot.body.modules):
         body = spec.body(f"module{i + 1}")
         if i:
-            size = [0.2 * twin.body_width, 0.36 * twin.body_height, 0.0]
-            body.add_geom(type=cylinder, size=size, pos=[0.5 * length, 0.0, 0.0], rgba=ink)
+            size = [0.2 * twin.body_width, 0.56 * twin.body_height, 0.0]
+            body.add_geom(name=f"spring{i}", type=cylinder, size=size, pos=[0.5 * length, 0.0, 0.0], rgba=ink)
         for side in (1.0, -1.0):
             size = [0.07 * length, 0.5 * abs(outer - inner), 0.2 * twin.body_height]
             place = [robot.legs.forward_offset, 0.5 * side * (outer + inner), 0.0]
