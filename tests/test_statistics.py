@@ -132,7 +132,7 @@ def test_no_scatter_decides_nothing():
     found = Comparison()
     assert (found.words(), found.needs) == (
         "undecided (fewer than 3 different values)",
-        "at least 3 different values are needed",
+        "at least 3 different values are needed to decide",
     )
     assert difference([0.3, 0.6, 0.9], [0.1 * 3, 0.2 * 3, 0.3 * 3], paired=True).above().side is None
     assert np.isnan([share([]).value, ratio([0.0], [0.0]).value, mean([]).value]).all()
@@ -142,11 +142,11 @@ def test_no_scatter_decides_nothing():
 def test_as_many_trials_as_are_said_decide():
     asked = Estimate(0.5, 1.0 / np.sqrt(10.0), 9.0, 10).above()
     assert (asked.answer, asked.trials) == (None, 34.0)
-    assert asked.needs == "about 34 trials would decide"
+    assert asked.needs == "about 34 trials are needed to decide"
     rng = np.random.default_rng(0)
     power = np.mean([mean(0.5 + rng.standard_normal(34)).above().answer is True for _ in range(1000)])
     assert power == pytest.approx(0.8, abs=0.04)
-    assert Estimate(0.01, 0.3, 9.0, 10).above().needs == "more than 1000 trials would be needed to decide"
+    assert Estimate(0.01, 0.3, 9.0, 10).above().needs == "more than 1000 trials are needed to decide"
     assert Estimate(2.0, 0.1, 9.0, 10).above().needs == ""
 
 

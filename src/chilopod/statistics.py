@@ -18,18 +18,10 @@ from scipy.special import ndtri, stdtr, stdtrit
 
 from chilopod.frozen import Array
 
-LEVEL = 0.95
-"""Level of all intervals; a comparison of equal things is decided in a share 1 - LEVEL of cases at most."""
-
-POWER = 0.8
-"""Chance of a decision by as many trials as are said to decide."""
-
-MOST = 1000
-"""Largest number of trials that is said to decide."""
-
-DISTINCT = 3
-"""Number of different values from which scatter is known."""
-
+LEVEL = 0.95  # of all intervals; equal things are told apart in a share 1 - LEVEL of cases at most
+POWER = 0.8  # chance of a decision by as many trials as are said to decide
+MOST = 1000  # largest number of trials that is said to decide
+DISTINCT = 3  # number of different values from which scatter is known
 _FLOOR = 1e-12  # relative: closer values differ by rounding alone
 
 Answer = bool | None
@@ -50,34 +42,15 @@ class Interval:
             return True
         return False if self.high < other.low else None
 
-    def inside(self, low: float, high: float) -> Answer:
-        """True if the whole interval lies between two bounds; undecided if it contains one of them."""
-        if low <= self.low and self.high <= high:
-            return True
-        return False if self.high < low or self.low > high else None
-
 
 @dataclass(frozen=True)
 class Comparison:
-    """Comparison of a number with a bound.
+    """Comparison of a number with a bound; by default one of unknown scatter."""
 
-    Attributes
-    ----------
-    side
-        True or False, whichever side of the bound the number lies on; None if the scatter is unknown.
-    p
-        Probability of a number as far from the bound by chance, if it were equal to it (two-sided); NaN if unknown.
-    away
-        Distance from the bound in standard errors.
-    trials
-        Number of trials that would decide it with the probability :data:`POWER`, if scatter and distance are as found;
-        NaN if unknown.
-    """
-
-    side: Answer = None
-    p: float = math.nan
-    away: float = math.nan
-    trials: float = math.nan
+    side: Answer = None  # of the bound, on which the number lies
+    p: float = math.nan  # two-sided probability of a number so far from the bound by chance, if it were equal to it
+    away: float = math.nan  # distance from the bound, in standard errors
+    trials: float = math.nan  # number that would decide it with the probability POWER, if all is as found
 
     @property
     def answer(self) -> Answer:
@@ -96,25 +69,21 @@ class Comparison:
         """Number of trials that would decide, in words; empty if it is decided."""
         if self.answer is not None:
             return ""
-        if not self.trials <= MOST:
-            unknown = f"at least {DISTINCT} different values are needed"
-            return unknown if math.isnan(self.trials) else f"more than {MOST} trials would be needed to decide"
-        return f"about {self.trials:.0f} trials would decide"
+        if math.isnan(self.trials):
+            return f"at least {DISTINCT} different values are needed to decide"
+        count = f"about {self.trials:.0f}" if self.trials <= MOST else f"more than {MOST}"
+        return f"{count} trials are needed to decide"
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number from trials, its standard error (NaN if unknown) and the error's degrees of freedom.
-
-    ``trials`` is the number of trials, under every condition if there are several. If ``reciprocal``, one over the
-    number scatters evenly, as springs of a fit in 1/k do.
-    """
+    """A number from trials with its standard error."""
 
     value: float = math.nan
-    error: float = math.nan
-    freedom: float = math.inf
-    trials: int = 0
-    reciprocal: bool = False
+    error: float = math.nan  # NaN if unknown
+    freedom: float = math.inf  # degrees of freedom of the error
+    trials: int = 0  # number of them, under every condition if there are several
+    reciprocal: bool = False  # if one over the number scatters evenly, as springs of a fit in 1/k do
 
     @property
     def interval(self) -> Interval:
@@ -127,15 +96,13 @@ class Estimate:
 
     def between(self, low: float, high: float) -> Comparison:
         """Comparison with the nearer of two bounds: True between them."""
-        if not self.reciprocal:
-            return self._compared(min(self.value - low, high - self.value))
-        # Errors are those of value ** 2 / k.
-        ends = [self.value**2 / end if end else math.inf for end in (high, low)]
-        return self._compared(min(self.value - ends[0], ends[1] - self.value))
+        if self.reciprocal:  # what scatters evenly is value ** 2 / number
+            low, high = (self.value**2 / end if end else math.inf for end in (high, low))
+        return self._compared(min(self.value - low, high - self.value))
 
-    def above(self, bound: float = 0.0) -> Comparison:
-        """Comparison with a bound: True above it."""
-        return self._compared(self.value - bound)
+    def above(self) -> Comparison:
+        """Comparison with zero: True above it."""
+        return self._compared(self.value)
 
     def _compared(self, margin: float) -> Comparison:
         if not self.error > 0.0 or math.isnan(margin):
@@ -220,11 +187,14 @@ def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Est
 def spread_difference(one: ArrayLike, other: ArrayLike) -> Estimate:
     """Difference of the scatter of trials: of their mean distances from the median, whose variances are pooled (the
     test of Brown and Forsythe, scipy's ``levene``). It hardly ever decides for fewer than six trials."""
-    first, second = (mean(np.abs(each - np.nanmedian(each))) for each in (np.asarray(one), np.asarray(other)))
-    freedom = first.freedom + second.freedom
-    squares = sum(each.freedom * each.trials * each.error**2 for each in (first, second))
-    error = math.sqrt(squares / freedom * (1.0 / first.trials + 1.0 / second.trials)) if freedom > 0.0 else math.nan
-    return Estimate(first.value - second.value, error, freedom, min(first.trials, second.trials))
+    known = difference(one, other)  # as is their scatter
+    distances = [np.abs(each - np.nanmedian(each)) for each in (np.asarray(one), np.asarray(other))]
+    counts = [int(np.isfinite(each).sum()) for each in distances]
+    value, freedom = float(np.nanmean(distances[0]) - np.nanmean(distances[1])), sum(counts) - 2.0
+    if math.isnan(known.error):
+        return Estimate(value)
+    pooled = sum(count * np.nanvar(each) for count, each in zip(counts, distances, strict=True)) / freedom
+    return Estimate(value, math.sqrt(pooled * (1.0 / counts[0] + 1.0 / counts[1])), freedom, known.trials)
 
 
 def propagated(of: Callable[[Array], ArrayLike], trials: Array, *, reciprocal: bool = False) -> list[Estimate]:

@@ -149,15 +149,18 @@ def over_durations(series: Sequence[xr.Dataset], durations: Sequence[float]) -> 
     onsets = [measures.onset_point(each, settled=False) for each in series]
     springs = series[0].spring.values
     radii = [[measures.radius_at(each, spring, settled=False) for spring in springs] for each in series]
-    data = xr.concat([measures.shares(each) for each in series], "duration")
-    data = data.assign_coords(duration=("duration", np.array(durations), {"units": "s"}))
-    for ending, field, units in (("", "value", True), ("_error", "error", True), ("_freedom", "freedom", False)):
+    columns: dict[str, Any] = {}
+    for ending, field in (("", "value"), ("_error", "error"), ("_freedom", "freedom")):
+        units = ("1", "1") if field == "freedom" else (PAPER_UNIT, "m")
         onset = np.array([getattr(each, field) for each in onsets])
         radius = np.array([[getattr(each, field) for each in row] for row in radii])
-        data[f"onset{ending}"] = ("duration", onset, {"units": PAPER_UNIT if units else "1"})
-        data[f"axis_radius{ending}"] = (("duration", "spring"), radius, {"units": "m" if units else "1"})
-    attrs = {"robot": series[0].attrs["robot"], "repeats": series[0].sizes["repeat"], "averaged_s": AVERAGED}
-    return data.assign_attrs(attrs)
+        columns[f"onset{ending}"] = ("duration", onset, {"units": units[0]})
+        columns[f"axis_radius{ending}"] = (("duration", "spring"), radius, {"units": units[1]})
+    return xr.Dataset(
+        {**columns, **xr.concat([measures.shares(each) for each in series], "duration")},
+        coords={"duration": ("duration", np.array(durations), {"units": "s"}), "spring": series[0].spring},
+        attrs={"robot": series[0].attrs["robot"], "repeats": series[0].sizes["repeat"], "averaged_s": AVERAGED},
+    )
 
 
 def undulations(
