@@ -55,7 +55,7 @@ def test_a_sentence_counts_what_chance_decides_among_all_comparisons():
     assert [row.verdict for row in rows] == ["outside"] * 3
     words = at_once(rows)
     assert words.startswith("3 verdicts rest on trials that scatter")
-    assert "chance would decide 0.1 of them. 3 are decided, 1 with a chance of 5 % of any error among all" in words
+    assert "chance would decide 0.2 of them. 3 are decided, 1 with a chance of 5 % of any error among all" in words
     assert at_once([]) == ""
 
 

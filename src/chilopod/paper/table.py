@@ -202,7 +202,7 @@ def robot_rows(
 
 
 def at_once(rows: Iterable[RobotRow]) -> str:
-    """What chance does to all comparisons of a table together, in words; empty if none rests on scatter."""
+    """Statement about all comparisons of a table at once, in words; empty if none rests on scatter."""
     tested = [(row.quantity, row.p) for row in rows if row.p is not None]
     if not tested:
         return ""

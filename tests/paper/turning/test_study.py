@@ -175,7 +175,7 @@ def test_geometry_is_held_against_the_paper_and_walks_stand_beside_the_robot(fou
     others = {statements.ARRIVAL, statements.WITHOUT, statements.HOPF, statements.HOPF_SPRINGS}
     assert set(beside) == {*tasks, *others}
     assert not any("nan" in words for words in beside.values())
-    assert beside[statements.HOPF] == "3 of 3 lower"
+    assert beside[statements.HOPF] == "1 of 3 lower, 2 of 3 undecided"
     assert beside[statements.WITHOUT].startswith("0 of 9 arrive")
 
 
