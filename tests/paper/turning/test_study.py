@@ -139,7 +139,7 @@ def test_a_parabola_in_compliance_is_found_exactly():
 
 @pytest.mark.parametrize("repeats", [3, 10])
 def test_the_best_of_many_springs_alike_is_no_better_than_the_best_of_few(repeats):
-    outcomes, sets = dict.fromkeys(range(8, 20), Outcome.ARRIVED.label), 60
+    outcomes, sets = dict.fromkeys(range(8, 20), Outcome.ARRIVED.label), 20
     decided, kept = [], []
     for seed in range(sets):
         many = made_up_robot.task(range(8, 20), 12.0, {}, outcomes, wiggle=1e3, repeats=repeats, seed=seed)
@@ -147,7 +147,7 @@ def test_the_best_of_many_springs_alike_is_no_better_than_the_best_of_few(repeat
         decided += [all_lower(many, one).answer is not None, all_lower(one, many).answer is not None]
         kept += [float(each) for each in minima(many.criteria)["alike"]]
     assert np.mean(decided) < 0.07
-    assert np.mean(kept) > 0.95 * 12
+    assert np.mean(kept) > 0.9 * 12
 
 
 def test_a_minimum_at_the_end_of_the_springs_is_there():
