@@ -7,9 +7,8 @@ import numpy as np
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.paper.measures import onset_with_error, radius_at, shares
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.walks import SHORTER, SPRINGS, UNIFORM_SPRINGS, VARIANT_SPRINGS, RobotWalks
+from chilopod.paper.robot.walks import SHORTER, SPRINGS, UNIFORM_SPRINGS, VARIANT_SPRINGS, RobotWalks, over_durations
 from chilopod.paper.turning.trials import CRITERIA, TurningTask
 from chilopod.steering import Outcome, Target
 
@@ -58,20 +57,7 @@ def series(springs, onset, amplitude=AMPLITUDE, *, repeats=10, scatter=0.01, sat
 def durations(onsets, springs=SPRINGS, repeats=10, scatter=0.01):
     """The dataset of walks of several lengths, the onset of each given."""
     each = [series(springs, onset, repeats=repeats, scatter=scatter) for onset in onsets]
-    points = np.array([onset_with_error(one) for one in each])
-    radii = np.array([[radius_at(one, spring) for spring in springs] for one in each])
-    both = ("duration", "spring")
-    return xr.Dataset(
-        {
-            "onset": ("duration", points[:, 0]),
-            "onset_error": ("duration", points[:, 1]),
-            **xr.concat([shares(one) for one in each], "duration"),
-            "axis_radius": (both, radii[..., 0]),
-            "axis_radius_error": (both, radii[..., 1]),
-        },
-        coords={"duration": [*SHORTER, 90.0], "spring": np.asarray(springs, float)},
-        attrs={"repeats": repeats},
-    )
+    return over_durations(each, [*SHORTER, 90.0])
 
 
 def walks(**changes):
@@ -88,7 +74,7 @@ def walks(**changes):
     uniform = xr.Dataset(
         {"amplitude": (("spring", "repeat"), np.full((len(UNIFORM_SPRINGS), 3), 0.2))},
         coords={"spring": np.array(UNIFORM_SPRINGS)},
-        attrs={"critical_k": 18.0, "critical_k_error": 0.2},
+        attrs={"critical_k": 18.0, "critical_k_error": 0.2, "critical_k_freedom": 12.0},
     )
     given = {
         "robot": ROBOT,

@@ -7,7 +7,19 @@ import pytest
 
 from chilopod.paper import printed, statements
 from chilopod.paper.printed import Band
-from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Statement, Verdict, of_twin, robot_rows
+from chilopod.paper.table import (
+    Kind,
+    OfPlanar,
+    OfTwin,
+    Result,
+    Statement,
+    Verdict,
+    at_once,
+    estimated,
+    of_twin,
+    robot_rows,
+)
+from chilopod.statistics import Estimate
 
 MEASURED = [each for each in statements.ORDER if isinstance(each.said, Band)]
 
@@ -22,9 +34,9 @@ def test_every_measured_statement_on_both_sides(statement):
     for value in (low, high):
         inside = value - 1e-6 * (value - 0.5 * (low + high))
         assert [row.verdict for row in robot_rows([of_twin(statement, Result("", inside, 0.0))], ())] == ["within"]
-        assert [row.verdict for row in robot_rows([of_twin(statement, Result("", inside, high - low))], ())] == [
-            "undecided"
-        ]
+        (row,) = robot_rows([estimated(statement, Estimate(inside, high - low, 9.0, 10), "")], ())
+        assert row.verdict == "undecided"
+        assert row.needs.endswith(" to decide")
 
 
 def test_tolerances_are_those_that_the_rows_name():
@@ -34,6 +46,17 @@ def test_tolerances_are_those_that_the_rows_name():
         if percent and part.isdigit():
             wanted = each.said.middle if not each.said.words.startswith(("almost", "no ")) else 1.0
             assert each.said.high == pytest.approx(wanted * (1.0 + float(part) / 100.0)), each.quantity
+
+
+def test_a_sentence_counts_what_chance_decides_among_all_comparisons():
+    said = statements.RADII[21.0]
+    far, near = (estimated(said, Estimate(value, 0.04, 9.0, 10), "m") for value in (1.5, 1.07))
+    rows = robot_rows([far, near, near], ())
+    assert [row.verdict for row in rows] == ["outside"] * 3
+    words = at_once(rows)
+    assert words.startswith("3 verdicts rest on trials that scatter")
+    assert "chance would decide 0.2 of them. 3 are decided, 1 with a chance of 5 % of any error among all" in words
+    assert at_once([]) == ""
 
 
 def test_statements_are_told_apart():

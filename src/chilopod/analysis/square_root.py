@@ -8,6 +8,7 @@ repeated trials do not cover.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array
-
-RESAMPLED = 1000
-"""Default number of bootstrap samples."""
+from chilopod.statistics import Estimate, weighted
 
 _GRID = 2000
 _CLOSEST, _FARTHEST = 1e-3, 0.999  # to the springs fitted: of their distance, and on the way to an infinite kc
@@ -32,9 +31,9 @@ class SquareRootFit:
     critical, error
         The spring kc, in the unit of the fitted springs; its standard error from the covariance of the least squares,
         which treats the residuals, lack of fit included, as independent and of equal variance.
-    bootstrap_error
-        Standard error of kc by resampling the trials at every spring: the reproducibility for another set of trials at
-        the same springs, whatever the law; NaN if every spring has only one trial, or without resampling.
+    estimate
+        kc with the error of another set of trials at the same springs, whatever the law, from the scatter of the
+        trials at every spring; 1/kc has an even interval. Unknown if every spring has only one trial.
     amplitude, residual
         Amplitude, in the unit of the angles times the root of that of the springs; root mean square of the residuals.
     trials
@@ -43,7 +42,7 @@ class SquareRootFit:
 
     critical: float
     error: float
-    bootstrap_error: float
+    estimate: Estimate
     amplitude: float
     residual: float
     trials: int
@@ -53,7 +52,7 @@ class SquareRootFit:
         return self.amplitude * _root(np.asarray(inverse, dtype=np.float64), 1.0 / self.critical)
 
 
-def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAMPLED, seed: int = 0) -> SquareRootFit:
+def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
     """Fit the square-root law to trials by least squares in the angle.
 
     Parameters
@@ -61,8 +60,6 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
     inverse, angle
         1/k of every trial, positive, equal for trials at one spring, and their mean angles, whose sign is ignored,
         shape (trials,).
-    resampled, seed
-        Number of bootstrap samples, 0 for none, and their seed.
 
     Raises
     ------
@@ -102,11 +99,13 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
     slopes = np.stack([root[beyond], -0.5 * amplitude / root[beyond]], axis=1)
     # Trials on the stiff side carry no information about the error of the law and do not count.
     spread = float(residuals[beyond] @ residuals[beyond]) / max(int(beyond.sum()) - 2, 1)
-    covariance = spread * np.linalg.inv(slopes.T @ slopes)
+    inverted = np.linalg.inv(slopes.T @ slopes)
+    effects = np.zeros(x.size)  # of every trial on 1/kc
+    effects[beyond] = inverted[1] @ slopes.T
     return SquareRootFit(
         critical=1.0 / at,
-        error=float(np.sqrt(covariance[1, 1])) / at**2,
-        bootstrap_error=_bootstrap(x, y, grid, basis, resampled, seed),
+        error=float(np.sqrt(spread * inverted[1, 1])) / at**2,
+        estimate=_estimate(x, y, at, effects),
         amplitude=amplitude,
         residual=float(np.sqrt(np.mean(residuals**2))),
         trials=x.size,
@@ -123,29 +122,8 @@ def _lost(basis: Array, angles: Array) -> Array:
     return (angles**2).sum(axis=0) - (basis @ angles) ** 2 / (basis**2).sum(axis=1, keepdims=True)
 
 
-def _bootstrap(x: Array, y: Array, grid: Array, basis: Array, resampled: int, seed: int) -> float:
-    """Bootstrap standard error of kc, with trials resampled at every spring."""
-    if resampled < 2:
-        return float("nan")
-    rng = np.random.default_rng(seed)
-    drawn = np.repeat(y[:, None], resampled, axis=1)
-    repeated = False
-    for value in np.unique(x):
-        here = np.flatnonzero(x == value)
-        if here.size > 1:
-            repeated = True
-            # Deviations from the mean of n trials are too small by this factor on average.
-            wider = np.sqrt(here.size / (here.size - 1.0))
-            spread = wider * (y[here] - y[here].mean())
-            drawn[here] = y[here].mean() + rng.choice(spread, size=(here.size, resampled))
-    if not repeated:
-        return float("nan")
-    lost = _lost(basis, drawn)
-    best = np.clip(lost.argmin(axis=0), 1, len(grid) - 2)
-    sets = np.arange(resampled)
-    left, middle, right = lost[best - 1, sets], lost[best, sets], lost[best + 1, sets]
-    bend = left - 2.0 * middle + right
-    # The lowest point of the parabola through three neighbours on the grid; at a kink it may lie outside of them.
-    shift = np.clip(np.where(bend > 0.0, 0.5 * (left - right) / np.where(bend > 0.0, bend, 1.0), 0.0), -1.0, 1.0)
-    critical = 1.0 / np.interp(best + shift, np.arange(len(grid)), grid)
-    return float(np.std(critical, ddof=1))
+def _estimate(x: Array, y: Array, at: float, effects: Array) -> Estimate:
+    """The point 1/at by the scatter of the trials at every spring."""
+    springs, place = np.unique(x, return_inverse=True)
+    trials = zip_longest(*(y[place == row] for row in range(springs.size)), fillvalue=np.nan)
+    return weighted(1.0 / at, np.bincount(place, effects) / at**2, np.array(list(trials)).T, reciprocal=True)

@@ -17,38 +17,30 @@ import xarray as xr
 
 from chilopod.frozen import Array
 from chilopod.paper.measures import counted, fitted, point_of
-from chilopod.paper.scatter import drawn_anew, mean_and_error
-
-DRAWN = 200
-"""Number of bootstrap samples for the standard errors."""
+from chilopod.statistics import Estimate, mean, propagated
 
 
 @dataclass(frozen=True)
 class RadiusRatio:
     """Radius of a variant over that of the robot as built; NaN without a common distance."""
 
-    distance: float  # at equal distances from each one's own onset
-    distance_error: float  # standard error
-    springs: float  # at equal springs, mean over those compared
-    springs_error: float
+    distance: Estimate  # at equal distances from each one's own onset
+    springs: Estimate  # at equal springs, mean over those compared
     compared: tuple[float, ...]  # springs at which two trials of both curve, N*mm/deg
 
 
-def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed: int = 0) -> RadiusRatio:
+def radius_ratio(base: xr.Dataset, variant: xr.Dataset) -> RadiusRatio:
     """Compare the radii of two series of trials over spring and repeat, from
     :func:`chilopod.tasks.radius_law.end_of_walk`; only trials that are :func:`chilopod.paper.measures.counted` count.
-
-    The standard errors come from a bootstrap at every spring, with onsets fitted anew; 0 samples: no errors.
     """
     inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
-    found = _ratios(inverse, bends)
-    rng = np.random.default_rng(seed)
-    again = [_ratios(inverse, [drawn_anew(each, rng) for each in bends]) for _ in range(drawn)]
-    if any((np.isfinite(each).sum(axis=1) < 2).all() for each in bends):  # nobody knows how these scatter
-        again = []
-    errors = [_spread([each[i] for each in again]) for i in range(2)]
-    compared = tuple(float(1.0 / x) for x in _shared(inverse, bends))
-    return RadiusRatio(found[0], errors[0], found[1], errors[1], compared)
+    distance, springs = (Estimate(each) for each in _ratios(inverse, bends))
+    if all((np.isfinite(each).sum(axis=1) > 1).any() for each in bends):  # else nobody knows how one of them scatters
+        first, repeats = len(bends[0]), [each.shape[1] for each in bends]
+        table = np.full((first + len(bends[1]), max(repeats)), np.nan)
+        table[:first, : repeats[0]], table[first:, : repeats[1]] = bends
+        distance, springs = propagated(lambda trials: _ratios(inverse, [trials[:first], trials[first:]]), table)
+    return RadiusRatio(distance, springs, tuple(float(1.0 / x) for x in _shared(inverse, bends)))
 
 
 def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> float:
@@ -57,7 +49,7 @@ def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> floa
     Mean over the springs (N*mm/deg) softer than both onsets; NaN if there is none.
     """
     inverse = np.array([1.0 / spring for spring in springs if spring < min(base_onset, onset)])
-    return mean_and_error(np.sqrt((inverse - 1.0 / base_onset) / (inverse - 1.0 / onset)))[0]
+    return mean(np.sqrt((inverse - 1.0 / base_onset) / (inverse - 1.0 / onset))).value
 
 
 def onset_of_bend(data: xr.Dataset) -> float:
@@ -65,17 +57,12 @@ def onset_of_bend(data: xr.Dataset) -> float:
     return _onset(*_bends(data))
 
 
-def change(ratio: float, error: float = 0.0) -> str:
-    """Change that a ratio means, in per cent, with its standard error if that is known and not zero."""
-    if np.isnan(ratio):
+def change(ratio: Estimate) -> str:
+    """Change that a ratio means, in per cent, with its standard error if that is known."""
+    if np.isnan(ratio.value):
         return "not determined"
-    return f"{round(100.0 * (ratio - 1.0)):+d}" + (f" ± {100.0 * error:.0f}" if error > 0.0 else "") + " %"
-
-
-def _spread(values: Sequence[float]) -> float:
-    """Standard deviation of the numbers that are not NaN."""
-    finite = np.array(values)[np.isfinite(values)]
-    return float(finite.std(ddof=1)) if finite.size > 1 else float("nan")
+    error = f" ± {100.0 * ratio.error:.0f}" if ratio.error > 0.0 else ""
+    return f"{round(100.0 * (ratio.value - 1.0)):+d}{error} %"
 
 
 def _bends(data: xr.Dataset) -> tuple[Array, Array]:
@@ -120,4 +107,4 @@ def _squared(inverse: Array, bend: Array) -> tuple[Array, Array]:
 def _onset(inverse: Array, bend: Array) -> float:
     here = np.isfinite(bend)
     each = np.broadcast_to(inverse[:, None], bend.shape)[here]
-    return point_of(fitted(each, bend[here], resampled=0))[0]
+    return point_of(fitted(each, bend[here])).value

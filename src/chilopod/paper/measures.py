@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod import trials
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
-from chilopod.analysis.square_root import RESAMPLED, SquareRootFit, square_root_fit
+from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
-from chilopod.paper.scatter import drawn_anew, mean_and_error
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
+from chilopod.statistics import Estimate, mean, propagated
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
 from chilopod.trials import Trial
 
@@ -105,17 +105,17 @@ def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
     return (in_settled_curve(data) if settled else is_curved(data)) & most[:, None]
 
 
-def fitted(inverse: ArrayLike, bends: ArrayLike, resampled: int = RESAMPLED) -> SquareRootFit | None:
+def fitted(inverse: ArrayLike, bends: ArrayLike) -> SquareRootFit | None:
     """Square-root law of bends over 1/k by :func:`square_root_fit`; None if they do not determine a point."""
     try:
-        return square_root_fit(inverse, bends, resampled)
+        return square_root_fit(inverse, bends)
     except AnalysisError:
         return None
 
 
-def point_of(fit: SquareRootFit | None) -> tuple[float, float]:
-    """Point of a fit and its standard error by the bootstrap, N*mm/deg; NaN if there is none."""
-    return (fit.critical, fit.bootstrap_error) if fit else (float("nan"), float("nan"))
+def point_of(fit: SquareRootFit | None) -> Estimate:
+    """Point of a fit, N*mm/deg; NaN if there is none."""
+    return fit.estimate if fit else Estimate()
 
 
 def onset(data: xr.Dataset, joint: int = 1, settled: bool = True) -> SquareRootFit | None:
@@ -125,24 +125,23 @@ def onset(data: xr.Dataset, joint: int = 1, settled: bool = True) -> SquareRootF
     return fitted(inverse[here], data.mean_angle.sel(joint=joint).values[here])
 
 
-def onset_with_error(data: xr.Dataset, settled: bool = True) -> tuple[float, float]:
-    """:func:`onset` and its standard error, as of :func:`point_of`."""
+def onset_point(data: xr.Dataset, settled: bool = True) -> Estimate:
+    """Point of :func:`onset`, N*mm/deg; NaN if there is none."""
     return point_of(onset(data, settled=settled))
 
 
-def radius_at(data: xr.Dataset, spring: float, settled: bool = True) -> tuple[float, float]:
-    """Mean radius of the trials at a spring that curve and have settled (all without ``settled``), and its standard
-    error, m; NaN if there are fewer than two."""
+def radius_at(data: xr.Dataset, spring: float, settled: bool = True) -> Estimate:
+    """Mean radius of the trials at a spring that curve and have settled (all without ``settled``), m; NaN if there are
+    fewer than two."""
     at = data.sel(spring=spring)
     radii = at.axis_radius.values[in_settled_curve(at) if settled else is_curved(at)]
-    return mean_and_error(radii) if len(radii) > 1 else (float("nan"), float("nan"))
+    return mean(radii) if len(radii) > 1 else Estimate()
 
 
-def spring_for(data: xr.Dataset, radius: float) -> tuple[float, float]:
+def spring_for(data: xr.Dataset, radius: float) -> Estimate:
     """The paper's k1-hat: spring of a radius, interpolated between trials, N*mm/deg; NaN outside of them.
 
-    The squared curvature is interpolated in 1/k1, in which it is linear by the square-root law. The standard error
-    comes from a bootstrap at every spring.
+    The squared curvature is interpolated in 1/k1, in which it is linear by the square-root law.
     """
     here = counted(data)
     curved = here.any(axis=1)
@@ -154,12 +153,7 @@ def spring_for(data: xr.Dataset, radius: float) -> tuple[float, float]:
         order = np.argsort(squared)
         return 1.0 / float(np.interp(wanted, squared[order], inverse[order], left=np.nan, right=np.nan))
 
-    if not curved.any():
-        return float("nan"), float("nan")
-    rng = np.random.default_rng(0)
-    again = [found(drawn_anew(curvature, rng)) for _ in range(RESAMPLED)]
-    single = (np.isfinite(curvature).sum(axis=1) < 2).all()  # nobody knows how it scatters
-    return found(curvature), float("nan") if single else float(np.std(again, ddof=1))
+    return propagated(found, curvature, reciprocal=True)[0] if curved.any() else Estimate()
 
 
 def cycle_means(angles: Array, samples: int) -> Array:

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chilopod.analysis.parameters import PAPER_UNIT
-from chilopod.paper.scatter import Answer, between
 from chilopod.robot import Robot
 from chilopod.steering import Outcome, Target
 
@@ -35,9 +34,9 @@ class Band(Said):
         """Middle between the bounds."""
         return 0.5 * (self.low + self.high)
 
-    def answer(self, value: float, error: float = 0.0) -> Answer:
-        """True if a number with a standard error lies between the bounds."""
-        return between(value, error, self.low, self.high)
+    def holds(self, value: float) -> bool:
+        """True if a number without an error lies between the bounds."""
+        return self.low <= value <= self.high
 
 
 @dataclass(frozen=True)
@@ -56,10 +55,6 @@ class Number:
         """Band of numbers that agree."""
         low, high = self.value - self.tolerance, self.value + self.tolerance
         return Band(str(self), f"{100.0 * self.tolerance / self.value:.0f} %", low, high)
-
-    def answer(self, value: float, error: float = 0.0) -> Answer:
-        """True if a number with a standard error agrees."""
-        return self.band.answer(value, error)
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from chilopod.analysis.square_root import SquareRootFit
 from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.printed import Band
-from chilopod.paper.scatter import means
 from chilopod.show import style
 from chilopod.show.words import SPRING_UNIT, k, typeset
+from chilopod.statistics import means
 
 INVERSE_UNIT: Final = "deg/(N·mm)"
 DASHED: Final[Any] = (0, (4, 2))

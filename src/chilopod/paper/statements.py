@@ -9,7 +9,6 @@ from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
 from chilopod.paper.fit_data import walking_speed
 from chilopod.paper.printed import CRITERION_NAMES, Band, Number, Said
-from chilopod.paper.scatter import SURE
 from chilopod.paper.table import Kind, Statement
 from chilopod.show.words import listing
 from chilopod.steering import Outcome
@@ -121,7 +120,7 @@ WITHOUT = _said(
 HOPF = _said(
     "task A, pitchfork against Hopf: smallest criteria",
     "lower for the pitchfork, all three",
-    f"all three lower, by {SURE:g} standard errors",
+    "all three lower",
 )
 HOPF_SPRINGS = _said(
     "task A, Hopf: springs of the smallest criteria",

@@ -6,17 +6,21 @@ the planar model, and :func:`robot_rows` puts them into one line.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from enum import Enum, StrEnum
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from chilopod.paper.printed import Band, Said
-from chilopod.paper.scatter import Answer, with_error
+from chilopod.show.words import listing
+from chilopod.statistics import LEVEL, Answer, Comparison, Estimate, holm
 
 S = TypeVar("S", bound=Said, covariant=True)
+
+INCREASES: Mapping[Answer, str] = {True: "increases", False: "not throughout", None: "not told apart everywhere"}
+"""Words for the answers of :func:`chilopod.statistics.increases`."""
 
 
 class Verdict(StrEnum):
@@ -55,7 +59,8 @@ class Result:
     @property
     def words(self) -> str:
         """Text, or the number with its error and unit."""
-        return self.text or f"{with_error(self.value, self.error, self.digits)} {self.unit}".rstrip()
+        error = f" ± {self.error:.{self.digits}f}" if self.error > 0.0 else ""
+        return self.text or f"{self.value:.{self.digits}f}{error} {self.unit}".rstrip()
 
     def data(self) -> dict[str, Any]:
         """Number, error and unit as plain data, None where there is none."""
@@ -105,12 +110,14 @@ class Statement(Generic[S]):
 
 @dataclass(frozen=True)
 class OfTwin:
-    """Result of the twin, its verdict, and the reading of the paper, if it allows several."""
+    """Result of the twin, its verdict, the reading of the paper, if it allows several, and the comparison behind the
+    verdict, if it rests on trials that scatter."""
 
     statement: Statement[Said]
     result: Result
     verdict: Verdict
     reading: str = ""
+    comparison: Comparison | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +140,8 @@ class RobotRow:
     kind: str  # one of :class:`Kind`
     verdict: Verdict  # on the twin
     asked: str  # condition for a verdict of *within*
+    p: float | None = None  # of the comparison behind the verdict; None for one that does not rest on scatter
+    needs: str = ""  # words on the number of trials that would decide
     absent: str = ""  # words where the twin has no result
 
     def data(self) -> dict[str, Any]:
@@ -148,13 +157,24 @@ class RobotRow:
 
 
 def of_twin(statement: Statement[Band], result: Result, reading: str = "") -> OfTwin:
-    """A number beside the band in which it is to lie: undecided if its error is not known, not determined without it.
+    """A number without an error beside the band in which it is to lie; such a number says so in its words."""
+    verdict = within(statement.said.holds(result.value)) if np.isfinite(result.value) else Verdict.NOT_DETERMINED
+    return OfTwin(statement, result, verdict, reading)
 
-    A number that has no error, such as the earliest of several, has 0 as its error and says so in its words.
-    """
-    if not np.isfinite(result.value):
+
+def estimated(
+    statement: Statement[Band], found: Estimate, unit: str, digits: int = 2, words: str = "", reading: str = ""
+) -> OfTwin:
+    """A number from trials beside the band in which it is to lie, in its words, or as a number."""
+    result = Result(words, found.value, found.error, unit, digits)
+    if not np.isfinite(found.value):
         return OfTwin(statement, result, Verdict.NOT_DETERMINED, reading)
-    return OfTwin(statement, result, within(statement.said.answer(result.value, result.error)), reading)
+    return compared(statement, result, found.between(statement.said.low, statement.said.high), reading)
+
+
+def compared(statement: Statement[Said], result: Result, comparison: Comparison, reading: str = "") -> OfTwin:
+    """A result with a verdict that rests on trials that scatter."""
+    return OfTwin(statement, result, within(comparison.answer), reading, comparison)
 
 
 def robot_rows(
@@ -168,8 +188,29 @@ def robot_rows(
         twins = [row for row in rows if isinstance(row, OfTwin) and row.statement == each]
         for twin in twins:
             quantity = f"{each.quantity} ({twin.reading})" if twin.reading else each.quantity
-            lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.condition))
+            line = RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.condition)
+            if twin.comparison is not None:
+                p = twin.comparison.p
+                line = replace(line, p=p if np.isfinite(p) else None, needs=twin.comparison.needs)
+            lines.append(line)
         if planar and not twins:
             none = Verdict.NOT_COMPUTED
-            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.condition, absent))
+            lines.append(
+                RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.condition, absent=absent)
+            )
     return lines
+
+
+def at_once(rows: Iterable[RobotRow]) -> str:
+    """Statement about all comparisons of a table at once, in words; empty if none rests on scatter."""
+    tested = [(row.quantity, row.p) for row in rows if row.p is not None]
+    if not tested:
+        return ""
+    p, edge = [each for _, each in tested], 1.0 - LEVEL
+    decided, left = [each < edge for each in p], holm(p)
+    fallen = [name for (name, _), was, still in zip(tested, decided, left, strict=True) if was and not still]
+    return (
+        f"{len(p)} verdicts rest on trials that scatter: were all at the edge of what is asked, chance would decide "
+        f"{edge * len(p):.1f} of them. {sum(decided)} are decided, {sum(left)} with a chance of {100.0 * edge:.0f} % "
+        f"of any error among all (Holm){f', not these: {listing(fallen)}' if fallen else ''}."
+    )

@@ -68,7 +68,7 @@ def radius_law(
     if curved.sum() < 3:
         raise AnalysisError("must give at least three curved walks for a radius law", field="springs")
     inverse = 1.0 / np.array(springs)
-    fit = square_root_fit(inverse[curved], ends.bend.values[curved], resampled=0)
+    fit = square_root_fit(inverse[curved], ends.bend.values[curved])
     stiff_first = np.flatnonzero(curved)[::-1]
     values = [fit.critical, *(springs[i] for i in stiff_first)]
     radii = [np.inf, *(float(ends.axis_radius[i]) for i in stiff_first)]

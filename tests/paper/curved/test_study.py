@@ -146,5 +146,5 @@ def test_a_small_study_says_what_it_found(kept):
     assert study.comparison.exact_k1.values == pytest.approx([11.991, 8.919, 10.786, 11.344], abs=1e-3)
     exact, fitted = study.fits.attrs["exact_k1"], study.fits.critical_k1.values
     assert (fitted - exact > 0.2).all()
-    assert (np.abs(fitted - study.fits.exact_walks) < 4.0 * study.fits.bootstrap_error).all()
+    assert (np.abs(fitted - study.fits.exact_walks) < 4.0 * study.fits.trial_error).all()
     assert float(study.agreement.max()) < 1e-6

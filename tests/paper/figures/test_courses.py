@@ -48,6 +48,6 @@ def test_the_map_has_every_target_where_it_was_put_up(drawn):
 
 def test_conditions_that_do_harm_are_named(drawn):
     text = " ".join(drawn["courses-robust"].text)
-    assert "clearly fewer with one (0.0 % (0.0 to 1.9))" in text
+    assert "clearly fewer with one (0.0 % (0.0 to 8.8))" in text
     assert "beyond doubt under these: as usual and another" in text
     assert "under every one of them" in " ".join(drawn["robot-courses-robust"].text)

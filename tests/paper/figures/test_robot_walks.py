@@ -22,5 +22,5 @@ def test_they_say_what_was_found(drawn):
     assert "within after 40, 60 and 90, outside after 20 and 30" in words[1]
     assert not any("nan" in each for each in words)
     lines = tables.csv(drawn["robot-durations"].data).splitlines()
-    assert lines[1].startswith("duration,spring,onset")
-    assert len(lines) == 2 + 5 * 7
+    assert lines[3].startswith("duration [s],spring,onset [N*mm/deg],axis_radius [m]")
+    assert len(lines) == 4 + 5 * 7

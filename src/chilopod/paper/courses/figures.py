@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from chilopod.frozen import Array
 from chilopod.paper.courses.robust import USUAL, Robust
 from chilopod.paper.courses.rows import decisions, percent
-from chilopod.paper.courses.statistics import Interval
 from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, verdicts
 from chilopod.paper.shapes import finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import listing, number, spring
+from chilopod.statistics import Interval
 from chilopod.steering import STRATEGIES, VARIABLE
 
 _STRATEGIES = (style.Layout("ABC", 3.4, widths=(1.2, 1.0, 1.0)), style.Layout("A;B;C", 8.6))

@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 
 from chilopod.paper.courses.robust import USUAL
-from chilopod.paper.courses.statistics import Interval
 from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, titled, verdicts
 from chilopod.paper.table import Row, unprinted
 from chilopod.show.words import listing
+from chilopod.statistics import Interval
 from chilopod.steering import VARIABLE
 
 _WHERE = "section Conclusion and discussion"
@@ -43,7 +43,7 @@ def _words(found: Summary) -> str:
         parts.append(between(found.seconds, "s for a target that is reached"))
         parts.append(between(found.spent, "s spent for each"))
     if np.isfinite(found.later.value) and found.name != VARIABLE.name:
-        parts.append(between(found.later, "s later than the variable spring at targets that both reach"))
+        parts.append(between(found.later.interval, "s later than the variable spring at targets that both reach"))
     return "; ".join(parts)
 
 

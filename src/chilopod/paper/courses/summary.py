@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from chilopod.frozen import Array
-from chilopod.paper.courses.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson
-from chilopod.paper.scatter import Answer
+from chilopod.statistics import Answer, Estimate, Interval, difference, grouped_mean, ratio, share
 from chilopod.steering import ON_COURSES, VARIABLE
 
 # Words for yes, undecided and no.
@@ -38,10 +37,10 @@ class Summary:
     courses: Interval  # share that is reached as a whole
     seconds: Interval  # for a target that is reached, s
     spent: Interval  # on all targets for every one that is reached, s, also where the robot has failed before
-    later: Interval  # mean difference to the variable spring's time, s, at targets that both reach
+    later: Estimate  # mean difference to the variable spring's time, s, at targets that both reach
     spring_work: float  # mean work of the actuators of springs, J a course
     drive_work: float  # and of joints
-    more_work: Interval  # sum of both, less the variable spring's
+    more_work: Estimate  # sum of both, less the variable spring's
     effort: float  # mean of the leg yaw, rad^2 s a course
     detour: float  # path over the shortest with circles of the radius law, of all targets reached together
     cost: float  # steering cost of transport
@@ -75,12 +74,12 @@ def _summary(one: xr.Dataset, variable: xr.Dataset) -> Summary:
         spring=float(one.spring),
         targets=share_of_targets(one.arrived),
         courses=share_of_courses(one.arrived),
-        seconds=bootstrap_mean(seconds),
-        spent=bootstrap_ratio(np.where(arrived, seconds, one.attrs["patience_s"]).sum(axis=1), arrived.sum(axis=1)),
-        later=bootstrap_mean(seconds - _reached(variable, "seconds")),
+        seconds=grouped_mean(seconds).interval,
+        spent=ratio(np.where(arrived, seconds, one.attrs["patience_s"]).sum(axis=1), arrived.sum(axis=1)).interval,
+        later=grouped_mean(seconds - _reached(variable, "seconds")),
         spring_work=float(one.goal_spring_work.sum("goal").mean()),
         drive_work=float(one.goal_drive_work.sum("goal").mean()),
-        more_work=bootstrap_mean(_work(one) - _work(variable)),
+        more_work=difference(_work(one), _work(variable), paired=True),
         effort=float(one.goal_effort.sum("goal").mean()),
         detour=path / shortest if arrived.any() else float("nan"),
         cost=float(one.cost),
@@ -89,14 +88,12 @@ def _summary(one: xr.Dataset, variable: xr.Dataset) -> Summary:
 
 def share_of_targets(arrived: xr.DataArray) -> Interval:
     """Share of targets that were reached, over (course, goal)."""
-    reached = arrived.values > 0.5
-    return wilson(int(reached.sum()), reached.size)
+    return share(arrived.transpose("course", "goal").values > 0.5)
 
 
 def share_of_courses(arrived: xr.DataArray) -> Interval:
     """Share of courses whose targets were all reached, over (course, goal)."""
-    whole = (arrived.transpose("course", "goal").values > 0.5).all(axis=1)
-    return wilson(int(whole.sum()), whole.size)
+    return share((arrived.transpose("course", "goal").values > 0.5).all(axis=1))
 
 
 def _reached(one: xr.Dataset, name: str) -> Array:
@@ -115,8 +112,8 @@ def verdicts(found: dict[str, Summary]) -> dict[str, list[str]]:
     answers: dict[tuple[str, ...], Callable[[Summary], Answer]] = {
         _REACH: lambda each: ours.targets.above(each.targets),
         _SPENT: lambda each: each.spent.above(ours.spent),
-        _LATER: lambda each: each.later.sign,
-        _WORK: lambda each: ON_COURSES[each.name].needs_torque and each.more_work.sign,
+        _LATER: lambda each: each.later.above().answer,
+        _WORK: lambda each: ON_COURSES[each.name].needs_torque and each.more_work.above().answer,
     }
     return {
         word: [each.title for each in others if answer(each) is wanted]

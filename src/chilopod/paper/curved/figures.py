@@ -15,10 +15,10 @@ from chilopod.frozen import Array
 from chilopod.paper import printed, shapes
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, fluctuation
 from chilopod.paper.curved.trials import on_branch
-from chilopod.paper.scatter import means
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, signed, spring, typeset
+from chilopod.statistics import means
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
 
@@ -116,9 +116,9 @@ def onset(study: CurvedStudy) -> Panel:
         f"grows, {number(power, 1)} instead of one half.",
         text=(
             "A square root is what a supercritical pitchfork promises close by. How close? Fitted to all trials it "
-            f"gives {number(float(wide.critical_k1), 4)} ± {number(float(wide.bootstrap_error), 1)} {SPRING_UNIT}, to "
+            f"gives {number(float(wide.critical_k1), 4)} ± {number(float(wide.trial_error), 1)} {SPRING_UNIT}, to "
             f"those of the two stiffest curved springs {number(float(near.critical_k1), 4)} ± "
-            f"{number(float(near.bootstrap_error), 1)}; the point itself is at {number(exact, 6)}. The error bars tell "
+            f"{number(float(near.trial_error), 1)}; the point itself is at {number(exact, 6)}. The error bars tell "
             "how well another set of trials would repeat the fit, not how far the law is off: fitted to the exact "
             "walks of the same springs, without any noise, it is off as much (open dots). More trials do not help, "
             "only springs closer to the point do.",
@@ -224,7 +224,7 @@ def _draw_onset(study: CurvedStudy, narrow: bool) -> Figure:
     below, along = (100.0 * (1.0 - each.softest.values / exact) for each in (fits, law))
     axes["A"].semilogx(along, law.critical_k1.values, color=style.ORANGE, label="fit to exact walks, evenly spread")
     name = "fit to the trials"
-    shapes.errorbars(axes["A"], below, fits.critical_k1.values, fits.bootstrap_error.values, style.BLACK, "o", name)
+    shapes.errorbars(axes["A"], below, fits.critical_k1.values, fits.trial_error.values, style.BLACK, "o", name)
     name = "the same springs, exact walks"
     look: dict[str, Any] = {"color": style.ORANGE, "markerfacecolor": "white", "markersize": 8.0, "zorder": 3.0}
     axes["A"].plot(below, fits.exact_walks.values, "o", label=name, **look)

@@ -12,10 +12,10 @@ from chilopod.paper import printed, statements
 from chilopod.paper.curved import figures
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, curved_study, fluctuation
 from chilopod.paper.equal_distance import change, radius_ratio
-from chilopod.paper.scatter import INCREASES, increases
 from chilopod.paper.section import Section
-from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement, unprinted
+from chilopod.paper.table import INCREASES, OfPlanar, Result, Row, Verdict, agreement, unprinted
 from chilopod.show.figures import branch, undulation
+from chilopod.statistics import Estimate, increases
 from chilopod.tasks.radius_law import is_curved
 
 CHAPTER = "Curved walks"
@@ -72,13 +72,14 @@ def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
     curving = here.any(axis=1)
     angles = np.where(here, np.abs(trials.mean_angle.sel(joint=1).values), np.nan)
     rising = increases(list(angles[curving & np.isfinite(angles).any(axis=1)])[::-1])
-    wider, softest, stiffest = fluctuation(trials)
+    spreads, softest, stiffest = fluctuation(trials)
+    wider = spreads.above().words()
     curved = f"curved up to {max(springs[curving]):g} N*mm/deg, {left} to the left and {right} to the right"
     words = [
         OfPlanar(statements.STRAIGHT, Result(f"straight from {min(springs[~curving]):g} N*mm/deg up")),
         OfPlanar(statements.CURVED, Result(curved)),
         OfPlanar(statements.ONSET, _onset(study.fit.critical, exact)),
-        OfPlanar(statements.RISING, Result(INCREASES[rising])),
+        OfPlanar(statements.RISING, Result(INCREASES[rising.answer])),
         OfPlanar(statements.FLUCTUATION, Result(f"{wider} at {softest:g} than at {stiffest:g} N*mm/deg")),
     ]
     for spring, statement in statements.RADII.items():
@@ -93,11 +94,11 @@ def _variants_beside_robot(study: CurvedStudy) -> list[OfPlanar]:
         at = study.comparison.sel(variant=name)
         ratio = radius_ratio(study.variants[printed.AS_BUILT], study.variants[name])
         text = (
-            f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset; "
-            f"{change(float(at.equal_spring))} at the same spring"
+            f"{change(ratio.distance)} at equal distance from its own onset; "
+            f"{change(Estimate(float(at.equal_spring)))} at the same spring"
         )
         words.append(OfPlanar(statement.onset, _onset(float(at.fitted_k1), float(at.exact_k1))))
-        words.append(OfPlanar(statement.radius, Result(text, ratio.distance, ratio.distance_error)))
+        words.append(OfPlanar(statement.radius, Result(text, ratio.distance.value, ratio.distance.error)))
     return words
 
 

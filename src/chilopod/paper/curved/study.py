@@ -18,10 +18,10 @@ from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.curved.trials import EXAMPLES, SPRINGS, curved_trials, off_branch, on_branch, variant_trials
 from chilopod.paper.measures import example_walks
-from chilopod.paper.scatter import Difference, means, spread_difference
 from chilopod.paper.section import Context
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
+from chilopod.statistics import Estimate, means, spread_difference
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
 
@@ -93,7 +93,7 @@ def bend_order(trials: xr.Dataset) -> tuple[int, ...]:
     return tuple(int(joint) + 1 for joint in np.argsort(-angles))
 
 
-def fluctuation(trials: xr.Dataset) -> tuple[Difference, float, float]:
+def fluctuation(trials: xr.Dataset) -> tuple[Estimate, float, float]:
     """Ratio of the scatter of joint 1 among trials at the softest spring to that at the stiffest spring that curves,
     and these springs, N*mm/deg."""
     curved = trials.isel(spring=is_curved(trials).any(axis=1))
@@ -113,9 +113,9 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
 
     Returns
     -------
-    Dataset over softest (the softest spring fitted, N*mm/deg): ``critical_k1``, its ``error`` and ``bootstrap_error``
-    (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, the fit with every trial replaced by
-    the exact walk of its spring (its error does not shrink with repeats), and ``trials``.
+    Dataset over softest (the softest spring fitted, N*mm/deg): ``critical_k1``, its ``error`` by the least squares and
+    ``trial_error`` by the scatter of trials (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, the fit
+    with every trial replaced by the exact walk of its spring (its error does not shrink with repeats), and ``trials``.
     """
     curved = trials.isel(spring=is_curved(trials).any(axis=1))
     softest, rows = curved.spring.values[:-1][::-1], []
@@ -124,10 +124,10 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
         here = is_curved(part)
         springs = np.broadcast_to(part.spring.values[:, None], here.shape)[here]
         exact = on_branch(branch, "mean_angle", springs)[:, 0]
-        found, without = fitted(part), square_root_fit(1.0 / springs, exact, resampled=0)
-        rows.append((found.critical, found.error, found.bootstrap_error, without.critical, found.trials))
+        found, without = fitted(part), square_root_fit(1.0 / springs, exact)
+        rows.append((found.critical, found.error, found.estimate.error, without.critical, found.trials))
     *springs_, counts = np.array(rows, dtype=np.float64).T
-    names = ("critical_k1", "error", "bootstrap_error", "exact_walks")
+    names = ("critical_k1", "error", "trial_error", "exact_walks")
     columns = {name: ("softest", each, {"units": PAPER_UNIT}) for name, each in zip(names, springs_, strict=True)}
     return xr.Dataset(
         {**columns, "trials": ("softest", counts.astype(int))},
@@ -151,7 +151,7 @@ def law_along_branch(branch: xr.Dataset, count: int = 25) -> xr.Dataset:
     for low in softest:
         inverse = np.linspace(1.0 / exact, 1.0 / low, 21)[1:]
         angles = on_branch(branch, "mean_angle", 1.0 / inverse)[:, 0]
-        found.append((square_root_fit(inverse, angles, resampled=0).critical, angles[-1]))
+        found.append((square_root_fit(inverse, angles).critical, angles[-1]))
     critical, angle = np.array(found).T
     return xr.Dataset(
         {
@@ -169,8 +169,8 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
 
     Returns
     -------
-    Dataset over variant and ratio (of k1 to the variant's own critical one): ``fitted_k1`` with its ``error`` (of the
-    bootstrap), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1`` of the curved walks (above
+    Dataset over variant and ratio (of k1 to the variant's own critical one): ``fitted_k1`` with its ``error`` (by
+    the scatter of trials), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1`` of the curved walks (above
     ``exact_k1`` where the branch folds back), all in N*mm/deg; ``criticality``; ``radius`` with ``radius_error``, mean
     and standard error over the trials that settled on a curved walk (m; NaN where there are fewer than two);
     ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios; ``equal_spring``, over that
@@ -181,14 +181,15 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
     fits = [fitted(trials) for trials in variants.values()]
     statistics = [means(each.axis_radius.values, is_curved(each)) for each in variants.values()]
     radius, error = (np.array(each) for each in zip(*statistics, strict=True))
-    radius = np.where(np.isnan(error), np.nan, radius)
+    several = [is_curved(each).sum(axis=1) > 1 for each in variants.values()]
+    radius = np.where(several, radius, np.nan)
     ratio = (radius / radius[0])[:, np.isfinite(radius).all(axis=0)]
     # Every variant walks a curve there: softer than all critical springs, stiffer than where a branch ends.
     spring = float(0.9 * exact.min())
     there = np.array([axis_radius(branch, spring) for branch in all_branches])
     springs = {
         "fitted_k1": [fit.critical for fit in fits],
-        "error": [fit.bootstrap_error for fit in fits],
+        "error": [fit.estimate.error for fit in fits],
         "exact_k1": exact,
         "robot_k1": [printed.onset(name).value for name in variants],
         "stiffest_k1": [float(branch.parameter.max()) for branch in all_branches],

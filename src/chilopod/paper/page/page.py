@@ -22,7 +22,7 @@ from chilopod.errors import in_words
 from chilopod.paper.page.story import summary
 from chilopod.paper.section import Found, Section
 from chilopod.paper.straight.sections import MODE
-from chilopod.paper.table import RobotRow, Row, Verdict
+from chilopod.paper.table import RobotRow, Row, Verdict, at_once
 from chilopod.robot import Robot
 from chilopod.show.panel import Panel
 from chilopod.show.words import listing, minus, typeset
@@ -137,6 +137,7 @@ def page(
         first=_first([film for each in drawings.shown for film in each.films]),
         tables=tables,
         robot_rows=robot_rows,
+        at_once=typeset(at_once(found.robot_rows())),
         chapters=_chapters(sections, drawings),
         robot=f'"{robot_file}"' if " " in robot_file else robot_file,
         soft=10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}"),

@@ -40,7 +40,7 @@ def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
         found = base_series(finer, base_series_data(), springs, tolerance=tolerance, duration=duration)
         speeds.append(found.speeds)
         radii.append(robot.axis_radius(found.bends))
-        onsets.append(point_of(fitted(1.0 / np.array(springs), np.abs(found.bends[:, 0]), resampled=0))[0])
+        onsets.append(point_of(fitted(1.0 / np.array(springs), np.abs(found.bends[:, 0]))).value)
     return xr.Dataset(
         {
             "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),

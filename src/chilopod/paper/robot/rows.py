@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
-from chilopod.paper.measures import onset_with_error, radius_at, shares, spring_for
+from chilopod.paper.measures import onset_point, radius_at, shares, spring_for
 from chilopod.paper.printed import Band, Said, Task
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.scatter import INCREASES, Answer, every, increases, mean_and_error, spread_difference, with_error
 from chilopod.paper.statements import listed
-from chilopod.paper.table import OfTwin, Result, Statement, Verdict, of_twin, within
+from chilopod.paper.table import INCREASES, OfTwin, Result, Statement, Verdict, compared, estimated, of_twin, within
 from chilopod.paper.turning.criteria import SCALES, all_lower, around, in_words, minima, saturation, softest_minima
 from chilopod.paper.turning.trials import LegYaw, arrivals, by_leg_yaw, outcome_words, springs_by_outcome
 from chilopod.show.words import listing
+from chilopod.statistics import Answer, Estimate, increases, mean, spread_difference
 from chilopod.steering import Outcome
 from chilopod.tasks.radius_law import in_settled_curve
 
@@ -30,19 +30,19 @@ PAPER_SPRING = printed.TASKS["A"].k_hat.value
 def walk_rows(found: RobotWalks) -> list[OfTwin]:
     """Onset, radius and speed of curved walks, and their dependence on the duration."""
     base = found.base
-    speed, error = mean_and_error(base.speed.sel(spring=PAPER_SPRING).values)
     rows = [
         _straight(base),
         _curved(base),
-        _spring(statements.ONSET, onset_with_error(base)),
+        _spring(statements.ONSET, onset_point(base)),
         *(_radius(base, spring, statement) for spring, statement in statements.RADII.items()),
-        of_twin(statements.SPEED, Result("", speed, error, "m/s", 4)),
+        estimated(statements.SPEED, mean(base.speed.sel(spring=PAPER_SPRING).values), "m/s", 4),
         _rising(base),
         _fluctuation(base),
     ]
     if found.uniform is not None:
-        uniform = found.uniform.attrs
-        rows.append(_spring(statements.UNIFORM, (uniform["critical_k"], uniform["critical_k_error"])))
+        value, error, freedom = (found.uniform.attrs[f"critical_k{ending}"] for ending in ("", "_error", "_freedom"))
+        point = Estimate(value, error, freedom, found.uniform.sizes["repeat"], reciprocal=True)
+        rows.append(_spring(statements.UNIFORM, point))
     for name, data in found.variants.items():
         lower = found.lower_steps.get(name)
         rows += variant_rows(base, data, name, "" if lower is None else "steps as high")
@@ -51,12 +51,13 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
     return rows + duration_rows(found.durations)
 
 
-def _spring(statement: Statement[Band], twin: tuple[float, float], reading: str = "") -> OfTwin:
+def _spring(statement: Statement[Band], twin: Estimate, reading: str = "") -> OfTwin:
     """Spring (N*mm/deg) beside the paper's; NaN if the trials determine no spring, or no error."""
-    value, error = twin
-    off = f"{with_error(value, error, 1)} {PAPER_UNIT} ({100.0 * (value / statement.said.middle - 1.0):+.0f} %)"
-    words = off if np.isfinite(value) else "not determined by trials"
-    return of_twin(statement, Result(words, value, error, PAPER_UNIT), reading)
+    number = Result("", twin.value, twin.error, PAPER_UNIT, 1).words
+    words = f"{number} ({100.0 * (twin.value / statement.said.middle - 1.0):+.0f} %)"
+    return estimated(
+        statement, twin, PAPER_UNIT, 1, words if np.isfinite(twin.value) else "not determined by trials", reading
+    )
 
 
 def _straight(base: xr.Dataset) -> OfTwin:
@@ -81,8 +82,8 @@ def _most(base: xr.Dataset, what: str, springs: tuple[float, ...]) -> tuple[str,
 
 
 def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTwin:
-    mean, error = radius_at(base, spring)
-    return of_twin(statement, Result("no two trials curve" if np.isnan(mean) else "", mean, error, "m"))
+    found = radius_at(base, spring)
+    return estimated(statement, found, "m", words="no two trials curve" if np.isnan(found.value) else "")
 
 
 def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
@@ -95,7 +96,7 @@ def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
 
 def _rising(base: xr.Dataset) -> OfTwin:
     rising = increases(_curved_angles(base).values())
-    return OfTwin(statements.RISING, Result(INCREASES[rising]), within(rising))
+    return compared(statements.RISING, Result(INCREASES[rising.answer]), rising)
 
 
 def _fluctuation(base: xr.Dataset) -> OfTwin:
@@ -104,10 +105,10 @@ def _fluctuation(base: xr.Dataset) -> OfTwin:
         none = Result("no two springs at which two trials curve")
         return OfTwin(statements.FLUCTUATION, none, Verdict.NOT_DETERMINED)
     (stiff, one), *_, (soft, other) = several.items()
-    wider = spread_difference(other, one)
+    wider = spread_difference(other, one).above()
     spreads = [f"{np.rad2deg(row.std(ddof=1)):.2f} deg at {k:g}" for k, row in ((stiff, one), (soft, other))]
-    words = f"{' and '.join(spreads)} {PAPER_UNIT} (standard deviation): {wider}"
-    return OfTwin(statements.FLUCTUATION, Result(words), within(wider.higher))
+    words = f"{' and '.join(spreads)} {PAPER_UNIT} (standard deviation): {wider.words()}"
+    return compared(statements.FLUCTUATION, Result(words), wider)
 
 
 def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "") -> list[OfTwin]:
@@ -116,47 +117,53 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
     said = statements.VARIANTS[name]
     ratio = radius_ratio(base, data)
     law = law_ratio(ratio.compared, printed.ONSET.value, printed.onset(name).value)
-    words = [f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset, 1/k1 - 1/k1*"]
-    if np.isnan(ratio.distance):
+    words = [f"{change(ratio.distance)} at equal distance from its own onset, 1/k1 - 1/k1*"]
+    if np.isnan(ratio.distance.value):
         words = ["no distance from the onset in common with the robot as built"]
     if ratio.compared:
         words.append(
-            f"{change(ratio.springs, ratio.springs_error)} at equal springs, {listed(ratio.compared)}"
-            + ("" if np.isnan(law) else f" (the robot's onsets alone would make it {change(law)})")
+            f"{change(ratio.springs)} at equal springs, {listed(ratio.compared)}"
+            + ("" if np.isnan(law) else f" (the robot's onsets alone would make it {change(Estimate(law))})")
         )
     return [
-        _spring(said.onset, onset_with_error(data), reading),
-        of_twin(said.radius, Result("; ".join(words), ratio.distance, ratio.distance_error), reading),
+        _spring(said.onset, onset_point(data), reading),
+        estimated(said.radius, ratio.distance, "", words="; ".join(words), reading=reading),
     ]
 
 
 def duration_rows(data: xr.Dataset) -> list[OfTwin]:
     """Quantities of :func:`chilopod.paper.robot.walks.by_duration`, and their dependence on the duration of walks."""
-    answers = [printed.ONSET.answer(*pair) for pair in zip(data.onset.values, data.onset_error.values, strict=True)]
+    answers = _answers(data, "onset", printed.ONSET.band, reciprocal=True)
     values = f"{_numbers(data.onset.values, 1)} {PAPER_UNIT}"
     rows = [_duration_row(data, statements.ONSET_BY_DURATION, values, answers)]
     for spring, statement in statements.RADII_BY_DURATION.items():
-        pairs = data[["axis_radius", "axis_radius_error"]].sel(spring=spring).to_array("part").values.T
-        answers = [printed.RADII[spring].answer(mean, error) for mean, error in pairs]
-        rows.append(_duration_row(data, statement, f"{_numbers(pairs[:, 0], 2)} m", answers))
+        at = data.sel(spring=spring)
+        answers = _answers(at, "axis_radius", printed.RADII[spring].band)
+        rows.append(_duration_row(data, statement, f"{_numbers(at.axis_radius.values, 2)} m", answers))
     for what, statement in statements.WALKS_BY_DURATION.items():
         part = data[what].sel(spring=statements.SLOWEST[what]).values
         rows.append(_duration_row(data, statement, f"{_numbers(100.0 * part, 0)} %", list(map(bool, part > 0.5))))
     return rows
 
 
+def _answers(data: xr.Dataset, name: str, said: Band, *, reciprocal: bool = False) -> list[Answer]:
+    """Answers after every duration."""
+    columns = (data[f"{name}{ending}"].values for ending in ("", "_error", "_freedom"))
+    found = [
+        Estimate(value, error, freedom, reciprocal=reciprocal) for value, error, freedom in zip(*columns, strict=True)
+    ]
+    return [each.between(said.low, said.high).answer for each in found]
+
+
 def _duration_row(data: xr.Dataset, statement: Statement[Said], values: str, answers: Sequence[Answer]) -> OfTwin:
     """Row on a quantity that is judged after every duration."""
-    times, last = [f"{each:g}" for each in data.duration.values], answers[-1]
+    times = [f"{each:g}" for each in data.duration.values]
     by = {within(key): [t for t, one in zip(times, answers, strict=True) if one is key] for key in (True, False, None)}
     judged = [
         f"{word} after {listing(those) if len(those) < len(times) else 'each'}" for word, those in by.items() if those
     ]
-    return OfTwin(
-        statement,
-        Result(f"{values} after {listing(times)} s: {', '.join(judged)}"),
-        within(every(None if None in (each, last) else each == last for each in answers)),
-    )
+    same = False if {True, False} <= set(answers) else None if None in answers else True
+    return OfTwin(statement, Result(f"{values} after {listing(times)} s: {', '.join(judged)}"), within(same))
 
 
 def _numbers(values: NDArray[np.float64], digits: int) -> str:
@@ -169,9 +176,9 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
     for letter, task in found.tasks.items():
         said = statements.TASKS[letter]
         if walks is not None:
-            own, error = spring_for(walks.base, task.target.radius)
-            words = "" if np.isfinite(own) else "none of the springs walked"
-            rows.append(of_twin(said.k_hat, Result(words, own, error, PAPER_UNIT, 1)))
+            spring = spring_for(walks.base, task.target.radius)
+            words = "" if np.isfinite(spring.value) else "none of the springs walked"
+            rows.append(estimated(said.k_hat, spring, PAPER_UNIT, 1, words))
         words = outcome_words(task.criteria, lambda springs: ", ".join(f"{k:g}" for k in springs))
         rows.append(OfTwin(said.outcomes, Result(words), within(_became(task.criteria, printed.TASKS[letter]))))
         low = minima(task.criteria)
@@ -188,17 +195,17 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
     arrival = f"{time:.1f} s, the earliest, which has no error" if np.isfinite(time) else "none arrives"
     alone = by_leg_yaw(found.without)
     rows += [
-        of_twin(statements.ARRIVAL, Result(arrival, time, 0.0, "s")),
+        of_twin(statements.ARRIVAL, Result(arrival, time, unit="s")),
         *(OfTwin(statements.WITHOUT, Result(str(each)), within(_needs_leg_yaw(each))) for each in alone),
     ]
     if found.hopf is None:
         return rows
     own = walks.uniform.attrs["critical_k"] if walks and walks.uniform is not None else np.nan
     words, below = softest_minima(found.hopf, own if np.isfinite(own) else printed.UNIFORM.value)
-    compared = Result(f"{in_words(task, found.hopf)} ({saturation(task, found.hopf)})")
+    both = f"{in_words(task, found.hopf)} ({saturation(task, found.hopf)})"
     return [
         *rows,
-        OfTwin(statements.HOPF, compared, within(all_lower(task, found.hopf))),
+        compared(statements.HOPF, Result(both), all_lower(task, found.hopf)),
         OfTwin(statements.HOPF_SPRINGS, Result(words), within(below)),
     ]
 

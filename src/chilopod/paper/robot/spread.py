@@ -17,7 +17,7 @@ from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
 from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
-from chilopod.paper.measures import Folder, onset_with_error, spring_walks
+from chilopod.paper.measures import Folder, onset_point, spring_walks
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.robot.walks import UNIFORM_DURATION, lower_steps, undulations, walk_ends
 from chilopod.paper.section import Context, Size
@@ -119,8 +119,8 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
     base = next(iter(series.values()))
     uniform = undulations(robot, uniform_springs, 1, duration=swinging, folder=folder, engine=engine)
     return {
-        "onset": {name: onset_with_error(each)[0] for name, each in series.items()},
-        "radius": {name: radius_ratio(base, each, drawn=0).distance for name, each in series.items()},
+        "onset": {name: onset_point(each).value for name, each in series.items()},
+        "radius": {name: radius_ratio(base, each).distance.value for name, each in series.items()},
         "uniform": uniform.attrs["critical_k"],
     }
 

@@ -129,27 +129,37 @@ def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[f
 
     Returns
     -------
-    Dataset over duration (s; those of :data:`SHORTER`, and the walks' own last): ``onset`` with ``onset_error`` (of the
-    bootstrap), N*mm/deg; over duration and spring: those of :func:`chilopod.paper.measures.shares`, and ``axis_radius``
-    with ``axis_radius_error`` as of :func:`chilopod.paper.measures.radius_at`, m.
+    Dataset of :func:`over_durations`, after those of :data:`SHORTER` and the walks' own last.
     """
     last = float(records[0].time[-1])
     durations = [*(each for each in SHORTER if each < last), last]
-    series = [walk_ends(records, robot, springs, duration) for duration in durations]
+    return over_durations([walk_ends(records, robot, springs, duration) for duration in durations], durations)
+
+
+def over_durations(series: Sequence[xr.Dataset], durations: Sequence[float]) -> xr.Dataset:
+    """Results of the same walks after several durations (s).
+
+    Returns
+    -------
+    Dataset over duration: ``onset`` with ``onset_error`` and its degrees of freedom ``onset_freedom``, N*mm/deg; over
+    duration and spring: those of :func:`chilopod.paper.measures.shares`, and ``axis_radius`` with its error and
+    freedom, as of :func:`chilopod.paper.measures.radius_at`, m.
+    """
     # Short walks have not settled: what they show is what one would take for the radius.
-    onsets = np.array([measures.onset_with_error(each, settled=False) for each in series])
-    radii = np.array([[measures.radius_at(each, spring, settled=False) for spring in springs] for each in series])
-    both = ("duration", "spring")
+    onsets = [measures.onset_point(each, settled=False) for each in series]
+    springs = series[0].spring.values
+    radii = [[measures.radius_at(each, spring, settled=False) for spring in springs] for each in series]
+    columns: dict[str, Any] = {}
+    for ending, field in (("", "value"), ("_error", "error"), ("_freedom", "freedom")):
+        units = ("1", "1") if field == "freedom" else (PAPER_UNIT, "m")
+        onset = np.array([getattr(each, field) for each in onsets])
+        radius = np.array([[getattr(each, field) for each in row] for row in radii])
+        columns[f"onset{ending}"] = ("duration", onset, {"units": units[0]})
+        columns[f"axis_radius{ending}"] = (("duration", "spring"), radius, {"units": units[1]})
     return xr.Dataset(
-        {
-            "onset": ("duration", onsets[:, 0], {"units": PAPER_UNIT}),
-            "onset_error": ("duration", onsets[:, 1], {"units": PAPER_UNIT}),
-            **xr.concat([measures.shares(each) for each in series], "duration"),
-            "axis_radius": (both, radii[..., 0], {"units": "m"}),
-            "axis_radius_error": (both, radii[..., 1], {"units": "m"}),
-        },
+        {**columns, **xr.concat([measures.shares(each) for each in series], "duration")},
         coords={"duration": ("duration", np.array(durations), {"units": "s"}), "spring": series[0].spring},
-        attrs={"robot": robot.name, "repeats": series[0].sizes["repeat"], "averaged_s": AVERAGED},
+        attrs={"robot": series[0].attrs["robot"], "repeats": series[0].sizes["repeat"], "averaged_s": AVERAGED},
     )
 
 
@@ -169,8 +179,8 @@ def undulations(
     -------
     Dataset over spring (N*mm/deg) and repeat: ``amplitude``, root mean square of the joint angles, averaged over gait
     cycles, about their mean over the last 24 s (rad), and ``status``; attributes ``critical_k``, the onset of the
-    undulation by a square-root fit to springs up to :data:`SWINGING`, and ``critical_k_error``, its standard error by
-    the bootstrap; NaN if they determine no point.
+    undulation by a square-root fit to springs up to :data:`SWINGING`, ``critical_k_error``, its standard error, and
+    the degrees of freedom ``critical_k_freedom``; NaN if they determine no point.
     """
     wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(robot.body.modules - 1) * np.pi / 2.0))
     walk: dict[str, Any] = {"joint_angles": wave, "engine": engine, "rate": _PER_CYCLE / robot.gait.period}
@@ -184,10 +194,15 @@ def undulations(
     status = np.array([record.status.values[0] for record in records], dtype=object).reshape(shape)
     soft = np.asarray(springs) <= SWINGING
     inverse = np.broadcast_to(1.0 / np.asarray(springs)[:, None], shape)
-    critical, error = measures.point_of(measures.fitted(inverse[soft].ravel(), amplitude[soft].ravel()))
+    point = measures.point_of(measures.fitted(inverse[soft].ravel(), amplitude[soft].ravel()))
     both = ("spring", "repeat")
     return xr.Dataset(
         {"amplitude": (both, amplitude, {"units": "rad"}), "status": (both, status)},
         coords={"spring": measures.over_springs(springs), "repeat": np.arange(repeats)},
-        attrs={"robot": robot.name, "critical_k": critical, "critical_k_error": error},
+        attrs={
+            "robot": robot.name,
+            "critical_k": point.value,
+            "critical_k_error": point.error,
+            "critical_k_freedom": point.freedom,
+        },
     )

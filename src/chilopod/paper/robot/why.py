@@ -199,7 +199,7 @@ def _point(springs: Sequence[float], bends: Array) -> float:
         return float("nan")
     # Two springs have a point too: a third that is as straight as it gets does not move it.
     inverse = np.array([*(1.0 / springs[i] for i in curved), 1e-3])
-    point, _ = point_of(fitted(inverse, [*bends[curved], 0.0], resampled=0))
+    point = point_of(fitted(inverse, [*bends[curved], 0.0])).value
     # Beyond a spring at which walks are straight there is no point.
     return point if point <= max(springs) or bends[-1] > 0.0 else float("nan")
 

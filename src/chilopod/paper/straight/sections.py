@@ -10,7 +10,6 @@ import xarray as xr
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.printed import ANALYSIS
-from chilopod.paper.scatter import every
 from chilopod.paper.section import Section
 from chilopod.paper.straight import exponents, figures, study
 from chilopod.paper.table import OfPlanar, Result, Row, agreement, unprinted
@@ -25,7 +24,7 @@ def mode_rows(data: xr.Dataset) -> list[Row]:
     found, said = data.attrs, printed.CRITICAL_K1
     kind = f"{found['kind']}, {found['criticality']} (coefficient {found['coefficient']:.4g} /rad² per cycle)"
     rows = [
-        Row("critical k1", str(said), _located(data), ANALYSIS, agreement(said.answer(found["value"]))),
+        Row("critical k1", str(said), _located(data), ANALYSIS, agreement(said.band.holds(found["value"]))),
         Row(
             "kind and direction",
             f"{printed.KIND} (from the exponent crossing on the real axis)",
@@ -39,7 +38,7 @@ def mode_rows(data: xr.Dataset) -> list[Row]:
     for joint, (computed, paper) in enumerate(zip(data.computed.values, known, strict=False), 1):
         beyond = abs(computed - paper.value) - paper.tolerance
         remark = f"beyond rounding by {beyond:.4f}" if beyond > 0.0 else ""
-        result, verdict = Result(value=computed, error=0.0, digits=4), agreement(paper.answer(computed))
+        result, verdict = Result(value=computed, error=0.0, digits=4), agreement(paper.band.holds(computed))
         rows.append(Row(f"critical mode, joint {joint}", f"{paper.value:.2f}", result, ANALYSIS, verdict, remark))
     return rows
 
@@ -51,7 +50,7 @@ def variant_rows(data: xr.Dataset) -> list[Row]:
     for name, variant in printed.VARIANTS.items():
         value = float(data.critical_k1.sel(variant=name))
         words = f"{value:.3f} {PAPER_UNIT} ({100 * (value / base - 1):+.0f} %)"
-        result, verdict = Result(words, value, unit=PAPER_UNIT), agreement(variant.model.answer(value / base))
+        result, verdict = Result(words, value, unit=PAPER_UNIT), agreement(variant.model.holds(value / base))
         rows.append(Row(f"critical k1, {name}", variant.model.words, result, "figure Floquet analysis, C", verdict))
     return rows
 
@@ -66,7 +65,7 @@ def module_rows(data: xr.Dataset) -> list[Row]:
             said.words,
             Result(f"{float(longer.min()):.2f} to {float(longer.max()):.2f} {PAPER_UNIT}"),
             f"{ANALYSIS}, figure D",
-            agreement(every(said.answer(float(value) / base) for value in longer)),
+            agreement(all(said.holds(float(value) / base) for value in longer)),
         )
     ]
 

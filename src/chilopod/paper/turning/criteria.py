@@ -4,6 +4,7 @@ spring, Hopf by springs all alike."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -11,14 +12,14 @@ import xarray as xr
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.frozen import Array
 from chilopod.paper.printed import CRITERION_NAMES, Band
-from chilopod.paper.scatter import SURE, Answer, Difference, difference, every
 from chilopod.paper.turning.trials import CRITERIA, TurningTask
+from chilopod.statistics import LEVEL, Answer, Comparison, difference, every, mean
 from chilopod.steering import LegYawController
 
 SCALES = {"distance": (1.0, "m"), "angle": (180.0 / math.pi, "deg"), "effort": (1.0, "rad²·s")}
 """Units in which the criteria are shown: factor and unit."""
 
-_COLUMNS = ("spring", "at", "softest", "stiffest", "mean", "error")
+_COLUMNS = ("spring", "at", "softest", "stiffest", "alike", "mean", "error")
 
 
 def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
@@ -28,9 +29,9 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
     Returns
     -------
     Dataset over criterion: the ``spring`` of the smallest mean; ``at``, the vertex of a parabola in 1/k1 through it and
-    its neighbours (the spring itself at an end of the grid); ``softest`` and ``stiffest`` of the springs that are worse
-    by at most two standard errors of the difference (seed by seed), all in N*mm/deg; ``mean`` and ``error`` of the
-    smallest.
+    its neighbours (the spring itself at an end of the grid); ``softest`` and ``stiffest`` of the springs that are not
+    worse by a t test (seed by seed), all in N*mm/deg, and ``alike``, their number; the best spring is one of them in
+    95 % of cases, as the tests share their level (Bonferroni); ``mean`` and ``error`` of the smallest.
     """
     at_instant = criteria.isel(instant=instant)
     rows = np.array([_minimum(at_instant, name) for name in CRITERIA])
@@ -43,15 +44,17 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
 
 def _minimum(criteria: xr.Dataset, name: str) -> tuple[float, ...]:
     """Columns of :func:`minima` for one criterion; NaN where no spring has a mean."""
-    springs, mean, each = criteria.spring.values, criteria[f"{name}_mean"].values, criteria[name].values
-    if np.isnan(mean).all():
+    springs, means, each = criteria.spring.values, criteria[f"{name}_mean"].values, criteria[name].values
+    if np.isnan(means).all():
         return (np.nan,) * len(_COLUMNS)
-    lowest = int(np.nanargmin(mean))
-    apart = each - each[lowest]
-    spread = apart.std(1, ddof=1) / np.sqrt(apart.shape[1]) if apart.shape[1] > 1 else np.zeros(len(apart))
-    alike = springs[apart.mean(1) <= SURE * spread + 1e-15]
+    lowest = int(np.nanargmin(means))
+    others = [mean(row - each[lowest], size=float(np.nanmax(each))).above() for row in each]
+    # One-sided, and the chance of an error is shared by all springs that the best one is compared with.
+    worse = [one.side is True and one.p * (len(springs) - 1) < 2.0 * (1.0 - LEVEL) for one in others]
+    alike = springs[np.isfinite(means) & ~np.array(worse)]
     error = criteria[f"{name}_error"].values[lowest]
-    return springs[lowest], _vertex(springs, mean, lowest), alike.min(), alike.max(), mean[lowest], error
+    vertex = _vertex(springs, means, lowest)
+    return springs[lowest], vertex, alike.min(), alike.max(), alike.size, means[lowest], error
 
 
 def _vertex(springs: Array, mean: Array, lowest: int) -> float:
@@ -74,13 +77,20 @@ def around(low: xr.Dataset, said: Band) -> Answer:
     return None if low_end <= said.high and said.low <= high_end else False
 
 
-def differences(pitchfork: TurningTask, hopf: TurningTask) -> dict[str, Difference]:
-    """Smallest mean of every criterion with one strategy minus that with the other, at the first instant.
+def comparisons(pitchfork: TurningTask, hopf: TurningTask) -> dict[str, Comparison]:
+    """Comparisons of the smallest mean of every criterion with both strategies, at the first instant: True if the
+    pitchfork's is lower.
 
-    Both have the seeds 0, 1, ...: with as many repeats they are compared seed by seed, else as independent trials.
+    Both have the seeds 0, 1, ...: with as many repeats they are compared seed by seed, else as independent trials. The
+    lower one is the best of several springs, so its p counts as often as springs are no worse.
     """
-    pairs = {name: (_smallest(pitchfork, name), _smallest(hopf, name)) for name in CRITERION_NAMES}
-    return {name: difference(one, two, paired=one.size == two.size) for name, (one, two) in pairs.items()}
+    found = {}
+    for name in CRITERION_NAMES:
+        ours, theirs = (_smallest(task, name) for task in (pitchfork, hopf))
+        one = difference(theirs, ours, paired=ours.size == theirs.size).above()
+        best_of = minima((pitchfork if one.side else hopf).criteria)["alike"].sel(criterion=name)
+        found[name] = replace(one, p=min(1.0, one.p * float(best_of)) if one.side is not None else one.p)
+    return found
 
 
 def _smallest(task: TurningTask, name: str) -> Array:
@@ -91,25 +101,25 @@ def _smallest(task: TurningTask, name: str) -> Array:
     return trials
 
 
-def all_lower(pitchfork: TurningTask, hopf: TurningTask) -> Answer:
-    """True if all three minima of the pitchfork are lower; False if any is clearly higher."""
-    return every(each.lower for each in differences(pitchfork, hopf).values())
+def all_lower(pitchfork: TurningTask, hopf: TurningTask) -> Comparison:
+    """Comparison of all three minima: True if those of the pitchfork are lower."""
+    return every(comparisons(pitchfork, hopf).values())
 
 
 def in_words(pitchfork: TurningTask, hopf: TurningTask) -> str:
     """Minimum of every criterion with both strategies, with the words lower, higher or undecided for the pitchfork."""
     ours, theirs = minima(pitchfork.criteria)["mean"], minima(hopf.criteria)["mean"]
     parts = []
-    for name, apart in differences(pitchfork, hopf).items():
+    for name, compared in comparisons(pitchfork, hopf).items():
         factor, unit = SCALES[name]
         one, two = (factor * float(each.sel(criterion=name)) for each in (ours, theirs))
-        parts.append(f"{CRITERION_NAMES[name]} {one:.3g} against {two:.3g} {unit}: {apart}")
+        parts.append(f"{CRITERION_NAMES[name]} {one:.3g} against {two:.3g} {unit}: {compared.words('lower', 'higher')}")
     return "; ".join(parts)
 
 
 def counted(pitchfork: TurningTask, hopf: TurningTask) -> str:
     """Numbers of minima of the pitchfork that are lower, higher and undecided."""
-    answers = [each.lower for each in differences(pitchfork, hopf).values()]
+    answers = [each.answer for each in comparisons(pitchfork, hopf).values()]
     named = {"lower": True, "higher": False, "undecided": None}
     counts = {word: sum(each is answer for each in answers) for word, answer in named.items()}
     return ", ".join(f"{count} of {len(answers)} {word}" for word, count in counts.items() if count)

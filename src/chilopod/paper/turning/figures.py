@@ -190,7 +190,7 @@ def criteria(found: Turning, letter: str) -> Panel:
         text=(
             _said(found, letter),
             f"ε3 has no clear minimum within this task: from {flat.softest:g} to {flat.stiffest:g}\u00a0{SPRING_UNIT} "
-            "it is the same within two standard errors, because the legs stand at their limit of 5° until the target "
+            "no difference is told, because the legs stand at their limit of 5° until the target "
             "is passed, to whichever side. Integrated until each robot arrives, when its task is done, it is smallest "
             f"at {spring(float(whole['at']), 2)}. A farther target shows a minimum (last figure)."
             if first
@@ -218,7 +218,7 @@ def comparison(found: Turning) -> Panel:
                 True: "Every minimum of the pitchfork is lower, as in the paper.",
                 False: "Not every minimum of the pitchfork is lower, unlike in the paper.",
                 None: "Whether every minimum of the pitchfork is lower, as in the paper, these walks leave open.",
-            }[all_lower(task, found.hopf)],
+            }[all_lower(task, found.hopf).answer],
             f"With uniform springs {ever} of {found.hopf.criteria.arrival.size} walks arrive. Their criteria are "
             f"smallest at {typeset(softest_minima(found.hopf, found.hopf_point)[0])}; there the walks scatter: "
             "how the body swings when it passes the target decides. ε3 tells the two apart least: "

@@ -46,7 +46,7 @@ def _radius(found: Turning, letter: str) -> Row:
         str(task.radius),
         Result(value=radius, unit="m", digits=3),
         task.source,
-        agreement(task.radius.answer(radius)),
+        agreement(task.radius.band.holds(radius)),
         "geometry alone, R/(2 sin ψ)",
     )
 

@@ -99,7 +99,7 @@ def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
     off += [(found.speeds[springs.index(k)] / v - 1.0) / data.tolerance for k, v in data.speeds.items()]
     curved = [springs.index(k) for k in data.curved]
     try:
-        fitted = square_root_fit(1.0 / np.array(data.curved), np.abs(found.bends[curved, 0]), resampled=0).critical
+        fitted = square_root_fit(1.0 / np.array(data.curved), np.abs(found.bends[curved, 0])).critical
     except AnalysisError:
         fitted = 0.5 * data.onset
     off.append((fitted / data.onset - 1.0) / data.tolerance)

@@ -10,7 +10,6 @@ from chilopod.paper import printed
 from chilopod.paper.measures import spring_for
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.scatter import SURE
 from chilopod.paper.statements import listed
 from chilopod.paper.turning import figures as planar
 from chilopod.paper.turning.criteria import in_words, saturation
@@ -55,7 +54,7 @@ def turning(found: RobotTurning) -> Panel:
 def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Panel:
     """Fig. "turning" E and "another"."""
     task, paper = found.tasks[letter], printed.TASKS[letter].k_hat.value
-    own = spring_for(walks.base, task.target.radius)[0] if walks else float("nan")
+    own = spring_for(walks.base, task.target.radius).value if walks else float("nan")
     k_hat = own if np.isfinite(own) else paper
     return Panel(
         name=f"robot-criteria-{letter.lower()}",
@@ -103,7 +102,8 @@ def comparison(found: RobotTurning, hopf: TurningTask) -> Panel:
         text=(
             "Task A with all springs alike, the paper's five values, at the same time and with the same disturbances. "
             f"At best, pitchfork against Hopf: {typeset(in_words(task, hopf))}. In the paper all three are "
-            f"lower for the pitchfork. {SURE:g} standard errors of the difference, seed by seed, decide here. The "
+            "lower for the pitchfork. The t test of the differences, seed by seed, decides here, and counts how many "
+            "springs are no worse than the best. The "
             f"third says little where it is nearly saturated: {typeset(saturation(task, hopf))}.",
         ),
         data=planar.both_strategies(task, hopf),

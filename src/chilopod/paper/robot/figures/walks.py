@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 
 from chilopod.paper import printed, shapes, statements
 from chilopod.paper.equal_distance import onset_of_bend
-from chilopod.paper.measures import onset_with_error, radius_at
+from chilopod.paper.measures import onset_point, radius_at
 from chilopod.paper.robot.rows import duration_rows
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.scatter import means
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
+from chilopod.statistics import means
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
 
 _THREE = (style.Layout("AB;CC", 7.6), style.Layout("A;B;C", 12.6))
@@ -46,7 +46,7 @@ def walks(found: RobotWalks) -> Panel:
     here = is_curved(base)
     lefts, rights = (int((base.direction == side).sum()) for side in ("left", "right"))
     unsettled = int((base.moved.values > 0.1).sum())
-    said = f"{number(fit.critical, 3)} ± {number(fit.bootstrap_error, 1)}" if fit else "no point"
+    said = f"{number(fit.critical, 3)} ± {number(fit.estimate.error, 1)}" if fit else "no point"
     straight, curved = found.examples.spring.values
     return Panel(
         name="robot-walks",
@@ -95,7 +95,7 @@ def different(found: RobotWalks, uniform: xr.Dataset) -> Panel:
     """The paper's Fig. "different"."""
     said = []
     for title, (name, data) in _variants(found).items():
-        point, paper = onset_with_error(data)[0], printed.onset(name).value
+        point, paper = onset_point(data).value, printed.onset(name).value
         said.append(f"{typeset(title)} {number(point, 3) if np.isfinite(point) else 'none'} (robot: {paper:g})")
     return Panel(
         name="robot-different",
@@ -193,7 +193,8 @@ def _draw_different(found: RobotWalks, uniform: xr.Dataset, narrow: bool) -> Fig
     figure, axes = style.figure(*_THREE, narrow)
     for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=False):
         inverse = 1.0 / data.spring.values
-        radius, error = np.array([radius_at(data, float(spring)) for spring in data.spring.values]).T
+        found_here = [radius_at(data, float(spring)) for spring in data.spring.values]
+        radius, error = np.array([(each.value, each.error) for each in found_here]).T
         away = inverse - 1.0 / onset_of_bend(data)
         for letter, place, shown in (("A", inverse, inverse > 0.0), ("B", away, away > 0.0)):
             points = place[shown], radius[shown], error[shown]
@@ -211,8 +212,8 @@ def _draw_different(found: RobotWalks, uniform: xr.Dataset, narrow: bool) -> Fig
 
 def _draw_onsets(axes: Axes, found: RobotWalks, uniform: xr.Dataset) -> None:
     found_at = [
-        ("base series (fitted)", printed.ONSET, onset_with_error(found.base)[0]),
-        *((title, printed.onset(name), onset_with_error(data)[0]) for title, (name, data) in _variants(found).items()),
+        ("base series (fitted)", printed.ONSET, onset_point(found.base).value),
+        *((title, printed.onset(name), onset_point(data).value) for title, (name, data) in _variants(found).items()),
         ("all springs alike", printed.UNIFORM, uniform.attrs["critical_k"]),
     ]
     shapes.draw_bands(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
