@@ -137,11 +137,17 @@ _SYMMETRIES = {
 }
 
 
-@functools.lru_cache
-def _waves(n: int) -> Array:
-    """Displacements of all sizes, two of each, shape (n, 2 sizes)."""
-    waves = np.cos(3.0 * np.arange(n)[:, None] + np.arange(1.0, 3.0))
-    return read_only((waves[:, None] * np.array(SIZES)[:, None]).reshape(n, -1))
+@functools.lru_cache(maxsize=16)
+def _compared(matrix: bytes, shift: float, times: bytes, base: bytes, period: float) -> tuple[Array, Array]:
+    """Times and states at which a symmetry is tested, states of all sizes at every time, and then their images, which
+    are the same for all systems of a family."""
+    origin, some = np.frombuffer(base), np.frombuffer(times)
+    n = origin.size
+    waves = np.cos(3.0 * np.arange(n)[:, None] + np.arange(1.0, 3.0))[:, None] * np.array(SIZES)[:, None]
+    x = np.tile(origin[:, None] + waves.reshape(n, -1), some.size)
+    t = np.repeat(some, x.shape[1] // some.size)
+    images = np.frombuffer(matrix).reshape(n, n) @ x
+    return read_only(np.concatenate([t, (t + shift) % period])), read_only(np.concatenate([x, images], axis=1))
 
 
 def check_symmetry(
@@ -149,10 +155,9 @@ def check_symmetry(
 ) -> None:
     """Test S f(t, x) = f(t + shift, S x) at some times, modulo the period, and states of all sizes: a wrong symmetry
     would give wrong multipliers without an error. A period is the symmetry S = 1 with itself as the shift."""
-    x = np.tile(base[:, None] + _waves(base.size), times.size)
-    t = np.repeat(times, x.shape[1] // times.size)
-    both = slopes(np.concatenate([t, (t + shift) % period]), np.concatenate([x, matrix @ x], axis=1))
-    here, there = both[:, : t.size], both[:, t.size :]
+    t, x = _compared(matrix.tobytes(), shift, times.tobytes(), base.tobytes(), period)
+    both, half = slopes(t, x), t.size // 2
+    here, there = both[:, :half], both[:, half:]
     off = np.abs(matrix @ here - there)
     if np.isfinite(off).all() and (off <= _SAME * np.abs(there)).all():
         return
@@ -162,11 +167,11 @@ def check_symmetry(
     largest = np.where(np.isfinite(terms), terms, 0.0).reshape(alike).max(axis=(1, 3), keepdims=True)
     wrong = (off.reshape(alike) > _SAME * largest).reshape(off.shape)
     if shift > 0.0:  # a right-hand side may be round-off of terms that cancel
-        wrong &= off > _NEGLIGIBLE / shift * np.abs(x).max(axis=0)
+        wrong &= off > _NEGLIGIBLE / shift * np.abs(x[:, :half]).max(axis=0)
     wrong = wrong.any(axis=0)
     if wrong.any():
         what, allowed = _SYMMETRIES[field]
-        said = f"must be a {what} of the right-hand side, but fails at t = {t[wrong][0]:g}"
+        said = f"must be a {what} of the right-hand side, but fails at t = {t[:half][wrong][0]:g}"
         raise ParameterError(said, field=field, value=shift if field == "period" else None, allowed=allowed)
 
 

@@ -56,16 +56,12 @@ def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[floa
     return [(a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b > a]
 
 
-def carry_all(carry: Callable[[int], None], count: int, fewest: int) -> None:
-    """Call a function for all numbers below ``count``, in several threads if each has at least ``fewest`` of them."""
-
-    def carry_some(numbers: range) -> None:
-        for i in numbers:
-            carry(i)
-
+def carry_all(carry: Callable[[slice], None], count: int, fewest: int) -> None:
+    """Call a function for all of a number of states, in several threads if each has at least ``fewest`` of them."""
     threads = min(cores(), count // fewest)
     if threads > 1:
+        borders = [count * i // threads for i in range(threads + 1)]
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(carry_some, (range(first, count, threads) for first in range(threads))))
+            list(pool.map(carry, map(slice, borders[:-1], borders[1:])))
     else:
-        carry_some(range(count))
+        carry(slice(0, count))

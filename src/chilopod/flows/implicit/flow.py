@@ -77,8 +77,9 @@ class ImplicitFlow(ReadOnlyArrays):
         """Many states, shape (states, n), without derivatives."""
         states, stop = np.array(states, dtype=np.float64), deadline.stop()
 
-        def carry(i: int) -> None:
-            states[i] = self._run(states[i], (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
+        def carry(some: slice) -> None:
+            for x in states[some]:
+                x[:] = self._run(x, (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
 
         carry_all(carry, len(states), _FEWEST_PER_THREAD)
         return states

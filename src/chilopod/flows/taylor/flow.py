@@ -1,11 +1,7 @@
 """Flows of taped right-hand sides by Taylor series, in compiled code that all tapes share.
 
 A :class:`TaylorFlow` holds a tape (:func:`chilopod.flows.tracing.trace.trace`) and the limits of its steps; the
-values of the parameters are an argument of every call, so one object serves a whole family::
-
-    traced = trace(rhs, n, args, events=[(guard, reset)])
-    flow = TaylorFlow(traced.tape, edges=(0.0, T), period=T, directions=(-1.0,))
-    state, derivative, bound, steps = flow.advance(x, t0, t1, traced.params, bounded=True)
+values of the parameters are an argument of every call, so one object serves a whole family.
 
 Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
 Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0; the
@@ -18,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,12 +81,8 @@ class TaylorFlow:
 
         The bound sums round-off and the last terms of each step, carried by the derivatives of the steps, scaled to
         many times the usual difference from a second computation (of another order with other steps, disturbed by
-        several times round-off), and adds several times the own difference of each entry.
-
-        Raises
-        ------
-        AnalysisError
-            If the motion does not reach t1: it diverges, slides, chatters, grazes, or takes too many steps.
+        several times round-off), and adds several times the own difference of each entry. Raises an AnalysisError if
+        the motion does not reach t1: it diverges, slides, chatters, grazes, or takes too many steps.
         """
         n = self.tape.dimension
         # Copies, because numba would compile again for read-only arrays.
@@ -125,8 +117,8 @@ class TaylorFlow:
         states, params = np.array(states, dtype=np.float64, order="C"), np.array(params, dtype=np.float64)
         none, stop = np.empty((self.tape.dimension, 0)), deadline.stop()
 
-        def carry(i: int) -> None:
-            self._run(states[i], (t0, t1), params, none, stop=stop)
+        def carry(some: slice) -> None:
+            self._run(states[some], (t0, t1), params, none, stop=stop)
 
         carry_all(carry, len(states), _FEWEST_PER_THREAD)
         return states
@@ -143,11 +135,14 @@ class TaylorFlow:
         stepwise: bool = True,
         stop: Array | None = None,
     ) -> int:
-        """Carry state, derivative and bound in place, by the second computation if ``other``; return the steps."""
-        kernels = _compiled()
+        """Carry one state, or several without derivatives, derivative and bound in place, by the second computation if
+        ``other``; return the steps of one."""
+        from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
+
+        carry = kernels.advance if x.ndim == 1 else kernels.advance_each
         stop = deadline.stop() if stop is None else stop
         n, parameters = self._shape
-        if not (x.shape == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
+        if not (x.shape[-1:] == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
             # Compiled code would read out of bounds.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         report, steps = np.zeros(2), 0
@@ -156,7 +151,7 @@ class TaylorFlow:
         outcome = kernels.Outcome(derivative, bound, report)
         clock = self._clock(params.tobytes())
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
-            status = kernels.advance(self.tape, self._directions, clock, params, x, span, control, outcome)
+            status = carry(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:
                 raise failure(status, report[1])
             steps += int(report[0])
@@ -171,11 +166,3 @@ class TaylorFlow:
         values = evaluate(tape, tape.clocks, times, anywhere, np.frombuffer(params))
         values = np.where(np.isfinite(values), values, 0.0)
         return np.ascontiguousarray(np.column_stack([values, np.abs(values).max(axis=1)])), self.period
-
-
-@functools.cache
-def _compiled() -> Any:
-    # numba takes half a second to import, and only integration needs it.
-    from chilopod.flows.taylor import stepping
-
-    return stepping

@@ -249,14 +249,10 @@ def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: Any, control: Any, outcome: Any) -> int:
-    """Carry a state x, shape (n,), over an interval from the start to the end of a span in place; return the status.
+    """Carry a state x, shape (n,), from the start to the end of a span in place; return the status.
 
-    Parameters
-    ----------
-    directions
-        Directions of the events; None for a tape without switches, whose code is then not compiled.
-    clock
-        Functions of time on a grid over the period, each with its largest modulus last, and the period.
+    The ``directions`` of the events are None for a tape without switches, whose code is then not compiled; a ``clock``
+    has functions of time on a grid over the period, each with its largest modulus last, and the period.
     """
     t0, t1 = span
     n, order, switches = tape.layout[0], control.order, tape.switches.shape[1]
@@ -315,3 +311,15 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         _absorb(block, in_block, outcome.derivative, outcome.bound)
     outcome.report[0], outcome.report[1] = steps, t
     return status
+
+
+@fused_njit(error_model="numpy", nogil=True)
+def advance_each(
+    tape: Any, directions: Any, clock: Any, params: Any, states: Any, span: Any, control: Any, outcome: Any
+) -> int:
+    """Carry several states, shape (states, n), without derivatives; return the first status that is not DONE."""
+    for i in range(states.shape[0]):
+        status = advance(tape, directions, clock, params, states[i], span, control, outcome)
+        if status != DONE:
+            return status
+    return DONE

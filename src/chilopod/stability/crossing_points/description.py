@@ -34,7 +34,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event
 
 _EPSILON = float(np.finfo(float).eps)
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
-_SETTLED = 1e-9  # change of the mean from half as many parts; its error is about the square of that
+_SETTLED = 1e-7  # change of the mean from half as many parts; its error is about the square of that
 
 
 def described(
@@ -94,18 +94,27 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
     """Root mean square of a mode over a return, across the motion; 1 for a given period, which fixes time 0."""
     if not is_autonomous(system):
         return 1.0
-    before, parts, duration = 0.0, _FEWEST_PARTS, orbit.period / orbit.image.returns
+    moves: list[tuple[Array, ComplexArray]] = [(orbit.state, mode)]
+    duration = orbit.period / orbit.image.returns
+
+    def carried(x: Array, v: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
+        x, derivative = system.flow(np.array(x), 0.0, part * duration)
+        return x, derivative @ v
+
+    def square(x: Array, v: ComplexArray) -> float:
+        velocity = np.asarray(system.velocity(np.array(x)))
+        across = v - velocity * (velocity @ v) / (velocity @ velocity)
+        return float(np.vdot(across, across).real)
+
+    for _ in range(_FEWEST_PARTS - 1):
+        moves.append(carried(*moves[-1], 1.0 / _FEWEST_PARTS))
+    mean = float(np.mean([square(*move) for move in moves]))
     while True:
-        x, v, squares = orbit.state, mode, []
-        for _ in range(parts):
-            x, derivative = system.flow(np.array(x), 0.0, duration / parts)
-            velocity, v = np.asarray(system.velocity(np.array(x))), derivative @ v
-            across = v - velocity * (velocity @ v) / (velocity @ velocity)
-            squares.append(float(np.vdot(across, across).real))
-        mean = float(np.mean(squares))
-        if abs(mean - before) <= _SETTLED * mean or parts >= _MOST_PARTS:
+        between = [carried(*move, 0.5 / len(moves)) for move in moves]
+        before, mean = mean, 0.5 * (mean + float(np.mean([square(*move) for move in between])))
+        moves = [move for pair in zip(moves, between, strict=True) for move in pair]
+        if abs(mean - before) <= _SETTLED * mean or len(moves) >= _MOST_PARTS:
             return float(np.sqrt(mean))
-        before, parts = mean, 2 * parts
 
 
 def _formed(

@@ -37,6 +37,7 @@ from chilopod.stability.problem.returns import (
     Section,
     carried,
     in_parts,
+    on_section,
     return_duration,
     return_map,
     section_at,
@@ -312,25 +313,29 @@ def _solved(
     if len(start.states) > 1:  # all nodes give better sizes than the first one
         largest = np.abs(start.states).max(axis=0)
         size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
-    found = shot(
-        lambda _: system, start, size, section, shared=_shared(system, x, size), budget=budget, careful=careful
-    )
-    x, duration = found.nodes.states[0], found.nodes.duration
-    if with_error or is_autonomous(system):
-        return _found(system, x, duration, found.sizes, with_error)
-    count = returns_per_period(system)
-    image = ReturnMap(found.end, found.jacobian, np.nan, count, count * duration)
-    return Orbit(x, image, np.full(x.size, np.nan))
+    shared = _shared(system, x, size)
+    found = shot(lambda _: system, start, size, section, None, shared, budget, careful)
+    end = found.end, found.jacobian
+    return _found(system, found.nodes.states[0], found.nodes.duration, found.sizes, with_error, end)
 
 
-def _found(system: SystemLike, x: Array, duration: float, size: Array, with_error: bool) -> Orbit:
-    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states."""
+def _found(
+    system: SystemLike, x: Array, duration: float, size: Array, with_error: bool, end: tuple[Array, Array] | None = None
+) -> Orbit:
+    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states. The end
+    of a return there may be given, with its derivative without the change of the time."""
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         return _bounded(system, x, duration)
-    image = return_map(system, x, False, section_at(system, x, duration=duration))
+    section, count = section_at(system, x, duration=duration), returns_per_period(system)
+    if end is None:
+        image = return_map(system, x, False, section)
+    elif section is not None and is_autonomous(system):
+        image = on_section(system, section, *end, duration)
+    else:
+        image = ReturnMap(*end, np.nan, count, count * duration)
     return Orbit(x, image, np.full(x.size, np.nan))
 
 

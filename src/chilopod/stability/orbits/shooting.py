@@ -8,13 +8,14 @@ Problems*, section 4.3), the time to that at which the return ends on the sectio
 
 from __future__ import annotations
 
-import contextlib
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dgesv
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
@@ -39,8 +40,7 @@ _GROWTH = 4.0  # approximate growth of a deviation from one node to the next
 _MOST = 32
 
 
-@dataclass(frozen=True)
-class Nodes(ReadOnlyArrays):
+class Nodes(NamedTuple):
     """States at instants that divide a return evenly, shape (m, n), the first at time 0, the time of the return,
     and the value of the parameter."""
 
@@ -121,7 +121,7 @@ def shot(
                 return (equations if free is not None else equations.cleared()).closed()
             if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
                 break
-            strays += equations.astray
+            strays += equations.frame.astray
             if strays > _STRAYS:
                 break
             best = min(best, equations.residual)
@@ -171,8 +171,7 @@ class _Correction(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """Frame of a correction: sizes of the states, before and after it, shape (n,) both, the section of the first one,
-    and a flag for a motion that does not return to it."""
+    """Sizes of the states before and after a correction, the first one's section, and if the motion misses it."""
 
     sizes: Array
     reach: Array
@@ -188,21 +187,22 @@ class _Equations:
             problem.budget.take()
         self._problem, self.nodes, free = problem, nodes, problem.free
         system = problem.system_at(nodes.value)
-        # Flows between the nodes, and derivatives by the time of a return and by the parameter.
         m, n = nodes.states.shape
-        self._ends, self._factors = np.empty((m, n)), np.empty((m, n, n))
-        self._by_time, self._by_value = np.zeros((m, n)), np.zeros((m, n))
+        # Flows between the nodes, and their derivatives by the state, the time of a return and the parameter, beside
+        # the distance from the next node.
+        self._ends, self._linear = np.empty((m, n)), np.zeros((m, n, n + 3))
         self._returned = False
         if free is None and m == 1 and frame.section is not None and is_autonomous(system):
             frame = self._to_section(system, frame)
         else:
             self._to_nodes(system)
         if is_autonomous(system):
-            self._by_time = np.array([system.velocity(np.array(end)) for end in self._ends]) / m
+            self._linear[:, :, n] = [system.velocity(np.array(end)) for end in self._ends]
+            self._linear[:, :, n] /= m
         if system.symmetry is not None:
-            for last in (self._ends, self._factors, self._by_time, self._by_value):
-                last[-1] = system.symmetry @ last[-1]
-        self._off = self._ends - (nodes.states if m == 1 else np.roll(self.nodes.states, -1, axis=0))
+            self._ends[-1], self._linear[-1] = system.symmetry @ self._ends[-1], system.symmetry @ self._linear[-1]
+        self._off = self._ends - (nodes.states if m == 1 else np.roll(nodes.states, -1, axis=0))
+        self._linear[:, :, -1] = self._off
         sizes, x = frame.sizes, nodes.states[0]
         if free is None and x.any():
             sizes = np.maximum(sizes, np.maximum(np.abs(nodes.states), np.abs(self._ends)).max(axis=0))
@@ -212,28 +212,23 @@ class _Equations:
             moved = (np.append(x, nodes.value) - free.start) / np.append(sizes, free.scale)
             self._missing = float(free.row @ moved - free.target)
         self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
-        self._frame = frame._replace(sizes=sizes, reach=np.minimum(sizes, frame.reach))
-        if not np.isfinite(self.residual):
+        self.frame = _Frame(sizes, np.minimum(sizes, frame.reach), frame.section, frame.astray)
+        if not math.isfinite(self.residual):
             lost = np.flatnonzero(~np.isfinite(self._ends).all(axis=1))
             where = f"node {lost[0]} of {m}: " if lost.size else ""
             raise AnalysisError(f"{where}the motion is not finite between two nodes", field="orbit")
 
-    @property
-    def astray(self) -> bool:
-        """True if the motion does not come back to the section."""
-        return self._frame.astray
-
     def _to_nodes(self, system: SystemLike) -> None:
         """Carry every node to the next one."""
-        m, value = len(self.nodes.states), self.nodes.value
+        (m, n), value = self.nodes.states.shape, self.nodes.value
         part, beside = self.nodes.duration / m, self._problem.beside(value)
         for i, x in enumerate(self.nodes.states):
             a, b = (0.0, part) if is_autonomous(system) else (i * part, (i + 1) * part)
             try:
-                self._ends[i], self._factors[i] = checked_flow(system, x, a, b)
+                self._ends[i], self._linear[i, :, :n] = checked_flow(system, x, a, b)
                 if beside is not None:
                     with np.errstate(all="ignore"):  # values that are not finite are refused later
-                        self._by_value[i] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
+                        self._linear[i, :, n + 1] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
             except AnalysisError as error:
                 if m == 1 or isinstance(error, SpentError):
                     raise
@@ -249,36 +244,38 @@ class _Equations:
                 near = replace(frame.section, duration=duration)
                 start, rest, (before, first) = crossing(system, x, near, functools.partial(checked_flow, system))
                 self._ends[0], second = checked_flow(system, before, 0.0, rest)
-                self._factors[0] = second @ first
-                self.nodes, self._returned = replace(self.nodes, duration=start + rest), True
+                self._linear[0, :, : x.size] = second @ first
+                self.nodes, self._returned = self.nodes._replace(duration=start + rest), True
                 return frame
             except AnalysisError as error:
                 if not self._problem.careful or isinstance(error, SpentError):
                     raise
-        self._ends[0], self._factors[0] = checked_flow(system, x, 0.0, duration)
+        self._ends[0], self._linear[0, :, : x.size] = checked_flow(system, x, 0.0, duration)
         return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
 
     def _totals(self, off: Array) -> list[Array]:
-        """Each later node as a linear function of first state, time, parameter, and 1, shape (n, n+3)."""
-        n = off.shape[1]
-        total = np.eye(n, n + 3)
-        totals = [total]
-        for factor, by_time, by_value, each in zip(self._factors, self._by_time, self._by_value, off, strict=True):
-            total = factor @ total
-            total[:, n:] += np.stack([by_time, by_value, each], axis=1)
+        """The node after each as a linear function of first state, time, parameter, and 1, shape (n, n+3)."""
+        own, n = self._linear, off.shape[1]
+        if off is not self._off:
+            own = own.copy()
+            own[:, :, -1] = off
+        totals = [own[0]]
+        for each in own[1:]:
+            total = each[:, :n] @ totals[-1]
+            total[:, n:] += each[:, n:]
             totals.append(total)
         return totals
 
     def closed(self) -> Closed:
         """The nodes as a solution."""
         total, n = self._totals(self._off)[-1], self._off.shape[1]
-        return Closed(self.nodes, self._frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
+        return Closed(self.nodes, self.frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
 
     def correction(self, other: _Equations, cutoff: float) -> _Correction:
         """Correction by these linear equations for the residual here or at other nodes."""
-        section, free, sizes = self._frame.section, self._problem.free, self._frame.sizes
+        section, free, sizes = self.frame.section, self._problem.free, self.frame.sizes
         n, totals = sizes.size, self._totals(other._off)
-        last, time = totals[-1], np.zeros(n + 3)
+        last, time = totals[-1], None
         if section is not None:  # the time of the return to it
             speed = float(section.normal @ last[:, n])
             if speed == 0.0:
@@ -287,27 +284,32 @@ class _Equations:
             time[n] = 0.0
             time[n + 2] -= other._across / speed
             last = last + np.outer(last[:, n], time)
-        matrix, right = (last[:, :n] - np.eye(n)) * sizes / sizes[:, None], -last[:, n + 2] / sizes
+        matrix, right = last[:, :n] * sizes / sizes[:, None], -last[:, n + 2] / sizes
+        matrix.flat[:: n + 1] -= 1.0
         if free is not None:
             by_value = last[:, n + 1] * free.scale / sizes
             matrix = np.block([[matrix, by_value[:, None]], [free.row[None]]])
             right = np.append(right, -other._missing)
         move = _solution(matrix, right, cutoff, self._problem.shared, sizes)
-        value = 0.0 if free is None else float(move[n]) * free.scale
-        every = np.concatenate([sizes * move[:n], [0.0, value, 1.0]])
-        if not self._returned:  # else the next node determines it
+        every = np.zeros(n + 3)
+        every[:n], every[-1] = sizes * move[:n], 1.0
+        if free is not None:
+            every[n + 1] = move[n] * free.scale
+        if time is not None and not self._returned:  # else the next node determines it
             every[n] = time @ every
-        return _Correction(np.array([total @ every for total in totals[:-1]]), float(every[n]), value)
+        states = np.array([every[:n], *(total @ every for total in totals[:-1])])
+        return _Correction(states, float(every[n]), float(every[n + 1]))
 
     def after(self, correction: _Correction, part: float) -> _Equations | None:
         """The equations after that part of a correction, or less if states or the time would change much; None if the
         motion ends before, for a given parameter."""
         here = self.nodes
         part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
-        frame = self._frame
+        frame = self.frame
         farthest = _FARTHEST
         if frame.astray:
-            farthest = _CAREFUL * min(1.0, float(np.linalg.norm(self._by_time[0] * here.duration / frame.sizes)))
+            motion = self._linear[0, :, -3] * here.duration / frame.sizes
+            farthest = _CAREFUL * min(1.0, float(np.linalg.norm(motion)))
         part = min(part, farthest / max(float(np.abs(correction.states / frame.reach).max()), 1e-300))
         there = Nodes(
             here.states + part * correction.states,
@@ -327,26 +329,26 @@ class _Equations:
         """True if other equations, after part of a correction, have half the residual, or a smaller correction by the
         linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3); without a return, where
         steps are short, if their residual is not much larger than the best."""
-        if self.astray:
+        if self.frame.astray:
             return there.residual <= 2.0 * best
-        if float(np.abs(there._off / self._frame.sizes).max()) <= 0.5 * self.residual:
+        if float(np.abs(there._off / self.frame.sizes).max()) <= 0.5 * self.residual:
             return True
         before, left = self._length(correction), self._length(self.correction(there, cutoff))
         return left <= max((1.0 - 0.25 * part) * before, NODES.settled)
 
     def _length(self, correction: _Correction) -> float:
-        states = float(np.abs(correction.states / self._frame.sizes).max())
+        states = float(np.abs(correction.states / self.frame.sizes).max())
         return max(states, abs(correction.duration) / self.nodes.duration)
 
     def cleared(self) -> _Equations:
         """The orbit with the negligible states of its first node set to zero, if it remains an orbit. A remainder of
         the guess would count as the size of the orbit."""
         x = self.nodes.states[0]
-        small = (x != 0.0) & (np.abs(x) <= _NOTHING * self._frame.sizes)
+        small = (x != 0.0) & (np.abs(x) <= _NOTHING * self.frame.sizes)
         if not small.any():
             return self
         states = np.vstack([np.where(small, 0.0, x), self.nodes.states[1:]])
-        there = _Equations(self._problem, replace(self.nodes, states=states), self._frame)
+        there = _Equations(self._problem, self.nodes._replace(states=states), self.frame)
         return there if there.residual <= max(RETURN.round_off, self.residual) else self
 
 
@@ -358,10 +360,9 @@ def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, 
         return np.asarray(basis @ _solution(basis.T @ matrix @ basis, basis.T @ right, cutoff, None, sizes))
     try:
         if cutoff == _SINGULAR:
-            with contextlib.suppress(np.linalg.LinAlgError):
-                regular = np.linalg.solve(matrix, right)
-                if np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
-                    return np.asarray(regular)
+            _, _, regular, singular = dgesv(matrix, right)
+            if not singular and np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
+                return np.asarray(regular)
         return np.asarray(np.linalg.lstsq(matrix, right, rcond=cutoff)[0])
     except np.linalg.LinAlgError:
         raise AnalysisError("the equations of the orbit's nodes have no solution", field="orbit") from None

@@ -38,6 +38,7 @@ from chilopod.stability.problem.scales import sizes
 _APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from which the crossing is corrected
 _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
 _CROSSING_ROUNDS = 30
+_LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
 
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
@@ -206,8 +207,6 @@ def _period(system: SystemLike) -> float:
 
 def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: Section | None) -> ReturnMap:
     assert section is not None
-    count = returns_per_period(system)
-    turn = np.eye(x.size) if system.symmetry is None else system.symmetry
     start, rest, first = crossing(system, x, section, functools.partial(checked_flow, system))
     error: float | Array = np.nan
     if with_error:
@@ -215,16 +214,23 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
     else:
         state, second = checked_flow(system, first[0], 0.0, rest)
         jacobian = second @ first[1]
-    state, jacobian = turn @ state, turn @ jacobian
+    if system.symmetry is not None:
+        state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
+    return on_section(system, section, state, jacobian, start + rest, error)
+
+
+def on_section(
+    system: Autonomous, section: Section, state: Array, jacobian: Array, duration: float, error: float | Array = np.nan
+) -> ReturnMap:
+    """The return map to a section from a return to it within its duration, and from the derivative over this
+    duration; ``error`` bounds that of the flow without the symmetry."""
     velocity = _velocity(system, state)
-    across = np.eye(x.size) - np.outer(velocity, section.normal) / float(section.normal @ velocity)
-    if isinstance(error, np.ndarray):
-        error = np.abs(across) @ np.abs(turn) @ error
-    elif with_error:
-        error = float(error) * float(np.abs(across @ turn).sum(axis=1).max())
+    across = np.eye(state.size) - np.outer(velocity, section.normal) / float(section.normal @ velocity)
+    turned_across = np.abs(across) if system.symmetry is None else np.abs(across) @ np.abs(system.symmetry)
+    error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())
     _check_finite(state, jacobian)
-    period = count * (start + rest)
-    return ReturnMap(state, across @ jacobian, error, count, period, velocity, section.normal)
+    count = returns_per_period(system)
+    return ReturnMap(state, across @ jacobian, error, count, count * duration, velocity, section.normal)
 
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:
@@ -252,18 +258,15 @@ def crossing(
 def _time_to_section(system: Autonomous, before: Array, section: Section, rest: float) -> float | None:
     """Remaining time of a state near its return to the section, by Newton's method; None if it does not arrive, has
     passed it or crosses it backwards."""
-    best = np.inf
     for _ in range(_CROSSING_ROUNDS):
         state = turned(system, carried(system, before[None], 0.0, rest))[0]
         speed = float(section.normal @ _velocity(system, state))
         off = float(section.normal @ (state - section.point))
         if speed == 0.0 or not np.isfinite(off):
             return None
-        move = abs(off / speed)
-        if move <= 4e-16 * section.duration or (move <= 1e-10 * section.duration and move >= 0.5 * best):
-            return rest if speed > 0.0 else None
-        best = min(best, move)
         rest -= off / speed
+        if abs(off / speed) <= _LAST_MOVE * section.duration:
+            return rest if speed > 0.0 else None
         if not 0.0 < rest < _FARTHEST * section.duration:
             return None
     return None

@@ -38,8 +38,7 @@ class Plane(NamedTuple):
 
 @dataclass(frozen=True)
 class Corrected(Generic[R]):
-    """A solution: displacement, result of the evaluation there, values of the parameters, residual, inverse of the
-    matrix, and number of corrections."""
+    """A solution, with the residual and the inverse of the matrix there."""
 
     moved: Array
     found: R

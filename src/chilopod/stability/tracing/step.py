@@ -49,8 +49,7 @@ class Guess(NamedTuple):
 
 
 def predicted(anchor: Anchor, size: float) -> Guess:
-    """Predicted end of a step of some size: by the cubic through the last two points along their tangents, and the
-    straight line through their matrices; by the tangent and the matrix of a single point."""
+    """Predicted end of a step: by the cubic and the line through the last two points, or by the tangent of one."""
     tangent, matrix, before = anchor.tangent, anchor.matrix, anchor.before
     if before is None:
         return Guess(size * tangent, matrix)

@@ -32,25 +32,11 @@ def trace(
     look: Callable[[Step[A, S], Ending | None], tuple[F, Ending | None]],
     keep: Callable[[F, int], None],
 ) -> tuple[Ending, str, float]:
-    """Follow a curve.
+    """Follow a curve from its first point; return the ending, the reason if it was lost, and the size of the next step.
 
-    Parameters
-    ----------
-    equations, anchor
-        Curve, and its first point.
-    sizes
-        First and longest step.
-    points
-        Largest number of steps; None for any number.
-    look
-        Function ``look(step, ending)`` that finds the events within a step, and the ending if the curve ends there; it
-        raises a ChilopodError if a shorter step may succeed.
-    keep
-        Function ``keep(found, count)`` that receives the events of the accepted step with number ``count``.
-
-    Returns
-    -------
-    The ending, the reason if the curve was lost, and the size of the next step.
+    The ``sizes`` are the first and the longest step, ``points`` the largest number of steps, None for any.
+    ``look(step, ending)`` finds the events within a step, and the ending if the curve ends there, or raises a
+    ChilopodError if a shorter step may succeed; ``keep(found, count)`` receives the events of accepted step ``count``.
     """
     longest = sizes[1]
     size = min(sizes)
