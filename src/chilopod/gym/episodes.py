@@ -56,12 +56,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Moment:
-    """Poses of a batch at the end of a step, for pictures: x, y and heading of module 1 (m, m, rad), joint angles and
-    leg yaw (rad), and positions of the targets (m), each of shape (robots, ...)."""
+    """A batch at the end of a step, for pictures: x, y and heading of module 1 (m, m, rad), joint angles and leg yaw
+    (rad), stiffness of the springs (N·m/rad), and positions of the targets (m), each of shape (robots, ...)."""
 
     pose: Array
     joint_angles: Array
     leg_yaw: Array
+    stiffness: Array
     aims: Array
 
 
@@ -234,7 +235,7 @@ class Episodes:
         if self._ended.any():
             walk.halt(self._ended)
         if self.moments is not None:
-            self.moments.append(Moment(pose, seen.joint_angles, seen.leg_yaw, aims))
+            self.moments.append(Moment(pose, seen.joint_angles, seen.leg_yaw, seen.stiffness, aims))
         info = {
             "time": (self._cycle - self._since) * self.period,
             "distance": self._away.copy(),

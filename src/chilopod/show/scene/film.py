@@ -260,18 +260,20 @@ class Stage:
         """Panel below a place; sizes in pixels."""
         box = (at[0], at[1] - size[1], *size)
         axes = self.figure.add_axes(tuple(np.array(box) / np.tile(self.size, 2)))
-        return FilmPanel(self, index, axes, size[0] / (self.floor.x1 - self.floor.x0), outcome)
+        zoom, near = size[0] / (self.floor.x1 - self.floor.x0), self.floor if self.follow else None
+        return FilmPanel(self.shown, index, axes, zoom, self.font, outcome, near)
 
 
 class FilmPanel:
-    """One robot on its floor; `zoom` in pixels per metre."""
+    """One robot on its floor, or on the piece of floor ``near`` it that follows it; ``zoom`` in pixels per metre."""
 
-    def __init__(self, stage: Stage, robot: int, axes: Axes, zoom: float, label: Text) -> None:
-        shown, font = stage.shown, stage.font
-        self.shown, self.robot, self.label, self.axes, self.follow = shown, robot, label, axes, stage.follow
+    def __init__(
+        self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text, near: Floor | None = None
+    ) -> None:
+        self.shown, self.robot, self.label, self.axes, self.follow = shown, robot, label, axes, near is not None
         self.outcome, self.outcome_text = shown.outcomes[robot], label.get_text()
         self.rings: list[tuple[Circle, Line2D]] = []
-        self.floor, frames = stage.floor, shown.frames
+        self.floor, frames = near or shown.floor, shown.frames
         axes.set(xticks=[], yticks=[])
         axes.spines[:].set(visible=True, color=COLORS["grid"])
         self.lines = LineCollection([], colors=COLORS["grid"], linewidths=1.0, zorder=0)

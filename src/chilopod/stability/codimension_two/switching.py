@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.frozen import Array, in_one_line
+from chilopod.frozen import Array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Critical, Detector, across
@@ -73,7 +73,7 @@ def switch2(
     box = checked_box(between)
     if not isinstance(point, SpecialPoint2):
         said, allowed = "must be a point of codimension two", "one of the `special` points of a curve from `follow2`"
-        raise ParameterError(said, field="point", value=in_one_line(point), allowed=allowed)
+        raise ParameterError(said, field="point", value=point, allowed=allowed)
     kind = _CURVES.get(point.kind)
     if kind is None:
         why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, from which no curve can be followed")
