@@ -139,10 +139,11 @@ class TaylorFlow:
         ``other``; return the steps of one."""
         from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
 
-        carry = kernels.advance if x.ndim == 1 else kernels.advance_each
         stop = deadline.stop() if stop is None else stop
         n, parameters = self._shape
-        if not (x.shape[-1:] == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
+        several = x.ndim == 2 and derivative.shape == (n, 0)
+        fits = x.shape[several:] == derivative.shape[:1] == (n,)
+        if not (fits and params.shape == (parameters,)):
             # Compiled code would read out of bounds.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         report, steps = np.zeros(2), 0
@@ -150,6 +151,7 @@ class TaylorFlow:
         control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
         outcome = kernels.Outcome(derivative, bound, report)
         clock = self._clock(params.tobytes())
+        carry = kernels.advance_each if several else kernels.advance
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
             status = carry(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:

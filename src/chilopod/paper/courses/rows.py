@@ -21,8 +21,9 @@ def percent(share: Interval) -> str:
 
 
 def between(found: Interval, unit: str) -> str:
-    """A number with its interval."""
-    return f"{found.value:.1f} {unit} ({found.low:.1f} to {found.high:.1f})"
+    """A number with its interval, if it is known."""
+    bounds = f"{found.low:.1f} to {found.high:.1f}" if np.isfinite(found.low) else "interval not known"
+    return f"{found.value:.1f} {unit} ({bounds})"
 
 
 def compared_rows(data: xr.Dataset) -> list[Row]:
