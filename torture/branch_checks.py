@@ -330,7 +330,9 @@ def _end(found: Verdict, orbits: Orbits, asked: Drawn, branch: Any, solved: dict
             found.own.append("the end of a closed branch")
             return
         start = orbits.z(first.orbit, first.value, first.period)
-        along = [np.append(orbits.state_after(mine.z, part / 256), mine.z[orbits.n]) for part in range(257)]
+        # Where the end is a bifurcation, this program knows it to the root of its accuracy only.
+        z = mine.z if orbits.free else orbits.z(last.orbit, last.value, last.period)
+        along = [np.append(orbits.state_after(z, part / 256), z[orbits.n]) for part in range(257)]
         off = min(float(np.abs(each - start[: orbits.n + 1]).max()) for each in along[: None if orbits.free else 1])
         if off > (0.05 if orbits.free else 1e-6):
             found.fault("end", f"it says that it closed, {off:.1e} from its start")

@@ -104,6 +104,11 @@ def test_stretches_of_a_branch_end_at_folds():
         "  unstable  0.384900179 to -0.384900179",
         "  stable    -0.384900179 to 1",
     ]
+    # Without a fold, as where a bubble of doubled orbits passes its other end, a stretch may turn back.
+    part = [replace(each, special=None, multipliers=np.array([0.5])) for each in folded().points]
+    part = part[: 1 + max(i for i, each in enumerate(folded().points) if each.special is Kind.FOLD)]
+    (turned,) = (line for line in str(replace(folded(), points=tuple(part))).splitlines() if "  stable" in line)
+    assert turned.startswith("  stable  -1 to 0.384900179 and back to -0.384900179")
     # One that is unstable on both sides of a fold does not go straight from one end to the other.
     off = [replace(each, multipliers=np.append(1.5, each.multipliers)) for each in folded().points]
     assert str(replace(folded(), points=tuple(off))).count("unstable") == 3

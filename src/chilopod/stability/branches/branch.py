@@ -134,7 +134,7 @@ class Branch(Result):
             f"ends: {self.ending.sentence}{f' ({self.reason})' if self.reason else ''}",
             *(["special points:", *rows(special)] if special else ["special points: none"]),
             "stability along it:",
-            *rows((VERDICTS[v], f"{values[a]:.9g} to {values[b]:.9g}") for v, a, b in self._stretches()),
+            *rows((VERDICTS[v], _passed(values[a : b + 1])) for v, a, b in self._stretches()),
             *said(self.remarks),
         ]
 
@@ -353,3 +353,11 @@ def followed(
     ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
+
+
+def _passed(values: list[float]) -> str:
+    """Ends of a stretch, and where it turns back between them."""
+    first, last = values[0], values[-1]
+    turns = [each for each in (min(values), max(values)) if not min(first, last) <= each <= max(first, last)]
+    by = "".join(f" to {each:.9g} and back" for each in turns)
+    return f"{first:.9g}{by} to {last:.9g}"
