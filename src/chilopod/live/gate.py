@@ -115,10 +115,21 @@ class Gate:
 
     def _serve(self, handler: Any, *where: Any, process_request: Any, **how: Any) -> Any:
         self._serves = True
-        how |= {"max_size": _LARGEST, "create_connection": partial(_Guarded, self)}
+        logger = logging.Logger("chilopod.live")
+        logger.addFilter(self._unread)
+        how |= {"max_size": _LARGEST, "create_connection": partial(_Guarded, self), "logger": logger}
         return serve(handler, *where, process_request=partial(self._answer, process_request), **how)
 
     # -- requests
+
+    def _unread(self, record: logging.LogRecord) -> bool:
+        """False for the report of a request that websockets cannot read, such as a POST: it is refused, and counts."""
+        if record.getMessage() != "opening handshake failed":
+            return True
+        error = record.exc_info[1] if record.exc_info else None
+        if not isinstance(error and error.__cause__, EOFError):  # of a browser that opened a connection for later
+            self._refuse("a request that is not one for a page")
+        return False
 
     def _answer(self, answer: Any, connection: ServerConnection, request: Request) -> Response | None:
         host = _only(request.headers.get_all("Host")) or ""

@@ -56,7 +56,8 @@ def trace(
                 shortened = True
                 size *= tolerances.RETRY
                 if size < tolerances.SHORTEST * longest and not equations.budget.spent:
-                    return Ending.LOST, str(error), size
+                    lost = "no orbit is found beside the last one: corrections leave the interval"
+                    return Ending.LOST, lost if isinstance(error, OutsideBoxError) else str(error), size
         if not shortened:  # else the edge of the systems' domain would be met again at once
             few, many = step.corrections <= tolerances.FEW, step.corrections > tolerances.MANY
             size *= tolerances.GROWTH if few else tolerances.FALL if many else 1.0
