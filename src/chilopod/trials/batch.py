@@ -24,7 +24,6 @@ NOT_KEPT = "not kept"
 
 _CHANGES = "an object that its code can reach changes while it steers"
 _KNOWN: dict[str, str] = {}  # findings about controllers, by everything that defines them
-_ALL = slice(None)
 _MOST_BYTES = 256e6
 """Approximate largest size of the records of a batch, bytes."""
 
@@ -126,15 +125,15 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
         data, counts = data.drop_dims(["time", "event"], errors="ignore"), {}
     # Numbering each robot 0 afterwards would take longer than everything else.
     data = data.assign_coords(robot=np.zeros(len(trials), dtype=np.int64))
-    whole, records = {name: (each.dims, each.values) for name, each in data.data_vars.items()}, []
+    records = []
     for index, trial in enumerate(trials):
         own = {"robot": slice(index, index + 1), **{name: slice(count[index]) for name, count in counts.items()}}
-        if counts or not records:  # without times all views have one shape
-            view = data.isel(own, missing_dims="ignore")
-        parts = {name: each[tuple(own.get(over, _ALL) for over in dims)] for name, (dims, each) in whole.items()}
+        record = data.isel(own, missing_dims="ignore")
         # Numbers that lie otherwise in memory are added up in another order: sums have the same bits whether a walk was
         # one of many, alone, or read.
-        record = view.copy(data={name: np.ascontiguousarray(part) for name, part in parts.items()})
+        for each in map(record.variables.__getitem__, record.data_vars):
+            if not each.values.flags.c_contiguous:
+                each.data = np.ascontiguousarray(each.values)
         record.attrs |= {"duration": float(ends[index]), "robot": file_text(trial.robot), "trial": trial.text}
         records.append(record)
     return records

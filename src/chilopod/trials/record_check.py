@@ -102,17 +102,14 @@ def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str
     return ""
 
 
-def _extreme(choose: np.ufunc, each: xr.DataArray) -> float:
-    return float(choose.reduce(each.values, axis=None, initial=0.0))  # much faster than np.abs of it
-
-
 def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> str:
     """Fault of numbers."""
     first, status = trials[0], data["status"].values.tolist()
     if status != [each.label for each in walk.status]:
         return f"status is {status}, which differs from that of the walk"
     for name, each in data.data_vars.items():
-        if name != "status" and not -LARGEST <= _extreme(np.fmin, each) <= _extreme(np.fmax, each) <= LARGEST:
+        ends = (choose.reduce(each.values, axis=None, initial=0.0) for choose in (np.fmin, np.fmax))
+        if name != "status" and max(map(abs, ends)) > LARGEST:
             return f"{name} has numbers beyond {LARGEST:g}"
     there = np.isfinite(data["heading"].values)
     counts = np.where(np.array(status) == Status.WALKED.label, len(there), there.sum(axis=0))
