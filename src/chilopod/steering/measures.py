@@ -51,12 +51,8 @@ def add_measures(data: xr.Dataset, period: float) -> None:
         # The time that other robots of its batch walked on does not count.
         times, told = samples[: counts["time"][robot]], commands[: max(counts["event"][robot], 1)]
         moving = slice(len(times)), robot
-        sums = (
-            _path(times, place[moving], period),
-            (times, efforts[moving]),
-            (times, springs[moving]),
-            (told, drives[: len(told), robot]),
-        )
+        moved = _path(times, place[moving], period), (times, efforts[moving]), (times, springs[moving])
+        sums = *moved, (told, drives[: len(told), robot])
         found[:, robot] = [np.subtract(*np.interp(ends, *so_far)) for so_far in sums]
     units = zip(_UNITS.items(), found, strict=True)
     data.update({f"goal_{name}": (("robot", "goal"), values, {"units": unit}) for (name, unit), values in units})

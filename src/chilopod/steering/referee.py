@@ -129,7 +129,7 @@ class CourseReferee:
         return judged
 
     def _away(self, walk: Walk) -> tuple[Array, Array]:
-        """Poses, and distance of the target, m, shape (robots,), NaN without it or without a walk; the least is kept."""
+        """Poses, and distance of the target, m, shape (robots,), NaN without it or a walk; the least is kept."""
         pose = walk.pose()
         away: Array = np.hypot(*(self._aims - pose[:, :2]).T)
         np.fmin(self._least, away, out=self._least)
