@@ -103,6 +103,8 @@ class Recording:
 
 def as_number(name: str, value: object) -> float:
     """One plain number."""
+    if type(value) is float:
+        return value
     try:
         if np.ndim(value) != 0 or np.asarray(value).dtype.kind not in "fiuO":  # type: ignore[arg-type]
             raise TypeError
@@ -259,13 +261,15 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
         found["distance"] = (("time", "robot"), away, {"units": "m"})
         found["bearing"] = (("time", "robot"), angle, {"units": "rad"})
     data.update(found)
-    failed = np.isnan(data.heading.values)
-    if failed.any():
-        for name, values in data.variables.items():
-            if values.dims[:2] == ("time", "robot") and not np.isnan(values.values[failed]).all():
-                found[str(name)] = (values.dims, values.values.copy(), values.attrs)
-                found[str(name)][1][failed] = np.nan
-        data.update(found)
+    failed = np.flatnonzero(np.isnan(data.heading.values))
+    for name, each in data.variables.items():
+        if each.dims[:2] == ("time", "robot"):
+            rows = each.values.reshape(-1, *each.shape[2:])
+            if not np.isnan(rows[failed]).all():
+                rows = rows.copy()
+                rows[failed] = np.nan
+                found[str(name)] = (each.dims, rows.reshape(each.shape), each.attrs)
+    data.update(found)
 
 
 def spring_work(data: xr.Dataset) -> xr.DataArray:

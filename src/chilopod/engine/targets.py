@@ -55,13 +55,14 @@ class Targets:
         if given.shape not in (shape, (2,)):
             raise ParameterError("has the wrong shape", field="target", value=given.shape, allowed=f"(2,) or {shape}")
         none = np.isnan(given)
-        if np.isinf(given).any() or (none.any(axis=-1) != none.all(axis=-1)).any():
+        if np.isinf(given).any() or (none[..., 0] != none[..., 1]).any():
             raise ParameterError(
                 "must be a finite position", field="target", allowed="x and y in m, or NaN for both without a target"
             )
-        places = np.array(np.broadcast_to(given, shape))
-        if np.array_equal(places, self.present, equal_nan=True):
+        if ((given == self.present) | (none & np.isnan(self.present))).all():
             return
+        places = np.empty(shape)
+        places[:] = given
         self.present, self._given, self._moved = places, True, time > 0.0
         if self._log is not None:
             if not self._moved:

@@ -133,9 +133,8 @@ def foot_slip(models: Sequence[PlanarModel], states: Array, stroke: Array, yaw: 
 
 def front_velocity(states: Array, heading: Array) -> Array:
     """Velocity of module 1 on the axes that its heading is measured from, m/s, shape (..., 2)."""
-    ahead, left = directions(heading)
-    velocity: Array = states[..., :1] * ahead + states[..., 1:2] * left
-    return velocity
+    forward, aside, cos, sin = states[..., 0], states[..., 1], np.cos(heading), np.sin(heading)
+    return np.stack([forward * cos - aside * sin, forward * sin + aside * cos], axis=-1)
 
 
 def _chain_motion(states: Array, modules: int, length: ArrayLike) -> tuple[Array, Array, Array]:

@@ -263,10 +263,10 @@ class PlanarWalk(BatchWalk):
         rate = self._record.rate if self._record else 1.0
         # A sample that follows the present within rounding is taken already, but does not count yet.
         count = min(self._timeline.samples, len(self._record.samples(self._time)) if self._record else 0)
-        states = self._samples.rows[:count].copy() if copy else self._samples.grown(0)[:count]
+        states = self._samples.grown(0)[:count]
         times = np.arange(len(states)) / rate
         leg_yaw = self._actuators.leg_yaw_over(times)
-        data = planar_record(self._models[0], times, states, leg_yaw)
+        data = planar_record(self._models[0], times, states, leg_yaw).copy(deep=copy)
         self._actuators.add_to(data)
         if self._record and self._record.forces:
             acting = self._actuators.leg_yaw_commanded(times)

@@ -13,7 +13,6 @@ from chilopod import units
 from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError, UnitError, nearest_name
 from chilopod.frozen import Array
-from chilopod.kinematics import directions
 from chilopod.record import in_range
 from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
 from chilopod.text_file import read_text
@@ -102,12 +101,13 @@ class Goal:
         return f"{math.degrees(math.atan2(self.y, self.x)):g} deg, {math.hypot(self.x, self.y):g} m"
 
     def place(self, poses: Array) -> Array:
-        """Position on the floor, m, shape (robots, 2), from the poses of module 1 when the goal is set: x, y (m) and
-        heading (rad), shape (robots, 3)."""
+        """Position on the floor, m, shape (..., 2), from the poses of module 1 when the goal is set: x, y (m) and
+        heading (rad), shape (..., 3)."""
         if not self.relative:
-            return np.tile([self.x, self.y], (len(poses), 1))
-        ahead, left = directions(poses[:, 2])
-        return np.asarray(poses[:, :2] + self.x * ahead + self.y * left)
+            return np.tile([self.x, self.y], (*poses.shape[:-1], 1))
+        x, y, heading = poses.T
+        cos, sin = np.cos(heading), np.sin(heading)
+        return np.array([x + self.x * cos - self.y * sin, y + self.x * sin + self.y * cos]).T
 
 
 @dataclass(frozen=True)

@@ -40,58 +40,49 @@ def add_measures(data: xr.Dataset, period: float) -> None:
         Work of joint torques, joint by joint and command by command, where it is positive, J.
     """
     place, yaw, angles = (data[name].values for name in ("position", "leg_yaw", "joint_angle"))
-    springs, torques, seen, commands = (
-        np.broadcast_to(data.stiffness.values, angles.shape),
-        angles[:0],
-        angles[:0],
-        _NONE,
-    )
+    torques, seen, commands = angles[:0], angles[:0], np.zeros(1)
     if "command_torque" in data:
         torques, seen, commands = (data[name].values for name in ("command_torque", "seen_joint_angles", "event"))
     samples, counts = data.time.values, lengths(data)
+    efforts, springs = _effort(samples, yaw), _spring_work(angles, np.broadcast_to(data.stiffness.values, angles.shape))
+    drives = _drive_work(seen, torques)
     found = np.empty((len(_UNITS), *data.goal_end.shape))
-    for robot, (begin, end) in enumerate(zip(data.goal_begin.values, data.goal_end.values, strict=True)):
+    for robot, ends in enumerate(np.stack([data.goal_end.values, data.goal_begin.values], axis=1)):
         # The time that other robots of its batch walked on does not count.
-        moving, commanded = ((slice(counts[name][robot]), robot) for name in ("time", "event"))
-        times = samples[moving[0]]
-        sums = (
-            _path(times, place[moving], period),
-            _effort(times, yaw[moving]),
-            _spring_work(times, angles[moving], springs[moving]),
-            _drive_work(commands[commanded[0]], seen[commanded], torques[commanded]),
-        )
-        found[:, robot] = [np.interp(end, *so_far) - np.interp(begin, *so_far) for so_far in sums]
+        times, told = samples[: counts["time"][robot]], commands[: max(counts["event"][robot], 1)]
+        moving = slice(len(times)), robot
+        moved = _path(times, place[moving], period), (times, efforts[moving]), (times, springs[moving])
+        sums = *moved, (told, drives[: len(told), robot])
+        found[:, robot] = [np.subtract(*np.interp(ends, *so_far)) for so_far in sums]
     units = zip(_UNITS.items(), found, strict=True)
     data.update({f"goal_{name}": (("robot", "goal"), values, {"units": unit}) for (name, unit), values in units})
 
 
-def _so_far(times: Array, steps: Array) -> tuple[Array, Array]:
-    """Times, and cumulative sums of the increments between them; NaN counts 0."""
-    return times, np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+def _so_far(steps: Array) -> Array:
+    """Cumulative sums of increments over time, the first axis, from 0; NaN counts 0."""
+    return np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(np.nan_to_num(steps), axis=0)])
 
 
 def _path(recorded: Array, place: Array, period: float) -> tuple[Array, Array]:
     times = np.append(np.arange(recorded[0], recorded[-1], period), recorded[-1])
     known = np.isfinite(place[:, 0])
     at = np.stack([np.interp(times, recorded[known], each) for each in place[known].T], axis=1)
-    return _so_far(times, np.linalg.norm(np.diff(at, axis=0), axis=1))
+    return times, _so_far(np.linalg.norm(np.diff(at, axis=0), axis=1))
 
 
-def _effort(times: Array, yaw: Array) -> tuple[Array, Array]:
+def _effort(times: Array, yaw: Array) -> Array:
     # Exact where the yaw is straight between samples.
-    square = (yaw[1:] ** 2 + yaw[1:] * yaw[:-1] + yaw[:-1] ** 2).sum(axis=1) / 3.0
-    return _so_far(times, square * np.diff(times))
+    square = (yaw[1:] ** 2 + yaw[1:] * yaw[:-1] + yaw[:-1] ** 2).sum(axis=2) / 3.0
+    return _so_far(square * np.diff(times)[:, None])
 
 
-def _spring_work(times: Array, angles: Array, springs: Array) -> tuple[Array, Array]:
-    squares = 0.5 * angles**2
+def _spring_work(angles: Array, springs: Array) -> Array:
+    changed = (np.fmax.reduce(springs) > np.fmin.reduce(springs)).any(axis=0)  # other springs take no work
+    squares, springs = 0.5 * angles[..., changed] ** 2, springs[..., changed]
     work = 0.5 * (squares[1:] + squares[:-1]) * np.diff(springs, axis=0)
-    return _so_far(times, np.maximum(work, 0.0).sum(axis=1))
+    return _so_far(np.maximum(work, 0.0).sum(axis=2))
 
 
-def _drive_work(events: Array, seen: Array, torques: Array) -> tuple[Array, Array]:
-    if len(events) < 2:
-        return np.zeros(1), np.zeros(1)
+def _drive_work(seen: Array, torques: Array) -> Array:
     # A torque is held from one command to the next, so its work is exact.
-    work = torques[:-1] * np.diff(seen, axis=0)
-    return _so_far(events, np.maximum(work, 0.0).sum(axis=1))
+    return _so_far(np.maximum(torques[:-1] * np.diff(seen, axis=0), 0.0).sum(axis=2))

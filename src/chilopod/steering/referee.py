@@ -94,14 +94,15 @@ class CourseReferee:
         self._aims, (self._since, self._least) = np.full((robots, 2), np.nan), np.full((2, robots), np.nan)
         self._present, self._first = -1, np.nan  # number of robots with a target, -1 before any; earliest setting, s
         self._seen_once = np.zeros(robots, dtype=np.bool_)
-        self._log: list[Observation] = []
+        self._log: list[list[Array]] = []  # arrays of _KEPT
 
     def look(self, walk: Walk) -> bool:
         """Judge the targets, set the next ones, halt finished robots; return True if any robot walks on."""
-        far = np.count_nonzero(self._away(walk.pose()) >= ARRIVAL_RADIUS)
+        pose, away = self._away(walk)
+        far = np.count_nonzero(away >= ARRIVAL_RADIUS)
         if far == self._present > 0 and walk.time - self._first < self._common.patience - _ROUNDING:
             return True  # nothing to judge, as nearly always
-        moved, busy = self.judge(walk).moved, self.busy
+        moved, busy = self._judged(walk, pose, away).moved, self.busy
         done = moved & ~busy
         if done.any():
             walk.halt(done)
@@ -109,8 +110,10 @@ class CourseReferee:
 
     def judge(self, walk: Walk) -> Judged:
         """Judge the targets and set the next ones."""
-        now, pose, begins = walk.time, walk.pose(), self._number < 0
-        away = self._away(pose)
+        return self._judged(walk, *self._away(walk))
+
+    def _judged(self, walk: Walk, pose: Array, away: Array) -> Judged:
+        now, begins = walk.time, self._number < 0
         arrived, gone = away < ARRIVAL_RADIUS, np.isnan(away) & ~np.isnan(self._since)
         over = (now - self._since >= self._common.patience - _ROUNDING) & ~(arrived | gone)
         judged = Judged(arrived, over & self._seen_once, over & ~self._seen_once, gone, begins)
@@ -125,11 +128,12 @@ class CourseReferee:
         self._present, self._first = int(np.count_nonzero(~np.isnan(self._since))), np.fmin.reduce(self._since)
         return judged
 
-    def _away(self, pose: Array) -> Array:
-        """Distance of the target, m, shape (robots,), NaN without one or without a walk; the least is kept."""
+    def _away(self, walk: Walk) -> tuple[Array, Array]:
+        """Poses, and distance of the target, m, shape (robots,), NaN without it or a walk; the least is kept."""
+        pose = walk.pose()
         away: Array = np.hypot(*(self._aims - pose[:, :2]).T)
         np.fmin(self._least, away, out=self._least)
-        return away
+        return pose, away
 
     def restart(self, which: NDArray[np.bool_], courses: Sequence[Course], missed: NDArray[np.bool_] | None) -> None:
         """Restart with robots that were restarted, by a mask of shape (robots,), each with a course, no longer than the
@@ -170,10 +174,9 @@ class CourseReferee:
         bearing, distance = (np.where(hidden, np.nan, each) for each in (seen.bearing, seen.distance))
         self._seen_once |= np.isfinite(bearing)
         found = replace(seen, bearing=bearing, distance=distance)
-        if not self._keep:
-            return found
-        self._log.append(found)
-        return replace(found, **{name: getattr(found, name).copy() for name in _KEPT})
+        if self._keep:  # the observation is the controller's to keep
+            self._log.append([getattr(found, name).copy() for name in _KEPT])
+        return found
 
     def add_to(self, data: xr.Dataset, walk: Walk) -> None:
         """Add the outcomes of all targets and the observations of the controller to the record of a finished walk."""
@@ -192,10 +195,8 @@ class CourseReferee:
         ):
             found[f"goal_{name}"] = (over, values, {"units": unit})
         found["goal_verdict"] = (over, self._verdicts)
-        for name, (dims, unit) in _KEPT.items():
-            shown = np.array([getattr(each, name) for each in self._log])
-            if len(shown):
-                found[f"seen_{name}"] = (("event", "robot", *dims), shown, {"units": unit})
+        for (name, (dims, unit)), shown in zip(_KEPT.items(), zip(*self._log, strict=True), strict=False):
+            found[f"seen_{name}"] = (("event", "robot", *dims), np.array(shown), {"units": unit})
         data.coords["goal"] = np.arange(1, self._places.shape[1] + 1)
         data.update(found)
 
@@ -215,7 +216,7 @@ class CourseReferee:
         self._aims[which], self._since[which], self._least[which] = np.nan, np.nan, np.nan
         for robot in np.flatnonzero(which).tolist():
             for number in range(self._number[robot] + 1, len(self._courses[robot].goals)):
-                place = self._courses[robot].goals[number].place(pose[robot : robot + 1])[0]
+                place = self._courses[robot].goals[number].place(pose[robot])
                 bearing, away = bearing_and_distance(pose[robot, :2], pose[robot, 2], place)
                 self._seen_from[robot, number] = away * np.cos(bearing), away * np.sin(bearing)
                 self._number[robot], self._places[robot, number], self._begin[robot, number] = number, place, now

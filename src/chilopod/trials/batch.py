@@ -128,10 +128,12 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
     records = []
     for index, trial in enumerate(trials):
         own = {"robot": slice(index, index + 1), **{name: slice(count[index]) for name, count in counts.items()}}
-        view = data.isel(own, missing_dims="ignore")
+        record = data.isel(own, missing_dims="ignore")
         # Numbers that lie otherwise in memory are added up in another order: sums have the same bits whether a walk was
         # one of many, alone, or read.
-        record = view.copy(data={name: np.ascontiguousarray(view.variables[name].values) for name in view.data_vars})
+        for each in map(record.variables.__getitem__, record.data_vars):
+            if not each.values.flags.c_contiguous:
+                each.data = np.ascontiguousarray(each.values)
         record.attrs |= {"duration": float(ends[index]), "robot": file_text(trial.robot), "trial": trial.text}
         records.append(record)
     return records

@@ -108,7 +108,8 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
     if status != [each.label for each in walk.status]:
         return f"status is {status}, which differs from that of the walk"
     for name, each in data.data_vars.items():
-        if name != "status" and (np.abs(each.values) > LARGEST).any():
+        ends = (choose.reduce(each.values, axis=None, initial=0.0) for choose in (np.fmin, np.fmax))
+        if name != "status" and max(map(abs, ends)) > LARGEST:
             return f"{name} has numbers beyond {LARGEST:g}"
     there = np.isfinite(data["heading"].values)
     counts = np.where(np.array(status) == Status.WALKED.label, len(there), there.sum(axis=0))
