@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from html import escape
 from textwrap import wrap
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import viser
@@ -16,6 +16,7 @@ from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.frozen import Array
 from chilopod.live.state import Seen
 from chilopod.live.theory import Theory
+from chilopod.show.figures.branch import stretches
 from chilopod.show.style import SCENE
 
 _WIDTH, _HEIGHT = 320.0, 200.0  # px
@@ -97,16 +98,9 @@ def _branches(theory: Theory, bends: Array, place: _Place) -> list[str]:
         parts.append(_text(_RIGHT, _BOTTOM - 21.0, escape(theory.remark), "end"))
     for side in (1.0, -1.0):
         points = [place(*each) for each in zip(theory.springs, side * bends, strict=True)]
-        for first, last in _stretches(theory.stable):
-            look = _STABLE if theory.stable[last] else _UNSTABLE
-            parts.append(_line(points[first : last + 1], look))
+        for first, last, stable in stretches(theory.stable.tolist()):
+            parts.append(_line(points[first : last + 1], _STABLE if stable else _UNSTABLE))
     return parts
-
-
-def _stretches(stable: Any) -> list[tuple[int, int]]:
-    """First and last point of every stretch of equal stability; the next one begins where one ends."""
-    ends = [*(np.flatnonzero(stable[1:] != stable[:-1])), len(stable) - 1]
-    return list(zip([0, *ends[:-1]], ends, strict=True)) if len(stable) > 1 else []
 
 
 def _axes(place: _Place) -> list[str]:

@@ -29,11 +29,8 @@ def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
     plan = compiled(shown.frames.robot)
     found = record["pose"].transpose("time", "robot", "coordinate")
     if found.sizes["coordinate"] != plan.model.nq:
-        problem, allowed = (
-            f"has poses of {found.sizes['coordinate']} coordinates",
-            f"{plan.model.nq}, those of its robot",
-        )
-        raise ParameterError(problem, field="record", allowed=allowed)
+        problem = f"has poses of {found.sizes['coordinate']} coordinates"
+        raise ParameterError(problem, field="record", allowed=f"{plan.model.nq}, those of its robot")
     poses = _continued(found.sel(time=shown.frames.time).values, _quaternions(plan.model))
     origin, step = _scale(shown, poses)
     steps = packed(poses, origin, step)
@@ -119,15 +116,6 @@ def _shapes(plan: TwinModel) -> list[dict[str, Any]]:
 
 def _pins(plan: TwinModel) -> list[dict[str, Any]]:
     """The yaw joints, which have no geometry in the model."""
-    model, size = plan.model, [*yaw_joint(plan.model), 0.0]
-    return [
-        {
-            "body": int(model.jnt_bodyid[joint]),
-            "kind": "cylinder",
-            "role": "joint",
-            "size": size,
-            "place": model.jnt_pos[joint].tolist(),
-            "turn": [1.0, 0.0, 0.0, 0.0],
-        }
-        for joint in plan.yaw_joints
-    ]
+    bodies, places = plan.model.jnt_bodyid[plan.yaw_joints].tolist(), plan.model.jnt_pos[plan.yaw_joints].tolist()
+    look = {"kind": "cylinder", "role": "joint", "size": [*yaw_joint(plan.model), 0.0], "turn": [1.0, 0.0, 0.0, 0.0]}
+    return [{"body": body, "place": place, **look} for body, place in zip(bodies, places, strict=True)]
