@@ -347,7 +347,7 @@ def test_recordings_end_where_there_is_no_room(monkeypatch):
     session = Session(PLANAR)
     session.box.put(wishes.Record(True))
     for stride in (0.02, 0.03, 0.02, 0.03):
-        session.box.put(wishes.Stride(stride))
+        session.box.put(wishes.Set("gait.stride", stride))
         session.obey()
         session.walk_on(1.3)
     assert len(session.records()) == 2

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chilopod.frozen import Array
-from chilopod.kinematics import from_modules
+from chilopod.kinematics import foot_places, from_modules
 from chilopod.live.state import Seen
 from chilopod.show.scene.frames import bodies
 from chilopod.show.scene.outline import SLIMNESS
@@ -46,8 +46,7 @@ def flat_places(seen: Seen) -> Mapping[str, Placed]:
     turned = _about_z(headings)
 
     lift = np.where(flat.stands[0, 0], 0.0, np.sin(gait.swing_angle(gait.phases(seen.clock, n))))
-    inside = np.tile([legs.forward_offset, 0.5 * _WIDTH * length], (n, 2, 1))
-    inside[:, 1, 1] *= -1.0
+    inside = foot_places(legs.forward_offset, 0.5 * _WIDTH * length, np.zeros((n, 2)))
     hip_height = (_CLEARANCE + 0.5 * _HEIGHT) * length
     feet = _raised(flat.feet[0, 0], (_FOOT + _LIFT * lift) * length).reshape(-1, 3)
     hips = _raised(from_modules(centres, headings, inside), hip_height).reshape(-1, 3)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from functools import partial
 from html import escape
 from itertools import groupby, zip_longest
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,13 +19,13 @@ from chilopod.live.challenges import CHALLENGES, Challenge
 from chilopod.live.pitchfork import Pitchfork
 from chilopod.live.plots import Plots
 from chilopod.live.presets import PRESETS
+from chilopod.live.recordings import Recordings
+from chilopod.live.scene import View
+from chilopod.live.session import Session
 from chilopod.live.sliders import Slider
 from chilopod.live.state import Seen, Settings
 from chilopod.steering import ON_THE_WAY
 from chilopod.steering.target import FARTHEST
-
-if TYPE_CHECKING:
-    from chilopod.live.server import Live
 
 _PULL = 0.5  # rad by which a key or button pulls a joint, held by its spring
 _A_LENGTH = 2.0  # rad of pull where a joint is dragged aside by the length of a module
@@ -53,14 +53,25 @@ HELP = "| key | |\n|---|---|\n" + "\n".join(f"| {key} | {what} |" for key, what 
 
 
 class Controls:
-    """Controls of a page, for its present session and preset."""
+    """Controls of a page with a title. ``later`` has what the page does, when it has time, with the name of another
+    preset, the name of a challenge, and an answer to it."""
 
-    def __init__(self, page: Live, title: str) -> None:
-        session, self._page, self._put = page.session, page, page.session.box.put
-        self._settings, self._file, self._seen, self._rows = session.settings, session.file, page.seen, session.sliders
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        session: Session,
+        title: str,
+        view: View,
+        recordings: Recordings,
+        later: Sequence[Callable[[str], None]],
+        preset: str,
+    ) -> None:
+        self._put, self._settings, self._seen = session.box.put, session.settings, session.seen()
+        self._file, self._rows, self._view, self._recordings = session.file, session.sliders, view, recordings
+        choose, challenge, answer = later
         self._helped: WeakKeyDictionary[viser.ClientHandle, Any] = WeakKeyDictionary()
         self._moved = ""  # name of the slider that somebody moved last
-        gui = page.server.gui
+        gui = server.gui
         gui.add_markdown(
             f"**{title}**. Soften the **first spring** until it bends, **click the floor**, **drag a joint** (purple). "
             "**H**: keys."
@@ -69,7 +80,7 @@ class Controls:
         self._task = gui.add_markdown("", visible=False)
         self._answers: list[Any] = [gui.add_button("-", visible=False) for _ in range(_ANSWERS)]
         for button in self._answers:
-            button.on_click(lambda event: page.errand(page.answer, event.target.label))
+            button.on_click(lambda event: answer(event.target.label))
         self.pitchfork = Pitchfork(gui, next(iter(self._rows.values())).limits[1])
         self._sliders: dict[str, Any] = {}
         for folder, rows in groupby(self._rows.values(), lambda row: row.folder):
@@ -77,7 +88,12 @@ class Controls:
                 for row in rows:
                     self._add_slider(gui, row)
         self._walking(gui)
-        self._tasks(gui)
+        hint = "Robots and floors to choose"
+        robots: Any = gui.add_dropdown("robot", list(PRESETS), initial_value=preset, hint=hint)
+        robots.on_update(lambda _: choose(robots.value))
+        names, hint = [_NO_CHALLENGE, *CHALLENGES], "A task, and a check of what you did"
+        challenges: Any = gui.add_dropdown("challenge", names, initial_value=_NO_CHALLENGE, hint=hint)
+        challenges.on_update(lambda _: challenge(challenges.value))
         self._targets(gui)
         self._joints(gui)
         self.plots = Plots(gui, self._file.body.modules - 1)
@@ -153,15 +169,6 @@ class Controls:
         hint, largest = "Seed of the start and of the nudges", wishes.LARGEST_SEED
         self._seed: Any = gui.add_number("seed", self._settings.seed, min=0, max=largest, step=1, hint=hint)
 
-    def _tasks(self, gui: viser.GuiApi) -> None:
-        """Presets and challenges."""
-        page, names, hint = self._page, list(PRESETS), "Robots and floors to choose"
-        robot: Any = gui.add_dropdown("robot", names, initial_value=page.preset, hint=hint)
-        robot.on_update(lambda _: page.errand(page.choose, robot.value))
-        names, hint = [_NO_CHALLENGE, *CHALLENGES], "A task, and a check of what you did"
-        challenge: Any = gui.add_dropdown("challenge", names, initial_value=_NO_CHALLENGE, hint=hint)
-        challenge.on_update(lambda _: page.errand(page.begin_challenge, challenge.value))
-
     def _targets(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Target", expand_by_default=False):
             names, hint = list(ON_THE_WAY), "Way of steering to the target"
@@ -185,7 +192,7 @@ class Controls:
         self._record = gui.add_button("Record (C)", hint="Recording as a netCDF file, and as a page that plays it")
         self._record.on_click(self._toggle_record)
         self._follow: Any = gui.add_checkbox("follow the robot (M)", True)
-        self._follow.on_update(lambda _: setattr(self._page.view, "follow", self._follow.value))
+        self._follow.on_update(lambda _: setattr(self._view, "follow", self._follow.value))
 
     def _keys(self, gui: viser.GuiApi) -> None:
         def key(label: str, hotkey: Any, do: Callable[..., object], *to: object, shift: bool = False) -> None:
@@ -218,7 +225,7 @@ class Controls:
         joint = event.instance_index
         if joint is None:
             return
-        w, _, _, z = self._page.view.pins.batched_wxyzs[joint].tolist()  # a pin stands upright
+        w, _, _, z = self._view.pins.batched_wxyzs[joint].tolist()  # a pin stands upright
         (x0, y0, _), (x1, y1, _) = event.start_position, event.end_position
         angle = 2.0 * math.atan2(z, w)
         aside = math.cos(angle) * (y1 - y0) - math.sin(angle) * (x1 - x0)
@@ -272,7 +279,7 @@ class Controls:
         self._helped[event.client] = modal
 
     def _toggle_record(self, event: Any) -> None:
-        self._page.recordings.wanted_by = event.client
+        self._recordings.wanted_by = event.client
         self._put(wishes.Record(not self._settings.recording))
 
 

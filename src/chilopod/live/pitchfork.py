@@ -108,12 +108,12 @@ def _axes(place: _Place) -> list[str]:
     for bend in (-180, -90, 0, 90, 180):
         if abs(bend) <= place.most:
             y = place(0.0, bend)[1]
-            parts += [_grid((_LEFT, y), (_RIGHT, y)), _text(_LEFT - 4.0, y + 4.0, f"{bend}°".replace("-", "−"), "end")]
+            parts += [_grid(_LEFT, y, _RIGHT, y), _text(_LEFT - 4.0, y + 4.0, f"{bend}°".replace("-", "−"), "end")]
     widest = _in_unit(place.stiffest)
     step = 10.0 ** np.floor(np.log10(widest))
     for spring in np.arange(0.0, widest + 1e-9, step if widest > 3.0 * step else 0.5 * step):
         x = _LEFT + (_RIGHT - _LEFT) * spring / widest
-        parts += [_grid((x, _TOP), (x, _BOTTOM)), _text(x, _BOTTOM + 14.0, f"{spring:g}", "middle")]
+        parts += [_grid(x, _TOP, x, _BOTTOM), _text(x, _BOTTOM + 14.0, f"{spring:g}", "middle")]
     middle, below = 0.5 * (_LEFT + _RIGHT), _BOTTOM + 29.0
     parts += [
         _text(middle, below, "first spring (N·mm/deg); dashed: unstable", "middle"),
@@ -132,8 +132,7 @@ def _line(points: list[tuple[float, float]], look: str) -> str:
     return f'<polyline points="{along}" fill="none" stroke="{SCENE["edge"]}" {look}/>'
 
 
-def _grid(start: tuple[float, float], end: tuple[float, float]) -> str:
-    (x0, y0), (x1, y1) = start, end
+def _grid(x0: float, y0: float, x1: float, y1: float) -> str:
     return f'<path d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}" stroke="currentColor" opacity="0.15"/>'
 
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import TYPE_CHECKING
 
 import viser
 import xarray as xr
 
 from chilopod.errors import ChilopodError
+from chilopod.live.browsers import at_server, notify
 from chilopod.netcdf import netcdf
-
-if TYPE_CHECKING:
-    from chilopod.live.server import Live
 
 
 class Recordings:
@@ -23,8 +20,8 @@ class Recordings:
     ``undelivered`` has names and files of those that nobody took.
     """
 
-    def __init__(self, page: Live, kept: Callable[[str, bytes, str], None] | None) -> None:
-        self._page, self._kept = page, kept
+    def __init__(self, server: viser.ViserServer, kept: Callable[[str, bytes, str], None] | None) -> None:
+        self._server, self._kept = server, kept
         self.undelivered: list[tuple[str, bytes, str]] = []
         self.wanted_by: viser.ClientHandle | None = None
         self.over = False  #: True where no browser is waited for any more
@@ -55,13 +52,13 @@ class Recordings:
             try:
                 self._kept(name, content, page)
             except ChilopodError as error:
-                self._page.at_server(partial(self._page.notify, str(error)))
-        elif self.over or not self._page.server.get_clients():
+                notify(self._server, str(error))
+        elif self.over or not self._server.get_clients():
             self.undelivered.append((name, content, page))
-        self._page.at_server(partial(self._send, name, content, page, to))
+        at_server(self._server, partial(self._send, name, content, page, to))
 
     def _send(self, name: str, content: bytes, page: str, to: viser.ClientHandle | None) -> None:
-        clients = self._page.server.get_clients()
+        clients = self._server.get_clients()
         if to is not None and to.client_id in clients:
             clients = {to.client_id: to}
         for client in clients.values():

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import io
 import math
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -31,6 +31,7 @@ needs("viser", extra="live")
 
 import viser  # noqa: E402  (there, as has just been seen)
 
+from chilopod.live.browsers import at_server, notify  # noqa: E402
 from chilopod.live.controls import Controls  # noqa: E402
 from chilopod.live.gate import Gate  # noqa: E402
 from chilopod.live.recordings import Recordings  # noqa: E402
@@ -41,6 +42,7 @@ _SOONEST = 0.01  # s from one frame to the next that a wish brings on
 _BEHIND = 0.1  # s that may be made up for
 _PLOTS = 0.25  # s from one drawing of the plots and sentences to the next
 _LOOKS_AGAIN = 2.0  # s after a picture in which a browser without WebGL asks for the next one
+_LATELY = 25  # frames over which the present speed of the walk is measured
 _PANEL = 340  # px
 _ALONE = 0.1  # s from one look to the next while no browser watches
 
@@ -107,7 +109,7 @@ class Live:
         free = free_port(host, port)
         with _quiet():
             self.server = self.gate.open(free)
-        self.recordings = Recordings(self, kept)
+        self.recordings = Recordings(self.server, kept)
         self.undelivered = self.recordings.undelivered
         self._beside = Beside(engine)
         try:
@@ -134,7 +136,9 @@ class Live:
         """Everything of a page that is made for its robot."""
         server, robot = self.server, self.seen.robot
         self.view = View(server, self._places(self.seen), self.session.file)
-        self._controls = Controls(self, f"{robot.name}, {robot.body.modules} modules, {self.session.engine}")
+        title = f"{robot.name}, {robot.body.modules} modules, {self.session.engine}"
+        later = [partial(self.errand, do) for do in (self.choose, self.begin_challenge, self.answer)]
+        self._controls = Controls(server, self.session, title, self.view, self.recordings, later, self.preset)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(_PANEL)
         for client in server.get_clients().values():
@@ -176,23 +180,6 @@ class Live:
         self._errands.put(partial(do, word))
         self.session.box.wake()
 
-    def notify(self, sentence: str) -> None:
-        """Show a sentence to all browsers, in the thread of the server."""
-        for client in self.server.get_clients().values():
-            client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
-
-    def at_server(self, do: Callable[[], None]) -> None:
-        """Let the thread of the server do something, and wait for it.
-
-        viser wakes those who send to browsers by an event of asyncio, which no other thread may touch: with two
-        browsers it fails now and then.
-        """
-
-        async def done() -> None:
-            do()
-
-        asyncio.run_coroutine_threadsafe(done(), self.server.get_event_loop()).result()
-
     # -- the thread of the walk
 
     def _run(self) -> None:
@@ -200,12 +187,13 @@ class Live:
             self._walk()
         except BaseException as error:
             self.failure = error
-            self.at_server(partial(self._controls.fail, in_words(error)))
+            at_server(self.server, partial(self._controls.fail, in_words(error)))
         finally:
             self._ended.set()
 
     def _walk(self) -> None:
-        last, plotted, walked = time.perf_counter(), -math.inf, _Rate()
+        last, plotted = time.perf_counter(), -math.inf
+        lately: deque[tuple[float, float]] = deque(maxlen=_LATELY)  # times of the clock and of the walk
         self._ask()
         while not self._over.wait(max(0.0, last + _SOONEST - time.perf_counter())):
             self.session.box.wait(max(0.0, last + _FRAME - time.perf_counter()))
@@ -221,11 +209,15 @@ class Live:
             if watched and not settings.paused:
                 session.walk_on(passed * settings.speed)
             seen = self.seen = session.seen()
-            walked.add(now, seen.time)
+            if lately and seen.time < lately[-1][1]:
+                lately.clear()
+            lately.append((now, seen.time))
+            then, before = lately[0]
+            rate = (seen.time - before) / (now - then) if len(lately) == _LATELY else math.inf
             if self._challenge:
                 self._challenge.look(seen)
             self._controls.plots.add(seen)
-            self.at_server(partial(self._show, self._places(seen), now - plotted > _PLOTS, walked.value))
+            at_server(self.server, partial(self._show, self._places(seen), now - plotted > _PLOTS, rate))
             if now - plotted > _PLOTS:
                 plotted = now
             self.frames += watched
@@ -259,9 +251,9 @@ class Live:
                     each.forget()
         messages = session.messages()
         for sentence in messages:
-            self.at_server(partial(self.notify, sentence))
+            notify(self.server, sentence)
         if messages or wished:
-            self.at_server(partial(self._controls.put_back, session.settings))
+            at_server(self.server, partial(self._controls.put_back, session.settings))
         for answer in self._beside.answers():
             if isinstance(answer, Theory):
                 self._theory = answer
@@ -304,12 +296,12 @@ class Live:
         before.stop_recording()
         self._keep()
         self.preset, self._challenge = name, None
-        self.at_server(self._clear)
+        at_server(self.server, self._clear)
         self._compile(robot, engine)
         self.session = Session(robot, engine, seed=before.settings.seed, strategy=before.settings.strategy)
         self.session.box = before.box
         self.seen, self._places = self.session.seen(), _places(robot, engine)
-        self.at_server(self._furnish)
+        at_server(self.server, self._furnish)
         if engine != before.engine:
             self._beside.close()
             self._beside = Beside(engine)
@@ -338,7 +330,12 @@ class Live:
         """Part of an address that leads to the present settings."""
         return query(self.session.settings, self.session.first, self.session.sliders, self.preset)
 
-    def _obey_address(self, asked: str) -> None:
+    def _open_address(self, by_hand: bool, asked: str) -> None:
+        """Grant what an address asks for; not if another web site led there."""
+        if not by_hand:
+            if read(asked, self.session.sliders)[0]:
+                notify(self.server, "Another page led here: press Enter in the address to apply it.")
+            return
         preset = preset_of(asked)
         if preset is not None and preset != self.preset:
             self.choose(preset)
@@ -346,19 +343,13 @@ class Live:
         for wish in told:
             self.wish(wish)
         if wrong:
-            self.at_server(partial(self.notify, wrong))
-
-    def _warn(self, asked: str) -> None:
-        """Say that an address is not obeyed, as another web site led to it."""
-        if read(asked, self.session.sliders)[0]:
-            words = "Another page led here: press Enter in the address to apply it."
-            self.at_server(partial(self.notify, words))
+            notify(self.server, wrong)
 
     def _take_address(self) -> None:
-        """Grant what the address of a page that has just been opened asks for."""
+        """Open the address of a page that has just been loaded."""
         asked, by_hand = self.gate.asked()
         if asked:
-            self.errand(self._obey_address if by_hand else self._warn, asked)
+            self.errand(partial(self._open_address, by_hand), asked)
 
     def _keep(self) -> None:
         for record in self.session.records():
@@ -382,21 +373,6 @@ class Live:
         place = floor_place(self.view.origin, event.ray_origin, event.ray_direction)
         if place is not None:
             self.session.box.put(wishes.Target(place))
-
-
-class _Rate:
-    """Seconds walked in a second of the clock, lately."""
-
-    def __init__(self) -> None:
-        self.value = 0.0
-        self._since: tuple[float, float] | None = None
-
-    def add(self, now: float, walked: float) -> None:
-        if self._since is None or walked < self._since[1]:
-            self._since = now, walked
-        elif now - self._since[0] > 1.0:
-            self.value = (walked - self._since[1]) / (now - self._since[0])
-            self._since = now, walked
 
 
 def _places(robot: Robot, engine: str) -> Callable[[Seen], Mapping[str, Placed]]:

@@ -23,21 +23,6 @@ def Spring(joint: int | None, stiffness: float) -> Set:
     return Set("springs.stiffness" if joint is None else f"springs.stiffness[{joint}]", stiffness)
 
 
-def Friction(factor: float) -> Set:
-    """Another floor: factor on the friction of the robot file."""
-    return Set("friction", factor)
-
-
-def Stride(length: float) -> Set:
-    """Longer or shorter steps, m."""
-    return Set("gait.stride", length)
-
-
-def Speed(times: float) -> Set:
-    """Another number of seconds of walking that one second shows."""
-    return Set("speed", times)
-
-
 @dataclass(frozen=True)
 class Target:
     """Target on the floor, m; None for no target. By hand no strategy steers there."""

@@ -10,9 +10,8 @@ import xarray as xr
 from chilopod.netcdf import netcdf, sealed, storable
 from chilopod.output import write_all
 from chilopod.show import style
-from chilopod.show.figures import branch, identification, undulation
+from chilopod.show.figures import branch, undulation
 from chilopod.show.panel import Panel
-from chilopod.tasks.identify import Identification
 
 
 def files_of(name: str, folder: str | Path) -> list[Path]:
@@ -29,11 +28,6 @@ def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) 
 def write_undulation(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write undulating walks as ``undulation``, with the same endings as :func:`write_branch`."""
     return _write_alone(undulation.panel(data), folder, replace)
-
-
-def identification_files(found: Identification, folder: Path) -> Iterator[tuple[Path, bytes]]:
-    """Files of the profile of an identification, its figure and the data, see :func:`panel_files`."""
-    return panel_files(identification.panel(found), folder, folder)
 
 
 def panel_files(

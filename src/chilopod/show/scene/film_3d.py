@@ -80,9 +80,9 @@ def stills(
         allowed = f"{_NARROWEST} to {LARGEST} pixels"
         raise ParameterError("must be the size of a picture", field="size", value=size, allowed=allowed)
     walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
-    with gl.context(*size), style.house_style():
-        with closing(Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)) as studio:
-            return style.png(_arranged(walks, studio, heading, size), dpi=PIXEL)
+    robot, view = walks.shown.frames.robot, walks.view(size)
+    with gl.context(*size), style.house_style(), closing(Studio(robot, size, view, fine=True)) as studio:
+        return style.png(_arranged(walks, studio, heading, size), dpi=PIXEL)
 
 
 class _Walks:

@@ -31,7 +31,9 @@ def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
     if found.sizes["coordinate"] != plan.model.nq:
         problem = f"has poses of {found.sizes['coordinate']} coordinates"
         raise ParameterError(problem, field="record", allowed=f"{plan.model.nq}, those of its robot")
-    poses = _continued(found.sel(time=shown.frames.time).values, _quaternions(plan.model))
+    free = plan.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    quaternions = (plan.model.jnt_qposadr[free] + 3).tolist()
+    poses = _continued(found.sel(time=shown.frames.time).values, quaternions)
     origin, step = _scale(shown, poses)
     steps = packed(poses, origin, step)
     pole = plan.model.geom("pole").size
@@ -46,14 +48,9 @@ def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
     }
 
 
-def _quaternions(model: mujoco.MjModel) -> list[int]:
-    """Indices of the coordinates at which quaternions of free joints begin."""
-    free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
-    return [int(at) + 3 for at in model.jnt_qposadr[free]]
-
-
 def _continued(poses: Array, quaternions: Sequence[int]) -> Array:
-    """Poses (T, R, coordinates) that stay as they were once a robot stops, with quaternions that do not jump."""
+    """Poses (T, R, coordinates) that stay as they were once a robot stops; quaternions, which begin at some of the
+    coordinates, do not jump."""
     known = np.isfinite(poses).all(axis=-1)
     last = np.maximum.accumulate(np.where(known, np.arange(len(poses))[:, None], 0), axis=0)
     poses = poses[last, np.arange(poses.shape[1])]

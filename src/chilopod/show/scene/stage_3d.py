@@ -195,28 +195,15 @@ def _dressed(robot: Robot, size: tuple[int, int], view: View, fine: bool) -> Any
     look.map.znear, look.map.zfar, look.map.shadowclip = 0.05, 8.0, 0.7
     # What shines from the lens and what comes from above add up to 1 on the floor, so that colours stay as they are.
     look.headlight.ambient, look.headlight.diffuse, look.headlight.specular = [0.45] * 3, [0.15] * 3, [0.0] * 3
-    spec.worldbody.add_light(
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        dir=_LIGHT,
-        castshadow=fine,
-        ambient=[0.0] * 3,
-        diffuse=[0.5] * 3,
-        specular=[0.1] * 3,
-    )
-    floor = spec.add_texture(
-        name="tiles",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        mark=mujoco.mjtMark.mjMARK_EDGE,
-        rgb1=to_rgb("#e9eaec"),
-        rgb2=to_rgb("#dcdee1"),
-        markrgb=to_rgb("#c6c9cd"),
-        width=512,
-        height=512,
-    )
-    flat, pale = mujoco.mjtBuiltin.mjBUILTIN_FLAT, to_rgb("#f4f5f7")
-    sky: dict[str, Any] = {"builtin": flat, "rgb1": pale, "rgb2": pale, "width": 16, "height": 96}
-    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, **sky)
+    light: dict[str, Any] = {"ambient": [0.0] * 3, "diffuse": [0.5] * 3, "specular": [0.1] * 3}
+    above = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    spec.worldbody.add_light(type=above, dir=_LIGHT, castshadow=fine, **light)
+    checker, flat = mujoco.mjtBuiltin.mjBUILTIN_CHECKER, mujoco.mjtBuiltin.mjBUILTIN_FLAT
+    tile: dict[str, Any] = {"rgb1": to_rgb("#e9eaec"), "rgb2": to_rgb("#dcdee1"), "width": 512, "height": 512}
+    tile |= {"mark": mujoco.mjtMark.mjMARK_EDGE, "markrgb": to_rgb("#c6c9cd")}
+    floor = spec.add_texture(name="tiles", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=checker, **tile)
+    sky: dict[str, Any] = {"rgb1": to_rgb("#f4f5f7"), "rgb2": to_rgb("#f4f5f7"), "width": 16, "height": 96}
+    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=flat, **sky)
     # Two by two tiles make the texture, which MuJoCo repeats that many times on 2 m.
     tiles = spec.add_material(name="tiles", texuniform=True, texrepeat=[1.0 / TILE] * 2, specular=0.0, shininess=0.0)
     tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = floor.name
