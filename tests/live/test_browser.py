@@ -47,14 +47,9 @@ def running():
 @pytest.fixture
 def live(running):
     """The page as it is at first."""
-    for each in (
-        wishes.Spring(None, stiffness(41.0)),
-        wishes.Set("friction", 1.0),
-        wishes.Set("speed", 2.0),
-        wishes.Pause(False),
-    ):
+    settings = wishes.Spring(None, stiffness(41.0)), wishes.Set("friction", 1.0), wishes.Set("speed", 2.0)
+    for each in (*settings, wishes.Pause(False), wishes.Reset(1)):
         running.wish(each)
-    running.wish(wishes.Reset(1))
     yield running
     if running.failure is not None:
         raise running.failure

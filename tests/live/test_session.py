@@ -175,13 +175,8 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
     time = walking.seen().time
     walking.walk_on(5.0)
     assert walking.seen().time == time
-    wish(
-        walking,
-        wishes.Target((1.0, 1.0)),
-        wishes.Set("friction", 1.1),
-        wishes.Spring(0, stiffness(41.0)),
-        wishes.Reset(3),
-    )
+    stiff = wishes.Spring(0, stiffness(41.0))
+    wish(walking, wishes.Target((1.0, 1.0)), wishes.Set("friction", 1.1), stiff, wishes.Reset(3))
     walking.walk_on(5.0)
     assert walking.seen().status is Status.WALKED
     assert walking.settings.friction == 1.1

@@ -65,9 +65,8 @@ def test_a_film_that_follows_shows_its_robots_large():
     """Side by side, and however far they walk."""
 
     def sky(**how) -> int:
-        picture = imread(
-            io.BytesIO(Film(walk(0.0, 0.5, duration=20.0), titles=["a", "b"], heading="h", **how).poster())
-        )
+        film = Film(walk(0.0, 0.5, duration=20.0), titles=["a", "b"], heading="h", **how)
+        picture = imread(io.BytesIO(film.poster()))
         return int((np.abs(picture[30:-40, :, :3] - to_rgb(style.SKY)).max(axis=-1) < 0.1).sum())
 
     assert sky(follow=True) > 3 * sky()
