@@ -20,7 +20,7 @@ from statistics import median
 from typing import Any
 
 from chilopod.live import Live
-from chilopod.live.wishes import Speed
+from chilopod.live.wishes import Set
 from chilopod.robot import load_robot
 
 from _timing import machine, table, write_section
@@ -58,7 +58,7 @@ def measured(chromium: Any, engine: str, width: int, height: int) -> tuple[str, 
     """A row of the table."""
     live = Live(load_robot(ROBOTS[engine]), engine, port=0)
     try:
-        live.wish(Speed(1.0))
+        live.wish(Set("speed", 1.0))
         page = chromium.new_page(viewport={"width": width, "height": height})
         page.goto(live.address)
         page.get_by_text("pitchfork at").first.wait_for(timeout=600_000)
@@ -96,7 +96,7 @@ def remembered(chromium: Any, minutes: float) -> str:
         page = chromium.new_page(viewport={"width": 800, "height": 500})
         page.goto(live.address)
         page.get_by_text("pitchfork at").first.wait_for(timeout=600_000)
-        live.wish(Speed(10.0))
+        live.wish(Set("speed", 10.0))
         samples = []
         begin = time.monotonic()
         settle = min(120.0, 30.0 * minutes)

@@ -25,10 +25,10 @@ def picture(page: Page, live: Live) -> bytes:
     """The page, settled."""
     page.goto(live.address)
     page.get_by_text("pitchfork at").first.wait_for(timeout=PATIENCE)
-    for wish in (wishes.Spring(0, stiffness(8.0)), wishes.Speed(10.0)):
+    for wish in (wishes.Spring(0, stiffness(8.0)), wishes.Set("speed", 10.0)):
         live.wish(wish)
     page.get_by_text("Settled on").first.wait_for(timeout=PATIENCE)
-    live.wish(wishes.Speed(1.0))
+    live.wish(wishes.Set("speed", 1.0))
     page.wait_for_timeout(1500)
     written = io.BytesIO()
     Image.open(io.BytesIO(page.screenshot())).convert("RGB").save(written, "WEBP", quality=80, method=6)

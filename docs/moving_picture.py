@@ -14,7 +14,7 @@ import av
 
 from chilopod.output import write_atomic
 from chilopod.robot import load_robot
-from chilopod.show.scene.film_3d import film_3d
+from chilopod.show.scene.film_3d import Film3D
 from chilopod.steering import LegYawController, Target
 from chilopod.trials import Trial, run, together
 
@@ -42,7 +42,7 @@ def film(path: Path) -> None:
     ]
     heading = "A softer first spring turns the robot"
     look = {"titles": list(SPRINGS.values()), "heading": heading, "fps": PER_SECOND, "speed": SPEED, "size": SIZE}
-    write_atomic(path, film_3d(together(run(asked)), **look))
+    write_atomic(path, Film3D(together(run(asked)), **look).mp4())
 
 
 def picture(path: Path) -> bytes:

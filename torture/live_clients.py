@@ -132,9 +132,9 @@ class LiveClients:
         if self._given is None:
             self._given = Live(load_robot("aoi2022-planar"), port=0)
         live = self._given
-        if not live._session.settings.paused:
+        if not live.session.settings.paused:
             live.wish(wishes.Pause(True))
-            _until(lambda: live._session.settings.paused, "the page does not pause")
+            _until(lambda: live.session.settings.paused, "the page does not pause")
             time.sleep(0.2)  # a frame that was under way
         return live
 
@@ -154,7 +154,7 @@ class LiveClients:
 
     @property
     def _handles(self) -> dict[str, Any]:
-        return self._live()._server.gui._gui_input_handle_from_uuid
+        return self._live().server.gui._gui_input_handle_from_uuid
 
     def _seen(self) -> tuple[object, ...]:
         """All that a message may not move."""
@@ -163,7 +163,7 @@ class LiveClients:
             uuid: (each._impl.value, each._impl.removed, dict(vars(each._impl.props)), len(each._impl.update_cb))
             for uuid, each in self._handles.items()
         }
-        return live._session.settings, live.seen.time, live.seen.target, live.seen.pulled.tolist(), elements
+        return live.session.settings, live.seen.time, live.seen.target, live.seen.pulled.tolist(), elements
 
     def _send(self, raw: bytes | str) -> None:
         client, gate = self._client(), self._live().gate

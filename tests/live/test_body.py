@@ -5,7 +5,7 @@ import pytest
 
 from chilopod.kinematics import module_centres, module_headings
 from chilopod.live import Session, wishes
-from chilopod.live.body import KINDS, FlatBody
+from chilopod.live.body import KINDS, flat_places
 from chilopod.live.body_3d import SolidBody
 from chilopod.robot import load_robot
 from chilopod.show.scene.frames import body_frames
@@ -37,7 +37,7 @@ def test_the_flat_body_is_that_of_replays(time):
             "leg_yaw": at.leg_yaw.values,
         }
     )
-    placed = FlatBody().places(seen)
+    placed = flat_places(seen)
     np.testing.assert_allclose(placed["box"].centres[:, :2], frames.centres[0, 0], atol=1e-6)
     np.testing.assert_allclose(placed["ball"].centres[:, :2], frames.feet[0, 0].reshape(-1, 2), atol=1e-6)
     np.testing.assert_allclose(placed["pin"].centres[:, :2], frames.spine[0, 0, 1:-1], atol=1e-6)

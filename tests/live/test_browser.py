@@ -47,9 +47,9 @@ def running():
 @pytest.fixture
 def live(running):
     """The page as it is at first."""
-    for each in (wishes.Spring(None, stiffness(41.0)), wishes.Friction(1.0), wishes.Speed(2.0), wishes.Pause(False)):
+    settings = wishes.Spring(None, stiffness(41.0)), wishes.Set("friction", 1.0), wishes.Set("speed", 2.0)
+    for each in (*settings, wishes.Pause(False), wishes.Reset(1)):
         running.wish(each)
-    running.wish(wishes.Reset(1))
     yield running
     if running.failure is not None:
         raise running.failure
@@ -168,7 +168,7 @@ def test_a_joint_that_is_dragged_bends_and_springs_back(opened, live):
     read(opened, r"Joint \d is pulled aside, and it walks a curve of")
     assert np.abs(live.seen.joint_angles).max() > 0.1
     opened.mouse.up()
-    live.wish(wishes.Speed(10.0))
+    live.wish(wishes.Set("speed", 10.0))
     read(opened, READY)
     opened.set_viewport_size({"width": 800, "height": 500})
 

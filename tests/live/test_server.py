@@ -46,10 +46,8 @@ class Nobody:
     def __init__(self, engine):
         pass
 
-    def ask(self, robot):
+    def ask(self, robot, what="theory"):
         pass
-
-    ask_growth = ask
 
     def answers(self):
         return []
@@ -203,7 +201,7 @@ def test_the_attacks_find_a_gate_that_is_open(attacks, tmp_path, monkeypatch, na
 
 def test_what_is_used_of_viser_is_still_there(page):
     """Names of viser that are not documented; where one is gone or another, :mod:`chilopod.live.gate` has to follow."""
-    server = page._server
+    server = page.server
     assert isinstance(server._websock_server._live_connections, dict)
     assert len(server.gui._gui_input_handle_from_uuid) > 20
     assert len(server.gui._command_handle_from_uuid) > 20
@@ -247,14 +245,15 @@ def asked(page, query, **headers):
         return page.gate.asked()
 
 
-def test_an_address_is_obeyed_only_if_a_person_opened_it(page):
+def test_an_address_is_obeyed_only_if_a_person_opened_it(page, monkeypatch):
     assert asked(page, "k1=8", Site="none", Dest="document") == ("k1=8", True)
     assert asked(page, "k1=8", Site="cross-site", Dest="document") == ("k1=8", False)
     assert asked(page, "k1=8", Site="cross-site", Dest="image") == ("", False)
     assert asked(page, "k1=8") == ("", False)
-    page._open_address("k1=8", False)  # from another web site
-    page._session.obey()
-    assert page._session.settings.robot == PLANAR.override("springs.adjustable", True)
+    monkeypatch.setattr(page.gate, "asked", lambda: ("k1=8", False))  # from another web site
+    page._take_address()
+    time.sleep(0.5)
+    assert page.session.settings.robot == PLANAR.override("springs.adjustable", True)
 
 
 def test_a_browser_without_webgl_has_pictures(page):
@@ -266,17 +265,20 @@ def test_a_browser_without_webgl_has_pictures(page):
 
 
 def test_another_preset_is_another_robot(page):
-    page._errand(lambda: page._choose("ten modules"))
+    page.errand(page.choose, "ten modules")
     end = time.monotonic() + 60.0
-    while page.seen.robot.body.modules != 10 or page._link is None:
+    while page.seen.robot.body.modules != 10:
         assert time.monotonic() < end
         assert page.failure is None
         time.sleep(0.05)
-    page._errand(lambda: page._choose("as started"))
-    while page.seen.robot.body.modules != 6:
+    page.errand(page.choose, "uniform soft springs")
+    while page._controls._sliders["springs.stiffness"].value != 6.0:
         assert time.monotonic() < end
         time.sleep(0.05)
-    assert page._query().startswith("seed=")
+    page.errand(page.choose, "as started")
+    while not page._query().startswith("seed="):
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def test_a_flood_of_messages_is_slowed_down(page):
@@ -295,8 +297,8 @@ def test_the_largest_seed_reaches_later_browsers(page):
     for seed in (2**64 - 1, 1e30, 10**400, wishes.LARGEST_SEED):
         page.wish(wishes.Reset(seed))
         time.sleep(0.3)
-    assert page._session.settings.seed == wishes.LARGEST_SEED
-    sent = list(page._server._websock_server._broadcast_buffer.message_from_id.values())
+    assert page.session.settings.seed == wishes.LARGEST_SEED
+    sent = list(page.server._websock_server._broadcast_buffer.message_from_id.values())
     assert msgspec.msgpack.encode([each.as_serializable_dict([]) for each in sent])
     page.wish(wishes.Reset(1))
 
@@ -358,7 +360,7 @@ def test_recordings_end_where_there_is_no_room(monkeypatch):
     session = Session(PLANAR)
     session.box.put(wishes.Record(True))
     for stride in (0.02, 0.03, 0.02, 0.03):
-        session.box.put(wishes.Stride(stride))
+        session.box.put(wishes.Set("gait.stride", stride))
         session.obey()
         session.walk_on(1.3)
     assert len(session.records()) == 2
@@ -372,11 +374,11 @@ def test_what_no_browser_took_is_there_for_the_next(page):
         client_id=-1, send_file_download=lambda name, content, save_immediately: sent.append((name, content))
     )
     page.undelivered.append(("kept", b"record", "page"))
-    page._server._connected_clients[-1] = browser
+    page.server._connected_clients[-1] = browser
     try:
-        asyncio.run(page._send_undelivered(browser))
+        asyncio.run(page.recordings.greet(browser))
     finally:
-        del page._server._connected_clients[-1]
+        del page.server._connected_clients[-1]
     assert sent == [("kept.nc", b"record"), ("kept.html", b"page")]
     assert page.undelivered == []
 

@@ -83,7 +83,7 @@ def test_seeds():
 def test_floor_and_steps_change_at_the_next_gait_cycle_and_nothing_jumps():
     walking, period = session(), PLANAR.gait.period
     walking.walk_on(2.5 * period)
-    wish(walking, wishes.Friction(1.5), wishes.Stride(0.02))
+    wish(walking, wishes.Set("friction", 1.5), wishes.Set("gait.stride", 0.02))
     before = walking.seen()
     assert before.robot.gait.stride == PLANAR.gait.stride
     walking.walk_on(0.49 * period)
@@ -144,7 +144,7 @@ def test_a_recording_is_of_one_floor_and_can_be_played():
     walking.walk_on(1.0)
     wish(walking, wishes.Record(True))
     walking.walk_on(4.0)
-    wish(walking, wishes.Stride(0.025))
+    wish(walking, wishes.Set("gait.stride", 0.025))
     walking.walk_on(3.0)
     wish(walking, wishes.Record(False))
     walking.walk_on(2.0)
@@ -175,7 +175,8 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
     time = walking.seen().time
     walking.walk_on(5.0)
     assert walking.seen().time == time
-    wish(walking, wishes.Target((1.0, 1.0)), wishes.Friction(1.1), wishes.Spring(0, stiffness(41.0)), wishes.Reset(3))
+    stiff = wishes.Spring(0, stiffness(41.0))
+    wish(walking, wishes.Target((1.0, 1.0)), wishes.Set("friction", 1.1), stiff, wishes.Reset(3))
     walking.walk_on(5.0)
     assert walking.seen().status is Status.WALKED
     assert walking.settings.friction == 1.1
@@ -189,10 +190,10 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
         (wishes.Spring(0, stiffness(99.0)), "springs.stiffness[0] = "),
         (wishes.Spring(17, stiffness(9.0)), "must be a slider"),
         (wishes.Set("frictoin", 1.0), "did you mean 'friction'"),
-        (wishes.Friction(float("inf")), "friction = inf"),
-        (wishes.Friction(7.0), "0.3 to 3"),
-        (wishes.Stride(0.0), f"{STRIDES[0] * PLANAR.gait.stride:g} to"),
-        (wishes.Speed("fast"), "speed = 'fast'"),
+        (wishes.Set("friction", float("inf")), "friction = inf"),
+        (wishes.Set("friction", 7.0), "0.3 to 3"),
+        (wishes.Set("gait.stride", 0.0), f"{STRIDES[0] * PLANAR.gait.stride:g} to"),
+        (wishes.Set("speed", "fast"), "speed = 'fast'"),
         (wishes.Reset(-3), "whole number"),
         (wishes.Reset(1.5), "whole number"),
         (wishes.Reset(float("inf")), "seed = inf"),

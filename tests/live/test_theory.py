@@ -52,7 +52,7 @@ def test_only_the_last_question_is_answered_and_a_short_one_in_between():
         wide = PLANAR.with_value("gait.stride", 0.029)
         beside.ask(PLANAR)
         beside.ask(wide)
-        beside.ask_growth(PLANAR)
+        beside.ask(PLANAR, "growth")
         found, end = [], time.monotonic() + 120.0
         while time.monotonic() < end:
             found += beside.answers()

@@ -8,7 +8,7 @@ import pytest
 from chilopod import load_robot, planar
 from chilopod.record import Recording
 from chilopod.show import replay
-from chilopod.show.scene.film import filmed
+from chilopod.show.scene.film import Film
 from chilopod.show.scene.frames import scene
 from helpers.html_page import Page
 
@@ -50,4 +50,4 @@ def test_a_robot_that_was_halted_stands_there_and_says_how_far_it_came(record):
 def test_replays_and_films_take_them(record):
     told = json.loads(Page(replay(record, titles=["a", "b"], heading="Course").html).data)["robots"]
     assert [aim["place"] for aim in told[0]["aims"]] == [list(FIRST), list(SECOND), list(THIRD)]
-    assert filmed(record, titles=["a", "b"], heading="Course", fps=10)
+    assert Film(record, titles=["a", "b"], heading="Course", fps=10).mp4()

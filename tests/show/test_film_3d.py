@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from chilopod import load_robot
 from chilopod.errors import OutputError, ParameterError
 from chilopod.show import style
-from chilopod.show.scene.film_3d import film_3d, poster_3d, stills
+from chilopod.show.scene.film_3d import Film3D, stills
 from chilopod.show.scene.stage_3d import Look, Studio, framing
 from chilopod.twin import gl, initial_states, simulate
 from helpers.films import decoded
@@ -112,7 +112,7 @@ def test_floor_target_path_and_robots_that_stopped(studio):
 
 @pytest.mark.parametrize("follow", [False, True])
 def test_film(drawn, record, follow):
-    film = film_3d(record, titles=["a", "b"], heading="h", fps=5, size=(480, 240), follow=follow)
+    film = Film3D(record, titles=["a", "b"], heading="h", fps=5, size=(480, 240), follow=follow).mp4()
     frames = decoded(film, rate=5)
     assert frames.shape == (6, 240, 480, 3)
     blue = near(frames[0][30:-40], style.BLUE)
@@ -126,12 +126,12 @@ def test_film_of_robots_that_stop_or_never_start(drawn, record):
         stopped[name][10:, 0] = np.nan
         stopped[name][:, 1] = np.nan
     stopped["status"] = ("robot", np.array(["fallen", "diverged"], dtype=object))
-    film = film_3d(stopped, titles=["x" * 200, "b"], heading="y" * 200, fps=2, size=(320, 240))
+    film = Film3D(stopped, titles=["x" * 200, "b"], heading="y" * 200, fps=2, size=(320, 240)).mp4()
     assert len(film) > 1000
 
 
 def test_the_poster_is_as_large_as_the_film(drawn, record):
-    picture = read(poster_3d(record, titles=["a", "b"], heading="h", size=(480, 240)))
+    picture = read(Film3D(record, titles=["a", "b"], heading="h", size=(480, 240)).poster())
     assert picture.shape == (240, 480, 4)
     assert near(255.0 * picture, style.BLUE).any()
 
@@ -150,9 +150,9 @@ def test_what_cannot_be_drawn(monkeypatch, record):
     names = {"titles": ["a", "b"], "heading": "h"}
     for wrong in ({"size": (481, 320)}, {"size": (480, 100)}, {"fps": 0}, {"speed": 0.0}, {"titles": ["a"]}):
         with pytest.raises(ParameterError, match=next(iter(wrong))):
-            film_3d(record, **{**names, **wrong})
+            Film3D(record, **{**names, **wrong}).mp4()
     with pytest.raises(ParameterError, match="poses"):
-        film_3d(record.drop_vars("pose"), **names)
+        Film3D(record.drop_vars("pose"), **names).mp4()
     for times in ([], [-1.0], [2.0], [float("nan")], [0.5] * 40):
         with pytest.raises(ParameterError, match="times"):
             stills(record, times)
@@ -160,9 +160,9 @@ def test_what_cannot_be_drawn(monkeypatch, record):
         stills(record, [0.0], size=(10, 10))
     monkeypatch.setattr(gl, "find", lambda: gl.Found(None, missing="no OpenGL works", mend="plug one in"))
     with pytest.raises(OutputError, match="no OpenGL works; to mend it: plug one in"):
-        film_3d(record, **names)
+        Film3D(record, **names).mp4()
     with pytest.raises(OutputError, match="plug one in"):
         stills(record, [0.0])
     monkeypatch.setattr("chilopod.show.scene.film.has_encoder", lambda: False)
     with pytest.raises(OutputError, match="encoder"):
-        film_3d(record, **names)
+        Film3D(record, **names).mp4()

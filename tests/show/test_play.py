@@ -63,7 +63,7 @@ def walked(robot, law):
 @pytest.mark.parametrize("steers", [False, True])
 def test_the_motion_is_that_of_the_planar_model(robot, browser, steers):
     adjustable = robot.override("springs.adjustable[0]", True)
-    law = SpringLaw.of(adjustable, theory(robot).law) if steers else None
+    law = SpringLaw.of(adjustable, theory(robot)[1]) if steers else None
     found = browser.run(
         f"""(() => {{
           const robot = planarRobot(play.data, 1e-13);

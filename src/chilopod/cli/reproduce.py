@@ -217,7 +217,8 @@ def planar(
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
     from chilopod.show import files_of
-    from chilopod.show.files import identification_files
+    from chilopod.show.figures import identification
+    from chilopod.show.files import panel_files
 
     measured, variants = (critical_mode_data(), variant_settings()) if data is None else (CriticalMode.load(data), {})
 
@@ -225,7 +226,7 @@ def planar(
     with progress_bar("identification") as progress:
         found = identify_planar(described, measured, points, variants, partial(progress, "identification"))
     lines = [*found.lines(), f"profile, figure and robot file are in {out}"]
-    result, more = {"robot": described.name, **found.as_json()}, identification_files(found, out)
+    result, more = {"robot": described.name, **found.as_json()}, panel_files(identification.panel(found), out, out)
     _deliver(out, result, found.best, lines, more, force=force, as_json=as_json)
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from chilopod.frozen import Array
-from chilopod.kinematics import from_modules
+from chilopod.kinematics import foot_places, from_modules
 from chilopod.live.state import Seen
 from chilopod.show.scene.frames import bodies
 from chilopod.show.scene.outline import SLIMNESS
@@ -29,48 +28,35 @@ class Placed:
     scales: Array
 
 
-class Body(Protocol):
-    """A robot that can be drawn: its first box is module 1."""
-
-    def places(self, seen: Seen) -> Mapping[str, Placed]:
-        """Positions of its parts by kind, always the same parts in the same order."""
-
-
 # In parts of the length of a module: the planar robot has no height, and no width but that of its stance.
 _WIDTH, _HEIGHT, _GAP, _CLEARANCE, _LIFT = SLIMNESS, 0.22, 0.1, 0.24, 0.1
 _LEG, _FOOT, _PIN = 0.028, 0.045, (0.09, 0.26)
 
 
-class FlatBody:
-    """A robot of an engine that knows only where it is on the floor: the body it might have above its feet.
+def flat_places(seen: Seen) -> Mapping[str, Placed]:
+    """Positions by kind of the parts of a robot of an engine that knows only where it is on the floor, module 1 first:
+    the body it might have above its feet, which swing forward lifted by a tenth of a module's length."""
+    robot = seen.robot
+    n, length, legs, gait = robot.body.modules, robot.module_length, robot.legs, robot.gait
+    flat = bodies(
+        robot, np.array([seen.clock]), seen.pose[None, None, :2], seen.pose[None, None, 2],
+        seen.joint_angles[None, None], seen.leg_yaw[None, None],
+    )  # fmt: skip
+    centres, headings, pins = flat.centres[0, 0], flat.headings[0, 0], flat.spine[0, 0, 1:-1]
+    turned = _about_z(headings)
 
-    Feet swing forward as the gait has it, lifted by a tenth of a module's length.
-    """
-
-    def places(self, seen: Seen) -> Mapping[str, Placed]:
-        """See :class:`Body`."""
-        robot = seen.robot
-        n, length, legs, gait = robot.body.modules, robot.module_length, robot.legs, robot.gait
-        flat = bodies(
-            robot, np.array([seen.clock]), seen.pose[None, None, :2], seen.pose[None, None, 2],
-            seen.joint_angles[None, None], seen.leg_yaw[None, None],
-        )  # fmt: skip
-        centres, headings, pins = flat.centres[0, 0], flat.headings[0, 0], flat.spine[0, 0, 1:-1]
-        turned = _about_z(headings)
-
-        lift = np.where(flat.stands[0, 0], 0.0, np.sin(gait.swing_angle(gait.phases(seen.clock, n))))
-        inside = np.tile([legs.forward_offset, 0.5 * _WIDTH * length], (n, 2, 1))
-        inside[:, 1, 1] *= -1.0
-        hip_height = (_CLEARANCE + 0.5 * _HEIGHT) * length
-        feet = _raised(flat.feet[0, 0], (_FOOT + _LIFT * lift) * length).reshape(-1, 3)
-        hips = _raised(from_modules(centres, headings, inside), hip_height).reshape(-1, 3)
-        sizes = length * np.array([(1.0 - _GAP, _WIDTH, _HEIGHT), (_FOOT,) * 3, (_PIN[0], *_PIN)])
-        return {
-            "box": Placed(_raised(centres, hip_height), turned, np.tile(sizes[0], (n, 1))),
-            "rod": _rods(hips, feet, _LEG * length),
-            "ball": Placed(feet, np.tile([1.0, 0.0, 0.0, 0.0], (2 * n, 1)), np.tile(sizes[1], (2 * n, 1))),
-            "pin": Placed(_raised(pins, hip_height), turned[:-1], np.tile(sizes[2], (n - 1, 1))),
-        }
+    lift = np.where(flat.stands[0, 0], 0.0, np.sin(gait.swing_angle(gait.phases(seen.clock, n))))
+    inside = foot_places(legs.forward_offset, 0.5 * _WIDTH * length, np.zeros((n, 2)))
+    hip_height = (_CLEARANCE + 0.5 * _HEIGHT) * length
+    feet = _raised(flat.feet[0, 0], (_FOOT + _LIFT * lift) * length).reshape(-1, 3)
+    hips = _raised(from_modules(centres, headings, inside), hip_height).reshape(-1, 3)
+    sizes = length * np.array([(1.0 - _GAP, _WIDTH, _HEIGHT), (_FOOT,) * 3, (_PIN[0], *_PIN)])
+    return {
+        "box": Placed(_raised(centres, hip_height), turned, np.tile(sizes[0], (n, 1))),
+        "rod": _rods(hips, feet, _LEG * length),
+        "ball": Placed(feet, np.tile([1.0, 0.0, 0.0, 0.0], (2 * n, 1)), np.tile(sizes[1], (2 * n, 1))),
+        "pin": Placed(_raised(pins, hip_height), turned[:-1], np.tile(sizes[2], (n - 1, 1))),
+    }
 
 
 def _raised(flat: Array, height: float | Array) -> Array:

@@ -18,7 +18,7 @@ _KINDS = {"box": "box", "capsule": "rod", "cylinder": "rod", "sphere": "ball"}
 
 
 class SolidBody:
-    """Body of a robot with a twin, as its model has it; see :class:`chilopod.live.body.Body`."""
+    """Body of a robot with a twin, as its model has it."""
 
     def __init__(self, robot: Robot) -> None:
         plan = compiled(without_springs(robot))
@@ -33,7 +33,7 @@ class SolidBody:
         self._pins = np.tile((radius, radius, 2.0 * half_height), (len(self._yaw_joints), 1))
 
     def places(self, seen: Seen) -> Mapping[str, Placed]:
-        """See :class:`chilopod.live.body.Body`."""
+        """Positions of its parts by kind, module 1 first."""
         model, data = self._model, self._data
         data.qpos[:] = seen.state[: model.nq]
         mujoco.mj_kinematics(model, data)

@@ -26,9 +26,7 @@ class Challenge:
     task: ClassVar[str]
     answers: ClassVar[Sequence[str]] = ()
     hides: ClassVar[bool] = False  #: True if the pitchfork must not be shown until it is done
-
-    def __init__(self) -> None:
-        self.done, self.said = False, ""
+    done, said = False, ""
 
     def begin(self, seen: Seen) -> wishes.Wish | None:
         """Wish that sets the challenge up."""
@@ -63,10 +61,8 @@ class Onset(Challenge):
             return
         off = units.from_si(float(seen.stiffness[0]) - theory.pitchfork, PAPER_UNIT)
         self.done = abs(off) <= _NEAR
-        if self.done:
-            self.said = f"Done: the pitchfork is at {spring_text(theory.pitchfork)}."
-        else:
-            self.said = f"Not yet: the onset is at a {'softer' if off > 0.0 else 'stiffer'} spring."
+        no = f"Not yet: the onset is at a {'softer' if off > 0.0 else 'stiffer'} spring."
+        self.said = f"Done: the pitchfork is at {spring_text(theory.pitchfork)}." if self.done else no
 
 
 class Pole(Challenge):
@@ -112,9 +108,7 @@ class Left(Challenge):
     )
     answers = ("The gait prefers one side", "The spring decides", "The sides are alike: chance decides")
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._row, self._time, self._counts = 0, math.inf, False
+    _row, _time, _counts = 0, math.inf, False
 
     def look(self, seen: Seen) -> None:
         if self.done or self._row == 2:
@@ -135,11 +129,9 @@ class Left(Challenge):
         return self._row == 2 and not self.done
 
     def answer(self, given: str, seen: Seen, theory: Theory) -> None:
-        self.done = given == self.answers[-1]
-        if self.done:
-            self.said = "Done: both branches are mirror images, and the smallest disturbance chooses between them."
-        else:
-            self.said = "No: compare two seeds with the same spring and the same gait."
+        self.done, no = given == self.answers[-1], "No: compare two seeds with the same spring and the same gait."
+        yes = "Done: both branches are mirror images, and the smallest disturbance chooses between them."
+        self.said = yes if self.done else no
 
 
 CHALLENGES = {each.name: each for each in (Onset, Pole, Left)}

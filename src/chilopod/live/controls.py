@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from functools import partial
 from html import escape
 from itertools import groupby, zip_longest
@@ -20,6 +19,8 @@ from chilopod.live.challenges import CHALLENGES, Challenge
 from chilopod.live.pitchfork import Pitchfork
 from chilopod.live.plots import Plots
 from chilopod.live.presets import PRESETS
+from chilopod.live.recordings import Recordings
+from chilopod.live.scene import View
 from chilopod.live.session import Session
 from chilopod.live.sliders import Slider
 from chilopod.live.state import Seen, Settings
@@ -51,32 +52,25 @@ _KEYS: Final = (
 HELP = "| key | |\n|---|---|\n" + "\n".join(f"| {key} | {what} |" for key, what in _KEYS)
 
 
-@dataclass(frozen=True)
-class Calls:
-    """Functions that the controls call, each in a thread of the server."""
-
-    follow: Callable[[bool], None]  # with True if the picture is to follow the robot
-    record: Callable[[viser.ClientHandle | None], None]  # with the browser that wants a recording to begin or end
-    choose: Callable[[str], None]  # with the name of another preset
-    challenge: Callable[[str], None]  # with the name of a challenge, or that of none
-    answer: Callable[[str], None]  # with an answer to the challenge
-
-
 class Controls:
-    """Controls of a page with a title and the name of its preset."""
+    """Controls of a page with a title. ``later`` has what the page does, when it has time, with the name of another
+    preset, the name of a challenge, and an answer to it."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         session: Session,
         title: str,
+        view: View,
+        recordings: Recordings,
+        later: Sequence[Callable[[str], None]],
         preset: str,
-        calls: Calls,
     ) -> None:
-        self._server, self._put, self._settings = server, session.box.put, session.settings
-        self._file, self._calls = session.file, calls
-        self._seen: Seen = session.seen()
+        self._put, self._settings, self._seen = session.box.put, session.settings, session.seen()
+        self._file, self._rows, self._view, self._recordings = session.file, session.sliders, view, recordings
+        choose, challenge, answer = later
         self._helped: WeakKeyDictionary[viser.ClientHandle, Any] = WeakKeyDictionary()
+        self._moved = ""  # name of the slider that somebody moved last
         gui = server.gui
         gui.add_markdown(
             f"**{title}**. Soften the **first spring** until it bends, **click the floor**, **drag a joint** (purple). "
@@ -86,12 +80,20 @@ class Controls:
         self._task = gui.add_markdown("", visible=False)
         self._answers: list[Any] = [gui.add_button("-", visible=False) for _ in range(_ANSWERS)]
         for button in self._answers:
-            button.on_click(lambda event: calls.answer(event.target.label))
-        self.pitchfork = Pitchfork(gui, next(iter(session.sliders.values())).limits[1])
-        self._rows, self._sliders = session.sliders, dict[str, Any]()
-        self._slide(gui)
+            button.on_click(lambda event: answer(event.target.label))
+        self.pitchfork = Pitchfork(gui, next(iter(self._rows.values())).limits[1])
+        self._sliders: dict[str, Any] = {}
+        for folder, rows in groupby(self._rows.values(), lambda row: row.folder):
+            with gui.add_folder(folder, expand_by_default=False) if folder else nullcontext():
+                for row in rows:
+                    self._add_slider(gui, row)
         self._walking(gui)
-        self._tasks(gui, preset)
+        hint = "Robots and floors to choose"
+        robots: Any = gui.add_dropdown("robot", list(PRESETS), initial_value=preset, hint=hint)
+        robots.on_update(lambda _: choose(robots.value))
+        names, hint = [_NO_CHALLENGE, *CHALLENGES], "A task, and a check of what you did"
+        challenges: Any = gui.add_dropdown("challenge", names, initial_value=_NO_CHALLENGE, hint=hint)
+        challenges.on_update(lambda _: challenge(challenges.value))
         self._targets(gui)
         self._joints(gui)
         self.plots = Plots(gui, self._file.body.modules - 1)
@@ -100,23 +102,27 @@ class Controls:
         self._keys(gui)
 
     def reflect(self, settings: Settings, seen: Seen) -> None:
-        """Show the present settings, after a wish was refused or the walk itself changed one."""
+        """Show the present settings after a wish or the walk itself has changed them.
+
+        What somebody drags is not sent back, because it would jump.
+        """
         before, self._settings, self._seen = self._settings, settings, seen
         if settings == before:
             return
+        changed = (row for row in self._rows.values() if row.read(settings) != row.read(before))
+        self._show((row for row in changed if row.name != self._moved), settings)
         self._walks.options = _walking_options(settings.paused)
         self._record.label = "End the recording (C)" if settings.recording else "Record (C)"
         self._seed.value = settings.seed
 
     def put_back(self, now: Settings) -> None:
-        """Show the present value of every control, after a wish was refused or came from elsewhere.
-
-        A browser's own change is not sent back to it, because a dragged slider would jump.
-        """
-        for name, row in self._rows.items():
-            if not row.moves:
-                self._sliders[name].value = row.at_page(row.read(now))
+        """Show the present value of every control, after a wish was refused or came from elsewhere."""
+        self._show(self._rows.values(), now)
         self._seed.value, self._strategy.value = now.seed, now.strategy
+
+    def _show(self, rows: Iterable[Slider], now: Settings) -> None:
+        for row in rows:
+            self._sliders[row.name].value = row.at_page(row.read(now))
 
     def show_link(self, address: str) -> None:
         """Show the address that leads to the present settings."""
@@ -143,24 +149,18 @@ class Controls:
 
     # -- parts of the panel
 
-    def _slide(self, gui: viser.GuiApi) -> None:
-        """Every slider, those of a folder in it."""
-        for folder, rows in groupby(self._rows.values(), lambda row: row.folder):
-            with gui.add_folder(folder, expand_by_default=False) if folder else nullcontext():
-                for row in rows:
-                    self._sliders[row.name] = self._slider(gui, row)
-
-    def _slider(self, gui: viser.GuiApi, row: Slider) -> Any:
-        low, high = map(row.at_page, row.limits)
-        value = row.at_page(row.read(self._settings))
+    def _add_slider(self, gui: viser.GuiApi, row: Slider) -> None:
+        (low, high), value = map(row.at_page, row.limits), row.at_page(row.read(self._settings))
         slider: Any = gui.add_slider(row.label, low, high, row.step, value, hint=row.hint)
+        slider.on_update(
+            lambda event: self._wish(row) if event.client else None
+        )  # and not where :meth:`_show` moves it
+        self._sliders[row.name] = slider
 
-        async def move(_: Any) -> None:
-            for name in row.moves:
-                self._sliders[name].value = slider.value
-
-        slider.on_update(move if row.moves else lambda _: self._put(wishes.Set(row.name, row.from_page(slider.value))))
-        return slider
+    def _wish(self, row: Slider) -> None:
+        """Leave the wish that goes with the present place of a slider."""
+        self._moved = row.name
+        self._put(wishes.Set(row.name, row.from_page(self._sliders[row.name].value)))
 
     def _walking(self, gui: viser.GuiApi) -> None:
         hint = "Keys: space, N, R (with the next seed)"
@@ -168,14 +168,6 @@ class Controls:
         self._walks.on_click(lambda _: self._walk(self._walks.value))
         hint, largest = "Seed of the start and of the nudges", wishes.LARGEST_SEED
         self._seed: Any = gui.add_number("seed", self._settings.seed, min=0, max=largest, step=1, hint=hint)
-
-    def _tasks(self, gui: viser.GuiApi, preset: str) -> None:
-        """Presets and challenges."""
-        robot: Any = gui.add_dropdown("robot", list(PRESETS), initial_value=preset, hint="Robots and floors to choose")
-        robot.on_update(lambda _: self._calls.choose(robot.value))
-        names, hint = [_NO_CHALLENGE, *CHALLENGES], "A task, and a check of what you did"
-        challenge: Any = gui.add_dropdown("challenge", names, initial_value=_NO_CHALLENGE, hint=hint)
-        challenge.on_update(lambda _: self._calls.challenge(challenge.value))
 
     def _targets(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Target", expand_by_default=False):
@@ -198,19 +190,19 @@ class Controls:
 
     def _recording(self, gui: viser.GuiApi) -> None:
         self._record = gui.add_button("Record (C)", hint="Recording as a netCDF file, and as a page that plays it")
-        self._record.on_click(lambda event: self._toggle_record(event.client))
+        self._record.on_click(self._toggle_record)
         self._follow: Any = gui.add_checkbox("follow the robot (M)", True)
-        self._follow.on_update(lambda _: self._calls.follow(self._follow.value))
+        self._follow.on_update(lambda _: setattr(self._view, "follow", self._follow.value))
 
     def _keys(self, gui: viser.GuiApi) -> None:
         def key(label: str, hotkey: Any, do: Callable[..., object], *to: object, shift: bool = False) -> None:
             command = gui.add_command(label, hotkey=hotkey, modifier="shift" if shift else None)
             command.on_trigger(partial(_do, do, *to))
 
-        for name, row in self._rows.items():
+        for row in self._rows.values():
             for (hotkey, label), factor in zip(row.keys, (1.0 / row.factor, row.factor), strict=False):
-                key(label, hotkey, _scale, self._sliders[name], factor, shift=row.shift)
-        key("Pause, or go on", "space", self._toggle_pause)
+                key(label, hotkey, self._scale, row, factor, shift=row.shift)
+        key("Pause, or go on", "space", self._walk, "")
         key("One gait cycle", "N", self._put, wishes.Step(1.0))
         key("Begin anew with the next seed", "R", self._next_seed)
         key("Target further left", "B", self._turn, _TURN)
@@ -222,15 +214,22 @@ class Controls:
             key(f"Joint {joint}", joint, setattr, self._joint, "value", joint)
         key("Pull the joint left", "J", self._pull, 1.0)
         key("Pull the joint right", "K", self._pull, -1.0)
-        key("Follow the robot, or not", "M", self._toggle_follow)
-        gui.add_command("Record", hotkey="C").on_trigger(lambda event: self._toggle_record(event.client))
+        key("Follow the robot, or not", "M", lambda: setattr(self._follow, "value", not self._follow.value))
+        gui.add_command("Record", hotkey="C").on_trigger(self._toggle_record)
         gui.add_command("Help", hotkey="H").on_trigger(self._help)
 
     # -- what they do
 
-    def drag(self, joint: int, aside: float, ended: bool) -> None:
-        """Pull a joint that is dragged aside, m to the left, until it is let go."""
-        share = 0.0 if ended else _A_LENGTH * aside / self._file.module_length
+    async def drag(self, event: Any) -> None:
+        """Pull a joint that is dragged aside until it is let go."""
+        joint = event.instance_index
+        if joint is None:
+            return
+        w, _, _, z = self._view.pins.batched_wxyzs[joint].tolist()  # a pin stands upright
+        (x0, y0, _), (x1, y1, _) = event.start_position, event.end_position
+        angle = 2.0 * math.atan2(z, w)
+        aside = math.cos(angle) * (y1 - y0) - math.sin(angle) * (x1 - x0)
+        share = 0.0 if event.phase == "end" else _A_LENGTH * aside / self._file.module_length
         self._put(wishes.Pull(joint, share * self._file.springs.stiffness[joint]))
 
     def _pull(self, way: float, _: object = None) -> None:
@@ -243,13 +242,12 @@ class Controls:
         elif what == _ANEW:
             self._put(wishes.Reset(self._seed.value))
         else:
-            self._toggle_pause()
+            self._put(wishes.Pause(not self._settings.paused))
 
-    def _toggle_pause(self) -> None:
-        self._put(wishes.Pause(not self._settings.paused))
-
-    def _toggle_follow(self) -> None:
-        self._follow.value = not self._follow.value
+    def _scale(self, row: Slider, factor: float) -> None:
+        slider = self._sliders[row.name]
+        slider.value = float(np.clip(slider.value * factor, slider.min, slider.max))
+        self._wish(row)
 
     def _next_seed(self) -> None:
         self._put(wishes.Reset((self._settings.seed + 1) % (wishes.LARGEST_SEED + 1)))
@@ -280,8 +278,8 @@ class Controls:
             gui.add_button("Close").on_click(lambda _: None if modal.closed else modal.close())
         self._helped[event.client] = modal
 
-    def _toggle_record(self, client: viser.ClientHandle | None) -> None:
-        self._calls.record(client)
+    def _toggle_record(self, event: Any) -> None:
+        self._recordings.wanted_by = event.client
         self._put(wishes.Record(not self._settings.recording))
 
 
@@ -292,7 +290,3 @@ def _walking_options(paused: bool) -> tuple[str, ...]:
 async def _do(do: Callable[..., object], *to: object) -> None:
     """Action of a key, in the server's thread, which alone may change the page."""
     do(*to[:-1])  # the last is the event of the key
-
-
-def _scale(slider: Any, factor: float) -> None:
-    slider.value = float(np.clip(slider.value * factor, slider.min, slider.max))

@@ -50,12 +50,9 @@ _LOADING = 60.0  # s from the request of a page to the first word of its scripts
 _LOG = logging.getLogger("chilopod.live")
 _PATCHING = threading.Lock()
 _HOST = re.compile(r"([a-z0-9._-]+|\[[0-9a-f:.]+\])(:\d+)?", re.IGNORECASE)
-_KINDS: dict[str, Any] = {
-    each.__name__: each
-    for each in (
-        *(_messages.ViewerCameraMessage, _messages.ScenePointerMessage, _messages.SceneNodeDragMessage),
-        *(_messages.GuiUpdateMessage, _messages.CommandTriggerMessage),
-    )
+_KINDS: dict[str, Any] = {  # all messages that a browser may send
+    f"{name}Message": getattr(_messages, f"{name}Message")
+    for name in ("ViewerCamera", "ScenePointer", "SceneNodeDrag", "GuiUpdate", "CommandTrigger")
 }
 _HEADERS = {
     "X-Content-Type-Options": "nosniff",

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from html import escape
 from textwrap import wrap
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import viser
@@ -16,6 +16,7 @@ from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.frozen import Array
 from chilopod.live.state import Seen
 from chilopod.live.theory import Theory
+from chilopod.show.figures.branch import stretches
 from chilopod.show.style import SCENE
 
 _WIDTH, _HEIGHT = 320.0, 200.0  # px
@@ -97,16 +98,9 @@ def _branches(theory: Theory, bends: Array, place: _Place) -> list[str]:
         parts.append(_text(_RIGHT, _BOTTOM - 21.0, escape(theory.remark), "end"))
     for side in (1.0, -1.0):
         points = [place(*each) for each in zip(theory.springs, side * bends, strict=True)]
-        for first, last in _stretches(theory.stable):
-            look = _STABLE if theory.stable[last] else _UNSTABLE
-            parts.append(_line(points[first : last + 1], look))
+        for first, last, stable in stretches(theory.stable.tolist()):
+            parts.append(_line(points[first : last + 1], _STABLE if stable else _UNSTABLE))
     return parts
-
-
-def _stretches(stable: Any) -> list[tuple[int, int]]:
-    """First and last point of every stretch of equal stability; the next one begins where one ends."""
-    ends = [*(np.flatnonzero(stable[1:] != stable[:-1])), len(stable) - 1]
-    return list(zip([0, *ends[:-1]], ends, strict=True)) if len(stable) > 1 else []
 
 
 def _axes(place: _Place) -> list[str]:
@@ -114,12 +108,12 @@ def _axes(place: _Place) -> list[str]:
     for bend in (-180, -90, 0, 90, 180):
         if abs(bend) <= place.most:
             y = place(0.0, bend)[1]
-            parts += [_grid((_LEFT, y), (_RIGHT, y)), _text(_LEFT - 4.0, y + 4.0, f"{bend}°".replace("-", "−"), "end")]
+            parts += [_grid(_LEFT, y, _RIGHT, y), _text(_LEFT - 4.0, y + 4.0, f"{bend}°".replace("-", "−"), "end")]
     widest = _in_unit(place.stiffest)
     step = 10.0 ** np.floor(np.log10(widest))
     for spring in np.arange(0.0, widest + 1e-9, step if widest > 3.0 * step else 0.5 * step):
         x = _LEFT + (_RIGHT - _LEFT) * spring / widest
-        parts += [_grid((x, _TOP), (x, _BOTTOM)), _text(x, _BOTTOM + 14.0, f"{spring:g}", "middle")]
+        parts += [_grid(x, _TOP, x, _BOTTOM), _text(x, _BOTTOM + 14.0, f"{spring:g}", "middle")]
     middle, below = 0.5 * (_LEFT + _RIGHT), _BOTTOM + 29.0
     parts += [
         _text(middle, below, "first spring (N·mm/deg); dashed: unstable", "middle"),
@@ -138,8 +132,7 @@ def _line(points: list[tuple[float, float]], look: str) -> str:
     return f'<polyline points="{along}" fill="none" stroke="{SCENE["edge"]}" {look}/>'
 
 
-def _grid(start: tuple[float, float], end: tuple[float, float]) -> str:
-    (x0, y0), (x1, y1) = start, end
+def _grid(x0: float, y0: float, x1: float, y1: float) -> str:
     return f'<path d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}" stroke="currentColor" opacity="0.15"/>'
 
 

@@ -20,8 +20,7 @@ class Plots:
     """Plot of the mean angles of some number of yaw joints; nothing is created during the walk."""
 
     def __init__(self, gui: viser.GuiApi, joints: int) -> None:
-        self._times: deque[float] = deque(maxlen=_POINTS)
-        self._angles: deque[Array] = deque(maxlen=_POINTS)
+        self._kept: deque[tuple[float, Array]] = deque(maxlen=_POINTS)  # times, and angles in deg
         colors = [CURVES[joint % len(CURVES)] for joint in range(joints)]
         self._angle = gui.add_uplot(
             (np.zeros(2), *[np.zeros(2)] * joints),
@@ -35,16 +34,15 @@ class Plots:
 
     def forget(self) -> None:
         """Begin anew."""
-        self._times.clear()
-        self._angles.clear()
+        self._kept.clear()
 
     def add(self, seen: Seen) -> None:
         """Keep the present state of the walk."""
-        if not self._times or seen.time - self._times[-1] >= _SPAN / _POINTS:
-            self._times.append(seen.time)
-            self._angles.append(np.rad2deg(seen.mean_angles))
+        if not self._kept or seen.time - self._kept[-1][0] >= _SPAN / _POINTS:
+            self._kept.append((seen.time, np.rad2deg(seen.mean_angles)))
 
     def show(self) -> None:
         """Draw the states that are kept."""
-        if len(self._times) >= 2:
-            self._angle.data = (np.array(self._times), *np.array(self._angles).T.copy())
+        if len(self._kept) >= 2:
+            times, angles = zip(*self._kept, strict=True)
+            self._angle.data = (np.array(times), *np.array(angles).T.copy())

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
+from chilopod.analysis.parameters import ALL
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.live import wishes
 from chilopod.live.sliders import Slider
@@ -55,12 +56,9 @@ PRESETS: Final = {
 
 def query(settings: Settings, file: Settings, sliders: Mapping[str, Slider], preset: str) -> str:
     """Part of an address that leads to the present settings from those of the file."""
-    parts = {} if preset == OWN else {"robot": preset}
-    for row in sliders.values():
-        value = row.read(settings)
-        if not row.moves and value != row.read(file):
-            parts[row.key] = f"{row.at_page(value):g}"
-    return urlencode(parts | {"seed": str(settings.seed)})
+    changed = (row for row in sliders.values() if row.name != ALL and row.read(settings) != row.read(file))
+    parts = {row.key: f"{row.at_page(row.read(settings)):g}" for row in changed}
+    return urlencode({**({} if preset == OWN else {"robot": preset}), **parts, "seed": settings.seed})
 
 
 def preset_of(asked: str) -> str | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,6 @@ _SHADOW, _ON_FLOOR = 0.002, 0.004  # m above the floor: shadows; paths and targe
 _WAY = 300  # points of the way that it came
 _EYE = np.array([-0.5, -0.68, 0.68])  # place of the eye over the length of the robot
 _NARROW = 1.3  # width of a picture over its height below which the eye moves back
-_UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0]])
 
 
 def _rgb(color: str) -> tuple[int, int, int]:
@@ -60,53 +60,21 @@ class View:
         self._world = scene.add_frame(WORLD, show_axes=False)
         side = _TILES * self._tile
         self._floor = scene.add_image(f"{WORLD}/floor", _tiles(), side, side, cast_shadow=False, receive_shadow=False)
-        plain: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
-        self._batches = {
-            kind: scene.add_batched_meshes_simple(
-                f"{WORLD}/{kind}",
-                *_mesh(kind),
-                placed[kind].turns,
-                placed[kind].centres,
-                batched_scales=placed[kind].scales,
-                batched_colors=_colors(kind, len(placed[kind].centres)),
-                flat_shading=kind == "box",
-                **plain,
-            )
-            for kind in KINDS
-        }
-        count = len(placed["box"].centres)
-        self._shadows = scene.add_batched_meshes_simple(
-            f"{WORLD}/shadows",
-            *_mesh("box"),
-            np.tile(_UPRIGHT, (count, 1)),
-            placed["box"].centres,
-            batched_scales=placed["box"].scales * (1.0, 1.0, 0.0) + (0.0, 0.0, 1e-4),
-            batched_colors=np.tile(_lit(_SHADE), (count, 1)),
-            **plain,
-        )
+        self._batches = {kind: _add(scene, kind, kind, placed[kind], _COLORS[kind]) for kind in KINDS}
+        self.pins = self._batches["pin"]  #: the yaw joints, which can be dragged
+        self._batches["box"].batched_colors = np.stack([_FRONT, *[_COLORS["box"]] * (len(placed["box"].centres) - 1)])
+        flat = placed["box"].scales * (1.0, 1.0, 0.0) + (0.0, 0.0, 1e-4)
+        self._shadows = _add(scene, "shadows", "box", replace(placed["box"], scales=flat), _lit(_SHADE))
         self._way = scene.add_line_segments(
             f"{WORLD}/way", np.zeros((_WAY - 1, 2, 3)), _rgb(SCENE["path"]), thickness=2.5, thickness_units="screen"
         )
         self._points: deque[Array] = deque(maxlen=_WAY)
         self._apart = 0.02 * length
-        self._target = scene.add_batched_meshes_simple(
-            f"{WORLD}/target",
-            *_mesh("pin"),
-            np.tile(_UPRIGHT, (2, 1)),
-            np.zeros((2, 3)),
-            batched_scales=np.array([[ARRIVAL_RADIUS, ARRIVAL_RADIUS, 0.002], [0.01, 0.01, 0.3]]),
-            batched_colors=np.tile(_TARGET, (2, 1)),
-            opacity=0.6,
-            visible=False,
-            **plain,
-        )
+        pole = np.array([[ARRIVAL_RADIUS, ARRIVAL_RADIUS, 0.002], [0.01, 0.01, 0.3]])
+        upright = Placed(np.zeros((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), pole)
+        self._target = _add(scene, "target", "pin", upright, _TARGET, opacity=0.6, visible=False)
         self._eye = length * _EYE
         server.initial_camera.position, server.initial_camera.look_at = tuple(self._eye), (0.0, 0.0, 0.0)
-
-    @property
-    def pins(self) -> Any:
-        """The yaw joints, which can be dragged."""
-        return self._batches["pin"]
 
     @property
     def origin(self) -> Array:
@@ -195,18 +163,19 @@ def _tiles() -> NDArray[np.uint8]:
     return np.concatenate([colors, seen[..., None]], axis=2).astype(np.uint8)
 
 
-def _mesh(kind: str) -> tuple[Any, Any]:
+def _add(scene: viser.SceneApi, name: str, kind: str, placed: Placed, color: NDArray[np.uint8], **look: Any) -> Any:
+    """Parts of a kind in one colour, as one object of the picture."""
     if kind == "box":
         shape = trimesh.creation.box()
     elif kind == "ball":
         shape = trimesh.creation.icosphere(subdivisions=1)
     else:
         shape = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=16)
-    return shape.vertices, shape.faces
-
-
-def _colors(kind: str, count: int) -> NDArray[np.uint8]:
-    colors = np.tile(_COLORS[kind], (count, 1))
-    if kind == "box":
-        colors[0] = _FRONT
-    return colors
+    return scene.add_batched_meshes_simple(
+        f"{WORLD}/{name}",
+        *(shape.vertices, shape.faces, placed.turns, placed.centres),
+        batched_scales=placed.scales,
+        batched_colors=np.tile(color, (len(placed.centres), 1)),
+        flat_shading=name == "box",
+        **{"lod": "off", "cast_shadow": False, "receive_shadow": False, **look},
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -69,14 +68,10 @@ class Session:
 
     Attributes
     ----------
-    box
-        Box for wishes, from any thread.
-    settings
-        Wishes that were granted.
-    sliders
-        Sliders of this robot by name.
-    file
-        The robot as it was given, with springs that can all be changed.
+    box, settings, first
+        Wishes from any thread, those that were granted, and what was set at first.
+    file, sliders
+        The robot as it was given, with springs that can all be changed, and its sliders by name.
     law
         Radius law of the springs, which strategies need; None while it is not known.
 
@@ -91,7 +86,7 @@ class Session:
         self.file = robot.override("springs.adjustable", True)
         self._engine.common(self.file)
         strategy = strategy_named(strategy, ON_THE_WAY).name
-        self.settings = Settings(self.file, 1.0, strategy, SPEED, False, as_seed(seed), False)
+        self.settings = self.first = Settings(self.file, 1.0, strategy, SPEED, False, as_seed(seed), False)
         self.sliders = sliders_of(self.file)
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
@@ -114,7 +109,7 @@ class Session:
             looked.stiffness[0],
             looked.leg_yaw[0],
             np.array(self._looks).mean(axis=0),
-            self._turning(),
+            (self._bends[-1] - self._bends[0]) / self._period if len(self._bends) > LOOKS else 0.0,
             self._pull.copy(),
             self._target,
             self._steering,
@@ -147,7 +142,7 @@ class Session:
     def walk_on(self, seconds: float) -> None:
         """Walk on; a robot that has failed stays where it is."""
         until = self._walk.time + seconds
-        while self._walks:
+        while self._walk.status[0] is Status.WALKED:
             time = self._look_next / LOOKS * self._period
             if time > until:
                 self._go(until)
@@ -155,7 +150,7 @@ class Session:
             self._go(time)
             self._look()
             self._look_next += 1
-            if (self._look_next - 1) % LOOKS == 0 and self._walks:
+            if (self._look_next - 1) % LOOKS == 0 and self._walk.status[0] is Status.WALKED:
                 left = until - self._walk.time
                 self._between_cycles()
                 until = self._walk.time + left
@@ -166,10 +161,6 @@ class Session:
         self._keep_record()
 
     # -- inside
-
-    @property
-    def _walks(self) -> bool:
-        return self._walk.status[0] is Status.WALKED
 
     @property
     def _period(self) -> float:
@@ -192,7 +183,7 @@ class Session:
         self._bends: deque[float] = deque(maxlen=LOOKS + 1)
 
     def _start(self, robot: Robot, states: Array) -> None:
-        if self.settings.recording and not self._may_record:
+        if self.settings.recording and not (self._recorded < _MOST_RECORDS and self._bytes < _MOST_BYTES):
             self.settings = replace(self.settings, recording=False)
             self._messages.append(f"recording has ended: there is room for no more than the {self._recorded} so far")
         self._written = self._has_record = self.settings.recording
@@ -206,10 +197,7 @@ class Session:
 
     def _go(self, until: float) -> None:
         steer(self._walk, until, self._controller)
-        if self._target is None:
-            return
-        away = float(np.hypot(*(self._walk.pose()[0, :2] - self._target)))
-        if away < ARRIVAL_RADIUS:
+        if self._target is not None and np.hypot(*(self._walk.pose()[0, :2] - self._target)) < ARRIVAL_RADIUS:
             took = self._before + self._walk.time - self._reached
             self._messages.append(f"arrived after {took:.0f} s")
             self._let_go()
@@ -223,9 +211,6 @@ class Session:
         if np.isfinite(angles).all():
             self._looks.append(angles)
             self._bends.append(float(np.abs(np.mean(self._looks, axis=0)).sum()))
-
-    def _turning(self) -> float:
-        return (self._bends[-1] - self._bends[0]) / self._period if len(self._bends) > LOOKS else 0.0
 
     def _between_cycles(self) -> None:
         """Changes that are possible between two gait cycles only."""
@@ -245,11 +230,13 @@ class Session:
         seen = self._walk.observe()
         states = self._walk.states()
         self._before += self._walk.time
-        self._start(_with_springs(robot, seen.stiffness[0].tolist()), states)
+        for joint, value in enumerate(seen.stiffness[0].tolist()):
+            robot = robot.with_value(f"{ALL}[{joint}]", value)
+        self._start(robot, states)
         if self._target is not None:
             self._walk.aim(self._target)
         self._walk.command(Command(leg_yaw=seen.leg_yaw))
-        if not self._steers_springs:
+        if not isinstance(self._controller, SpringLaw):
             self._set_springs()
 
     def _keep_record(self) -> None:
@@ -259,18 +246,10 @@ class Session:
             self._records.append(record)
         self._written = False
 
-    @property
-    def _may_record(self) -> bool:
-        return self._recorded < _MOST_RECORDS and self._bytes < _MOST_BYTES
-
     def _push(self) -> None:
         # Who drives the joints would take the nudges back at once.
         if not isinstance(self._controller, ActuatedAxis):
             self._walk.command(Command(joint_torque=[self._nudge + self._pull]))
-
-    @property
-    def _steers_springs(self) -> bool:
-        return isinstance(self._controller, SpringLaw)
 
     def _set_springs(self) -> None:
         self._walk.command(Command(stiffness=[self.settings.robot.springs.stiffness]))
@@ -305,11 +284,10 @@ class Session:
                 self._keep_record()
                 self.settings = replace(self.settings, seed=as_seed(seed))
                 self._begin()
-            case wishes.Record(on):
-                if on:
-                    self.settings = replace(self.settings, recording=True)
-                else:
-                    self.stop_recording()
+            case wishes.Record(True):
+                self.settings = replace(self.settings, recording=True)
+            case wishes.Record():
+                self.stop_recording()
 
     def _set(self, name: str, value: object) -> None:
         slider = self.sliders.get(name)
@@ -322,7 +300,7 @@ class Session:
         self.settings = settings
         if settings.robot.springs == before.springs:
             return
-        if self._steers_springs:
+        if isinstance(self._controller, SpringLaw):
             self._messages.append("your springs are back when the target is reached")
         else:
             self._set_springs()
@@ -359,9 +337,3 @@ class Session:
         self._push()
         if isinstance(self._controller, ActuatedAxis):
             self._messages.append("the strategy actuated drives the joints, so they cannot be pulled")
-
-
-def _with_springs(robot: Robot, stiffness: Sequence[float]) -> Robot:
-    for joint, value in enumerate(stiffness):
-        robot = robot.with_value(f"{ALL}[{joint}]", value)
-    return robot

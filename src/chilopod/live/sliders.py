@@ -36,7 +36,6 @@ class Slider:
     keys: tuple[tuple[str, str], ...] = ()  # hot keys: smaller, larger, each with its words
     shift: bool = False  # True if the keys are pressed with shift
     factor: float = 1.1  # by which a key changes the value
-    moves: tuple[str, ...] = ()  # names of the sliders that follow this one at the page
     folder: str = ""  # of the panel, empty for none
 
     def at_page(self, value: float) -> float:
@@ -54,10 +53,7 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
     rows = (
         *_springs(file),
         Slider(
-            name="friction",
-            key="friction",
-            label="friction",
-            hint="Friction of the floor, relative to the robot file",
+            *("friction", "friction", "friction", "Friction of the floor, relative to the robot file"),
             unit="",
             si="times that of the robot file",
             limits=(0.3, 3.0),
@@ -66,23 +62,18 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
             apply=lambda settings, factor: _with_friction(settings, file, factor),
             keys=(("F", "Floor more slippery"), ("G", "Floor less slippery")),
         ),
-        _of_robot(
-            "gait.stride",
-            key="stride",
-            label="stride",
-            hint="Length of every step, cm",
+        Slider(
+            *("gait.stride", "stride", "stride", "Length of every step, cm"),
             unit="cm",
             si="m",
             limits=(STRIDES[0] * stride, STRIDES[1] * stride),
             step=round(100.0 * stride / 60.0, 6),
+            **_of_robot("gait.stride"),
             keys=(("F", "Shorter steps"), ("G", "Longer steps")),
             shift=True,
         ),
         Slider(
-            name="speed",
-            key="speed",
-            label="speed",
-            hint="Seconds of walking that one second shows",
+            *("speed", "speed", "speed", "Seconds of walking that one second shows"),
             unit="",
             si="times real time",
             limits=(1.0, 20.0),
@@ -96,13 +87,12 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
     return {row.name: row for row in rows}
 
 
-def _of_robot(path: str, **look: Any) -> Slider:
-    """Slider of a number of the robot file."""
-
-    def apply(settings: Settings, value: float) -> Settings:
-        return replace(settings, robot=settings.robot.with_value(path, value))
-
-    return Slider(name=path, **{"read": lambda settings: settings.robot.get(path), "apply": apply, **look})
+def _of_robot(path: str) -> dict[str, Any]:
+    """Functions of a slider of a number of the robot file."""
+    return {
+        "read": lambda settings: settings.robot.get(path),
+        "apply": lambda settings, value: replace(settings, robot=settings.robot.with_value(path, value)),
+    }
 
 
 def _springs(file: Robot) -> list[Slider]:
@@ -110,45 +100,22 @@ def _springs(file: Robot) -> list[Slider]:
     own = file.springs
     low = _SOFTEST * max(own.stiffness) if own.softest is None else min(own.softest)
     high = _STIFFEST * max(own.stiffness) if own.stiffest is None else max(own.stiffest)
-    look: dict[str, Any] = {
-        "unit": PAPER_UNIT,
-        "si": "N*m/rad",
-        "limits": (low, high),
-        "step": float(f"{units.from_si(high - low, PAPER_UNIT) / 400.0:.1g}"),
-    }
-    names = tuple(f"{ALL}[{joint}]" for joint in range(len(own.stiffness)))
-    first = _of_robot(
-        names[0],
-        key="k1",
-        label="first spring",
-        hint="Stiffness of joint 1 (the paper's k1), N·mm/deg",
-        keys=(("Z", "First spring softer"), ("X", "First spring stiffer")),
-        **look,
+    step = float(f"{units.from_si(high - low, PAPER_UNIT) / 400.0:.1g}")
+    look: dict[str, Any] = {"unit": PAPER_UNIT, "si": "N*m/rad", "limits": (low, high), "step": step}
+    first, *others = (
+        Slider(name, f"k{joint}", f"spring {joint}", f"Stiffness of joint {joint}, N·mm/deg", **look, **_of_robot(name))
+        for joint, name in enumerate((f"{ALL}[{joint}]" for joint in range(len(own.stiffness))), 1)
     )
-    together = _of_robot(
-        ALL,
-        key="k",
-        label="all springs",
-        hint="Stiffness of all joints, N·mm/deg",
-        read=lambda settings: float(np.mean(settings.robot.springs.stiffness)),
-        moves=names,
-        keys=(("Z", "All springs softer"), ("X", "All springs stiffer")),
-        shift=True,
-        **look,
+    keys = (("Z", "First spring softer"), ("X", "First spring stiffer"))
+    hint = "Stiffness of joint 1 (the paper's k1), N·mm/deg"
+    first = replace(first, label="first spring", hint=hint, keys=keys)
+    keys, hint = (
+        (("Z", "All springs softer"), ("X", "All springs stiffer")),
+        "Stiffness of all joints (their mean), N·mm/deg",
     )
-    folder = "Each spring (N·mm/deg)"
-    others = (
-        _of_robot(
-            name,
-            key=f"k{joint}",
-            label=f"spring {joint}",
-            hint=f"Stiffness of joint {joint}, N·mm/deg",
-            folder=folder,
-            **look,
-        )
-        for joint, name in enumerate(names[1:], 2)
-    )
-    return [first, together, *others]
+    together = Slider(ALL, "k", "all springs", hint, **look, **_of_robot(ALL), keys=keys, shift=True)
+    together = replace(together, read=lambda settings: float(np.mean(settings.robot.springs.stiffness)))
+    return [first, together, *(replace(row, folder="Each spring (N·mm/deg)") for row in others)]
 
 
 def _with_friction(settings: Settings, file: Robot, factor: float) -> Settings:

@@ -68,8 +68,7 @@ def growth_of(robot: Robot) -> Growth:
     """Rate of growth of a small bend about the straight walk, by the planar theory."""
     from chilopod.analysis import straight_walk
 
-    exponents = straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"]
-    rate, sways = max(exponents)
+    rate, sways = max(straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"])
     return Growth(robot, rate, abs(sways))
 
 
@@ -85,11 +84,7 @@ def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> 
         else:
             from chilopod.tasks import radius_law
 
-            law = radius_law(
-                robot,
-                engine,
-                progress=lambda done, words: callback(replace(known, remark=_share(done))),
-            )
+            law = radius_law(robot, engine, progress=lambda done, _: callback(_following(known, done)))
             stable = np.ones(len(law.values), dtype=np.bool_)
             callback(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
     except ChilopodError as error:
@@ -108,12 +103,8 @@ def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
     callback(replace(known, remark="computing the pitchfork"))
     loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
     known = replace(known, pitchfork=loss.point.value)
-    callback(replace(known, remark=_share(0.0)))
-
-    def follow(done: float, words: str) -> None:
-        callback(replace(known, remark=_share(done)))
-
-    walks = curved_walks(robot, K1, (low, high), side=-1, progress=follow)
+    callback(_following(known, 0.0))
+    walks = curved_walks(robot, K1, (low, high), side=-1, progress=lambda done, _: callback(_following(known, done)))
     possible = walks.verdict.values != Status.OUT_OF_RANGE.label
     known = replace(
         known,
@@ -130,8 +121,8 @@ def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
     callback(known)
 
 
-def _share(done: float) -> str:
-    return f"computing the branch: {100.0 * done:.0f} %"
+def _following(known: Theory, done: float) -> Theory:
+    return replace(known, remark=f"computing the branch: {100.0 * done:.0f} %")
 
 
 class Beside:
@@ -145,13 +136,10 @@ class Beside:
             self._process.start()
         there.close()
 
-    def ask(self, robot: Robot) -> None:
-        """Ask for the theory of a robot."""
-        self._send("theory", robot)
-
-    def ask_growth(self, robot: Robot) -> None:
-        """Ask for the growth of small bends of its straight walk."""
-        self._send("growth", robot)
+    def ask(self, robot: Robot, what: str = "theory") -> None:
+        """Ask for the theory of a robot, or for the ``growth`` of small bends of its straight walk."""
+        with suppress(OSError):  # the process may have ended, and answers nothing any more
+            self._here.send((what, robot))
 
     def answers(self) -> list[Theory | Growth]:
         """Answers since the last call; never waits."""
@@ -166,10 +154,6 @@ class Beside:
         self._here.close()
         self._process.terminate()
         self._process.join(timeout=5.0)
-
-    def _send(self, what: str, robot: Robot) -> None:
-        with suppress(OSError):  # it may have ended, and answers nothing any more
-            self._here.send((what, robot))
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Hashable
 from dataclasses import dataclass
 
 LARGEST_SEED = 2**53 - 1
@@ -12,26 +11,11 @@ LARGEST_SEED = 2**53 - 1
 
 
 @dataclass(frozen=True)
-class Wish:
-    """Base of the wishes; of several of the same kind only the last counts."""
-
-    @property
-    def kind(self) -> Hashable:
-        """Kind of the wish."""
-        return type(self).__name__
-
-
-@dataclass(frozen=True)
-class Set(Wish):
+class Set:
     """Another value (SI) of a slider, by its name in :func:`chilopod.live.sliders.sliders_of`."""
 
     slider: str
     value: float
-
-    @property
-    def kind(self) -> Hashable:
-        """Kind of the wish: every slider has its own."""
-        return self.slider
 
 
 def Spring(joint: int | None, stiffness: float) -> Set:
@@ -39,23 +23,8 @@ def Spring(joint: int | None, stiffness: float) -> Set:
     return Set("springs.stiffness" if joint is None else f"springs.stiffness[{joint}]", stiffness)
 
 
-def Friction(factor: float) -> Set:
-    """Another floor: factor on the friction of the robot file."""
-    return Set("friction", factor)
-
-
-def Stride(length: float) -> Set:
-    """Longer or shorter steps, m."""
-    return Set("gait.stride", length)
-
-
-def Speed(times: float) -> Set:
-    """Another number of seconds of walking that one second shows."""
-    return Set("speed", times)
-
-
 @dataclass(frozen=True)
-class Target(Wish):
+class Target:
     """Target on the floor, m; None for no target. By hand no strategy steers there."""
 
     place: tuple[float, float] | None
@@ -63,14 +32,14 @@ class Target(Wish):
 
 
 @dataclass(frozen=True)
-class Steering(Wish):
+class Steering:
     """Another strategy to go to targets with, by name."""
 
     strategy: str
 
 
 @dataclass(frozen=True)
-class Pull(Wish):
+class Pull:
     """A torque on a yaw joint, N*m, positive where it turns the part behind the joint to the left; for some time (s),
     or until another pull."""
 
@@ -80,46 +49,50 @@ class Pull(Wish):
 
 
 @dataclass(frozen=True)
-class Pause(Wish):
+class Pause:
     """Stand still, or walk on."""
 
     paused: bool
 
 
 @dataclass(frozen=True)
-class Step(Wish):
+class Step:
     """Walk on by a number of gait cycles, and pause."""
 
     cycles: float
 
 
 @dataclass(frozen=True)
-class Reset(Wish):
+class Reset:
     """Begin anew with a seed; springs, floor and steps stay as they are set."""
 
     seed: int
 
 
 @dataclass(frozen=True)
-class Record(Wish):
+class Record:
     """Begin or end a recording."""
 
     on: bool
 
 
+Wish = Set | Target | Steering | Pull | Pause | Step | Reset | Record
+
+
 class Box:
-    """Box of wishes that any thread fills and one empties; it holds one wish of each kind at most."""
+    """Box of wishes that any thread fills and one empties; it holds one wish of each kind, or for each slider."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._any = threading.Event()
-        self._waiting: dict[Hashable, Wish] = {}
+        self._waiting: dict[object, Wish] = {}
 
     def put(self, wish: Wish) -> None:
         """Leave a wish; an older one of its kind is forgotten."""
+        kind: object = wish.slider if isinstance(wish, Set) else type(wish)
         with self._lock:
-            self._waiting.pop(wish.kind, None)
-            self._waiting[wish.kind] = wish
+            self._waiting.pop(kind, None)
+            self._waiting[kind] = wish
         self._any.set()
 
     def wait(self, seconds: float) -> bool:

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import xarray as xr
 
-from chilopod.netcdf import netcdf, sealed
+from chilopod.netcdf import netcdf, sealed, storable
 from chilopod.output import write_all
-from chilopod.show import style, tables
-from chilopod.show.figures import branch, identification, undulation
+from chilopod.show import style
+from chilopod.show.figures import branch, undulation
 from chilopod.show.panel import Panel
-from chilopod.tasks.identify import Identification
 
 
 def files_of(name: str, folder: str | Path) -> list[Path]:
@@ -31,11 +30,6 @@ def write_undulation(data: xr.Dataset, folder: str | Path, *, replace: bool = Tr
     return _write_alone(undulation.panel(data), folder, replace)
 
 
-def identification_files(found: Identification, folder: Path) -> Iterator[tuple[Path, bytes]]:
-    """Files of the profile of an identification, its figure and the data, see :func:`panel_files`."""
-    return panel_files(identification.panel(found), folder, folder)
-
-
 def panel_files(
     panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None, stored: bytes | None = None
 ) -> Iterator[tuple[Path, bytes]]:
@@ -43,7 +37,7 @@ def panel_files(
     when these are asked for, into two folders; ``table`` takes the place of the data in the ``.csv``, ``stored`` in the
     ``.nc``."""
     yield data / f"{panel.name}.nc", netcdf(panel.data) if stored is None else stored
-    yield data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table).encode()
+    yield data / f"{panel.name}.csv", csv(panel.data if table is None else table).encode()
     with style.house_style():
         drawn = panel.draw(False)
         vector, pixels = style.svg(drawn, panel.name), style.png(drawn)
@@ -56,3 +50,13 @@ def _write_alone(
 ) -> list[Path]:
     write_all(panel_files(panel, Path(folder), Path(folder), table, stored), replace=replace)
     return files_of(panel.name, folder)
+
+
+def csv(data: xr.Dataset) -> str:
+    """A table with one line per point, units in the header, attributes in comment lines (#) above it."""
+    table = storable(data)
+    frame = table.to_dataframe().reset_index()
+    units = {str(name): variable.attrs.get("units", "") for name, variable in table.variables.items()}
+    frame = frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items() if unit})
+    notes = "".join(f"# {key} = {value}\n" for key, value in table.attrs.items())
+    return notes + str(frame.to_csv(index=False, lineterminator="\n"))

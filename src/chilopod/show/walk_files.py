@@ -13,7 +13,7 @@ from chilopod.netcdf import netcdf
 from chilopod.output import Content, write_all
 from chilopod.show import style
 from chilopod.show.scene.encoder import has_encoder
-from chilopod.show.scene.film import FASTEST, filmed
+from chilopod.show.scene.film import FASTEST, Film
 from chilopod.show.scene.replay import SHOWN, replay
 
 _LONGEST_FILM = 15.0  # s: it takes half as long to make
@@ -50,4 +50,4 @@ def _contents(figure: Any, done: Any, files: list[Path]) -> Iterator[tuple[Path,
         # As many times faster as makes it short; from above all of a course is seen.
         seconds = float(shown.time[-1] - shown.time[0])
         speed = min(max(1.0, np.ceil(seconds / _LONGEST_FILM)), FASTEST)
-        yield file, filmed(shown, titles=labels, heading=title, speed=speed, size=_FILM_SIZE)
+        yield file, Film(shown, titles=labels, heading=title, speed=speed, size=_FILM_SIZE).mp4()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 
 SPRING_UNIT = "N·mm/deg"
 
@@ -58,15 +59,10 @@ def _power(digit: str, sign: str, power: str) -> str:
 
 def spans(counts: Sequence[int]) -> str:
     """Whole numbers in rising order with runs drawn together: "4, 7 to 18 and 20"."""
-    runs: list[list[int]] = []
-    for count in counts:
-        if runs and count == runs[-1][-1] + 1:
-            runs[-1].append(count)
-        else:
-            runs.append([count])
     parts: list[str] = []
-    for run in runs:
-        parts += [f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(each) for each in run]
+    for _, numbered in groupby(enumerate(counts), lambda each: each[1] - each[0]):
+        run = [str(count) for _, count in numbered]
+        parts += [f"{run[0]} to {run[-1]}"] if len(run) > 2 else run
     return listing(parts)
 
 

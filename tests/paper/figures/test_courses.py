@@ -5,7 +5,7 @@ import pytest
 
 from chilopod.paper.courses import figures as courses
 from chilopod.paper.courses.sections import Robust
-from chilopod.show import style, tables
+from chilopod.show import files, style
 from helpers.made_up_courses import compared, conditions
 
 
@@ -25,7 +25,7 @@ def test_every_figure_has_words_a_table_and_two_layouts(drawn, narrow):
             text = " ".join((panel.title, panel.alt, *panel.text))
             assert "nan" not in text
             assert panel.alt.endswith(".")
-            assert len(tables.csv(panel.data).splitlines()) > 5
+            assert len(files.csv(panel.data).splitlines()) > 5
             assert len(panel.draw(narrow).axes) >= 1
 
 

@@ -8,7 +8,7 @@ from chilopod.paper.curved import figures
 from chilopod.paper.curved.study import curved_study
 from chilopod.paper.section import Context, Size
 from chilopod.show import style
-from chilopod.show.tables import csv
+from chilopod.show.files import csv
 
 PANELS = {"walks": figures.walks, "joints": figures.joints, "onset": figures.onset, "variants": figures.variants}
 

@@ -3,7 +3,7 @@
 import pytest
 
 from chilopod.paper.robot.figures.walks import panels
-from chilopod.show import tables
+from chilopod.show import files
 from helpers.made_up_robot import durations
 from helpers.made_up_robot import walks as made_up_walks
 
@@ -21,6 +21,6 @@ def test_they_say_what_was_found(drawn):
     assert "onset 27.0, 30.0, 32.0, 34.0, 34.0 N·mm/deg after 20, 30, 40, 60 and 90 s" in words[1]
     assert "within after 40, 60 and 90, outside after 20 and 30" in words[1]
     assert not any("nan" in each for each in words)
-    lines = tables.csv(drawn["robot-durations"].data).splitlines()
+    lines = files.csv(drawn["robot-durations"].data).splitlines()
     assert lines[3].startswith("duration [s],spring,onset [N*mm/deg],axis_radius [m]")
     assert len(lines) == 4 + 5 * 7

@@ -6,7 +6,7 @@ import pytest
 from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.figures import panels
 from chilopod.paper.turning.study import turning
-from chilopod.show import style, tables
+from chilopod.show import files, style
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def test_every_figure_has_a_name_of_its_own_words_and_a_table(drawn):
         text = " ".join((panel.title, panel.alt, *panel.text))
         assert "nan" not in text and "  " not in text, panel.name  # noqa: PT018
         assert panel.alt.endswith(".")
-        assert len(tables.csv(panel.data).splitlines()) > 10
+        assert len(files.csv(panel.data).splitlines()) > 10
 
 
 def test_the_shaded_springs_are_those_that_arrive(drawn):

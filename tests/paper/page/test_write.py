@@ -20,7 +20,8 @@ from chilopod.paper.section import Context, Found
 from chilopod.paper.straight import schematic
 from chilopod.paper.straight.sections import IDENTIFICATION, MODE
 from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Row, Statement, Verdict, within
-from chilopod.show.files import identification_files
+from chilopod.show.figures import identification
+from chilopod.show.files import panel_files
 from helpers.html_page import Page
 
 
@@ -163,7 +164,7 @@ def test_same_results_same_bytes(folder, full, tmp_path):
 
 
 def test_identification_on_its_own(fit, tmp_path):
-    files = write_all(identification_files(fit, tmp_path / "new"))
+    files = write_all(panel_files(identification.panel(fit), tmp_path / "new", tmp_path / "new"))
     assert sorted(path.suffix for path in files) == [".csv", ".nc", ".png", ".svg"]
     assert all(path.stat().st_size > 300 for path in files)
 

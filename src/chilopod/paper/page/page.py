@@ -11,10 +11,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from importlib.metadata import version
-from importlib.resources import files
 from typing import Any, Final
 
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup, escape
 
 from chilopod import units
@@ -25,6 +23,7 @@ from chilopod.paper.straight.sections import MODE
 from chilopod.paper.table import RobotRow, Row, Verdict, at_once
 from chilopod.robot import Robot
 from chilopod.show.panel import Panel
+from chilopod.show.templates import template
 from chilopod.show.words import listing, minus, typeset
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
@@ -112,22 +111,17 @@ def page(
     Figures and films stand in their chapters, those with a letter first. ``robot_file`` is the name of the robot in
     commands: a preset, or the path of a file.
     """
-    folder = files("chilopod.paper.page")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters["embedded"] = _embedded
     mode = found[MODE]
-    template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
     tables = {chapter: [_row(row) for row in rows] for chapter, rows in found.planar_rows().items()}
     # Nothing is left out before all has been tried.
     robot_rows = [_row(replace(row, absent="") if drawings.waiting else row) for row in found.robot_rows()]
     looks = Counter(row["look"] for rows in (*tables.values(), robot_rows) for row in rows)
-    return template.render(
+    return template("chilopod.paper.page", "page.html.j2").render(
         title=_TITLE,
         holds=" ".join([found.context.size.name, *(section.name for section in found.values)]),
-        css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
+        embedded=_embedded,
         state=state.value,
         plan=Markup(re.sub(r"--\w+", r"<code>\g<0></code>", str(escape(plan)))),
-        script=Markup(folder.joinpath("page.js").read_text(encoding="utf-8")),
         written=time.time(),
         done=sum(section in found for section in sections),
         count=len(sections),

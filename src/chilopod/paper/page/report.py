@@ -26,9 +26,8 @@ from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
 from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
+from chilopod.show.scene import film, film_3d
 from chilopod.show.scene.encoder import has_encoder
-from chilopod.show.scene.film import filmed, poster
-from chilopod.show.scene.film_3d import film_3d, poster_3d, stills
 from chilopod.show.scene.replay import replay
 
 T = TypeVar("T")
@@ -163,8 +162,8 @@ class Report:
         return Shown(section, figures, ())
 
     def _film(self, section: Section[Any], movie: Movie) -> Shown:
-        film, shown = write_movie(movie, self.page.parent / "movies"), self._shown[section]
-        return replace(shown, films=(*shown.films, film))
+        shown = self._shown[section]
+        return replace(shown, films=(*shown.films, write_movie(movie, self.page.parent / "movies")))
 
     def _draw_panel(self, panel: Panel) -> Drawn:
         folder = self.page.parent
@@ -259,23 +258,17 @@ def _held(page: Path) -> tuple[Size, list[str]] | None:
 def write_movie(shown: Movie, folder: Path) -> Film:
     """Write a movie as ``NAME.html``, ``NAME.mp4`` where films can be encoded and, of some moments of it in 3-D,
     ``NAME.png`` where it can be rendered."""
-    solid = "pose" in shown.record
     replay(shown.record, titles=shown.titles, heading=shown.heading).write(folder / f"{shown.name}.html", replace=True)
-    look: dict[str, Any] = {
-        "titles": shown.titles,
-        "heading": shown.heading,
-        "speed": shown.speed,
-        "follow": shown.follow,
-    }
+    look: dict[str, Any] = {name: getattr(shown, name) for name in ("titles", "heading", "speed", "follow")}
     file, first, encoded = folder / f"{shown.name}.mp4", folder / f"{shown.name}-poster.png", has_encoder()
-    rendered = encoded and solid and _rendered(first, lambda: poster_3d(shown.record, **look))
-    if encoded and not (rendered and _rendered(file, lambda: film_3d(shown.record, **look))):
-        write_atomic(first, poster(shown.record, **look, size=shown.size))
-        write_atomic(file, filmed(shown.record, **look, size=shown.size))
+    solid, flat = film_3d.Film3D(shown.record, **look), film.Film(shown.record, **look, size=shown.size)
+    rendered = encoded and "pose" in shown.record and _rendered(first, solid.poster)
+    if encoded and not (rendered and _rendered(file, solid.mp4)):
+        write_atomic(first, flat.poster())
+        write_atomic(file, flat.mp4())
     picture = folder / f"{shown.name}.png"
-    pictured = bool(shown.stills) and _rendered(
-        picture, lambda: stills(shown.record, shown.stills, titles=shown.titles)
-    )
+    moments = partial(film_3d.stills, shown.record, shown.stills, titles=shown.titles)
+    pictured = bool(shown.stills) and _rendered(picture, moments)
     return Film(shown.name, shown.heading, shown.speed, encoded, pictured)
 
 

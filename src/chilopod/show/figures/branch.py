@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,7 +74,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     bottom, top = axes["A"].get_ylim()
     axes["A"].set_ylim(top=top + 0.4 * (top - bottom))  # room for the legend
     axes["A"].legend(loc="upper right", ncols=max(2, data.sizes["joint"] // 3))
-    shown = {verdict for *_, verdict in _stretches(verdicts)}
+    shown = {verdict for *_, verdict in stretches(verdicts)}
     if shown != {"stable"}:
         for verdict in sorted(shown):
             axes["B"].plot([], [], color=style.GREY, linestyle=_LINES[verdict], label=verdict)
@@ -95,17 +95,16 @@ def _curve(
 ) -> None:
     if name:
         axes.plot([], [], color=color, label=name)  # the legend names the colour, whatever the stability
-    for first, last, verdict in _stretches(verdicts):
+    for first, last, verdict in stretches(verdicts):
         axes.plot(x[first : last + 1], y[first : last + 1], color=color, linestyle=_LINES[verdict])
 
 
-def _stretches(verdicts: list[str]) -> Iterator[tuple[int, int, str]]:
+def stretches(verdicts: Sequence[Any]) -> Iterator[tuple[int, int, Any]]:
     """First and last point of every stretch of equal verdicts; the next one starts where the last one ends."""
     first = 0
     # What a stretch is called is decided by its second point: its first may be the critical one in between.
     for index in range(1, len(verdicts)):
-        last = index == len(verdicts) - 1
-        if last or verdicts[index + 1] != verdicts[index]:
+        if index == len(verdicts) - 1 or verdicts[index + 1] != verdicts[index]:
             yield first, index, verdicts[index]
             first = index
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
@@ -21,12 +24,14 @@ _STILLS = 5
 def draw(done: Turn, narrow: bool = False) -> Figure:
     """The figure; call it within :func:`chilopod.show.style.house_style`."""
     figure, axes = style.figure(*_LAYOUTS, narrow)
-    record, ends = done.record[["distance", "bearing"]], done.criteria.arrival
-    _floor(axes["A"], done)
+    record = done.record[["position", "distance", "bearing"]]
+    walks = [
+        walk.where(walk.time <= end, drop=True) if np.isfinite(end) else walk
+        for walk, end in ((record.isel(robot=robot), end) for robot, end in enumerate(done.criteria.arrival))
+    ]
+    _floor(axes["A"], done, walks)
     axes["A"].set_title(title(done))
-    for robot in range(record.sizes["robot"]):
-        walk = record.isel(robot=robot)
-        walk = walk.where(walk.time <= ends[robot], drop=True) if np.isfinite(ends[robot]) else walk
+    for robot, walk in enumerate(walks):
         color = style.CURVES[robot % len(style.CURVES)]
         axes["B"].plot(walk.time, walk.distance, color=color)
         # A line does not cross the picture where the angle jumps from -180 to 180.
@@ -56,8 +61,8 @@ def title(done: Turn) -> str:
     return f"{done.strategy.name}{spring}"
 
 
-def _floor(axes: Axes, done: Turn) -> None:
-    """Paths, target, the circle to it, and the first walk's body at several times."""
+def _floor(axes: Axes, done: Turn, walks: Sequence[xr.Dataset]) -> None:
+    """Paths to the target, the circle to it, and the first walk's body at several times."""
     record, target = done.record, done.target.position
     axes.set_aspect("equal", adjustable="datalim")
     if np.isfinite(done.target.radius):
@@ -68,9 +73,7 @@ def _floor(axes: Axes, done: Turn) -> None:
         label = f"circle of {radius:.2f} m"
         x, y = radius * np.sin(turned), side * radius * (1.0 - np.cos(turned))
         axes.plot(x, y, color=style.GREY, linestyle=(0, (1, 2)), label=label)
-    for robot in range(record.sizes["robot"]):
-        walk, end = record[["position"]].isel(robot=robot), done.criteria.arrival[robot]
-        walk = walk.where(walk.time <= end, drop=True) if np.isfinite(end) else walk
+    for robot, walk in enumerate(walks):
         place = walk.position.transpose("time", "axis").values
         name = "path of module 1" if robot == 0 else None
         axes.plot(place[:, 0], place[:, 1], color=style.CURVES[robot % len(style.CURVES)], label=name, zorder=3)

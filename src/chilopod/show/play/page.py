@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from importlib.resources import files
-from typing import Any, Final, NamedTuple
+from typing import Any
 
 import xarray as xr
-from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
 from scipy.integrate import DOP853
 
 from chilopod.analysis.parameters import stiffness
@@ -18,48 +14,25 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.show.scene.outline import SLIMNESS
 from chilopod.show.style import SCENE as COLORS
+from chilopod.show.templates import template
 from chilopod.steering import ARRIVAL_RADIUS, LegYawController, RadiusLaw, SpringLaw
 from chilopod.steering.course import Course
 from chilopod.tasks.radius_law import that_holds
 
-_SCRIPTS: Final = ("model.js", "page.js")
 _SOFTEST, _STIFFEST = 0.05, 1.25  # of the stiffest spring of the file: range of the slider
 _STAGES = 12
 
 
 def play(robot: Robot, progress: Progress = silent) -> str:
-    """Page with a walking robot, a slider of its first spring, and the signed bend over the spring.
+    """HTML of a page with a walking robot of the planar model, a slider of its first spring, and the signed bend over
+    the spring. It is one file, which loads nothing else and opens from disk.
 
-    The page is one HTML file. It loads nothing else and opens from disk.
-
-    Parameters
-    ----------
-    robot
-        Robot of the planar model.
-    progress
-        Called with the part done (0 to 1) and a few words, while the branch of curved walks is computed.
-
-    Returns
-    -------
-    str
-        The HTML.
-
-    Raises
-    ------
-    AnalysisError
-        If the straight walk has no pitchfork in the first spring, or the branch gives no radius law.
+    ``progress`` is called with the part done (0 to 1) and a few words while the branch of curved walks is computed.
+    Raises an AnalysisError if the straight walk has no pitchfork in the first spring, or the branch gives no radius
+    law.
     """
-    folder = files("chilopod.show.play")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
-    scripts = [folder.joinpath(name).read_text(encoding="utf-8") for name in _SCRIPTS]
-    data = {**motion(robot), **_pictured(robot, theory(robot, progress)), **_look(robot)}
-    return template.render(
-        robot=robot.name,
-        css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
-        scripts=[Markup(script) for script in scripts],
-        data=Markup(json.dumps(data, allow_nan=False).replace("<", "\\u003c")),
-    )
+    data = {**motion(robot), **_pictured(robot, *theory(robot, progress)), **_look(robot)}
+    return template("chilopod.show.play", "page.html.j2").render(robot=robot.name, data=data)
 
 
 def motion(robot: Robot) -> dict[str, Any]:
@@ -102,24 +75,18 @@ def motion(robot: Robot) -> dict[str, Any]:
     }
 
 
-class Theory(NamedTuple):
-    """Curved walks of a robot, and its radius law."""
-
-    walks: xr.Dataset  # branch of left turns, see :func:`chilopod.analysis.curved_walks`
-    law: RadiusLaw  # radius of the body axis over the first spring, as far as a robot reaches it from straight
-
-
-def theory(robot: Robot, progress: Progress = silent) -> Theory:
-    """Branch and radius law of a robot; errors as of :func:`play`."""
+def theory(robot: Robot, progress: Progress = silent) -> tuple[xr.Dataset, RadiusLaw]:
+    """Left turns of a robot, and the radius law of its axis as far as it gets there from straight; errors as of
+    :func:`play`."""
     laws = radius_laws(robot, progress)
-    return Theory(laws.walks, that_holds(laws.axis, robot))
+    return laws.walks, that_holds(laws.axis, robot)
 
 
-def _pictured(robot: Robot, found: Theory) -> dict[str, Any]:
+def _pictured(robot: Robot, walks: xr.Dataset, law: RadiusLaw) -> dict[str, Any]:
     """Branch as bends over the first spring, and the law that steers by this spring."""
-    steers, walks = SpringLaw.of(robot, found.law), found.walks
+    steers = SpringLaw.of(robot, law)
     return {
-        "pitchfork": float(found.law.pitchfork),
+        "pitchfork": float(law.pitchfork),
         "branch": {
             "springs": walks.parameter_si.values.tolist(),
             "bends": (steers.arm / walks.axis_radius.values).tolist(),

@@ -27,20 +27,12 @@ class Aim:
 
 def aims_of(record: xr.Dataset) -> tuple[tuple[Aim, ...], ...]:
     """Targets of every robot of a record in the order of their turns."""
-    start = float(record["time"].values[0])
     if "goal_place" in record:
         goals = record[["goal_place", "goal_begin", "goal_end", "goal_verdict"]]
         return tuple(_course(goals.isel(robot=robot)) for robot in range(record.sizes["robot"]))
     if "target" not in record:
         return ((),) * record.sizes["robot"]
-    if "time" in record["target"].dims:
-        return tuple(_moved(record.isel(robot=[robot])) for robot in range(record.sizes["robot"]))
-    places = record["target"].transpose("robot", "axis").values.astype(np.float64)
-    reached = [float(when) if np.isfinite(when) else None for when in arrivals(record)]
-    return tuple(
-        (Aim((float(x), float(y)), start, when),) if np.isfinite([x, y]).all() else ()
-        for (x, y), when in zip(places, reached, strict=True)
-    )
+    return tuple(_targets(record.isel(robot=[robot])) for robot in range(record.sizes["robot"]))
 
 
 def places_of(aims: Iterable[Iterable[Aim]]) -> NDArray[np.float64]:
@@ -48,9 +40,10 @@ def places_of(aims: Iterable[Iterable[Aim]]) -> NDArray[np.float64]:
     return np.array([aim.place for each in aims for aim in each]).reshape(-1, 2)
 
 
-def _moved(record: xr.Dataset) -> tuple[Aim, ...]:
-    """Aims of one robot, whose target is over time."""
-    time, places = record["time"].values, record["target"].isel(robot=0).transpose("time", "axis").values
+def _targets(record: xr.Dataset) -> tuple[Aim, ...]:
+    """Aims of one robot, whose target may be over time."""
+    target, time = record["target"].isel(robot=0).broadcast_like(record["time"]), record["time"].values
+    places = target.transpose("time", "axis").values.astype(np.float64)
     edges = [0, *(np.flatnonzero((np.diff(places, axis=0) != 0.0).any(axis=1)) + 1).tolist(), len(time)]
     aims = []
     for first, last in zip(edges[:-1], edges[1:], strict=True):

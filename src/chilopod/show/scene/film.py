@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import KW_ONLY, dataclass
 from itertools import chain
 from typing import Any, Final
 
@@ -28,7 +30,7 @@ from chilopod.errors import OutputError, ParameterError
 from chilopod.frozen import Array
 from chilopod.show import style
 from chilopod.show.scene.encoder import ENCODER, encoded, has_encoder
-from chilopod.show.scene.frames import Floor, Outcome, Scene, close, scene
+from chilopod.show.scene.frames import Floor, Scene, close, scene
 from chilopod.show.scene.outline import SLIMNESS
 from chilopod.show.style import SCENE as COLORS
 from chilopod.show.words import spring
@@ -44,102 +46,77 @@ APART: Final = 28.0  # from column to column: outcome and next title stand side 
 _MARKS: Final = {"arrived": ("✓ ", "#00563f"), "stopped": ("✕ ", "#8f3d00"), "ended": ("", style.BLACK)}
 
 
-def filmed(
-    record: xr.Dataset,
-    *,
-    titles: Mapping[Any, str] | Sequence[str],
-    heading: str,
-    fps: int = 25,
-    speed: float = 1.0,
-    size: tuple[int, int] = (960, 480),
-    follow: bool = False,
-) -> bytes:
-    """A record as a film, H.264 in mp4: browsers and presentations play it before it is loaded whole.
+@dataclass(frozen=True)
+class Film:
+    """Film of a record, seen from above, a panel for each robot.
 
-    Titles of its robots are by label or in their order (:mod:`chilopod.show.scene.frames`), the heading is above all
-    panels. ``fps`` are frames per second of the film, ``speed`` seconds of the walk per second of it, and ``size`` its
-    width and height, even pixels. Every panel follows its robot, or all show the same floor with all of all walks.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is out of range, the record does not go with its robot, or a robot has no title.
-    OutputError
-        If PyAV was built without its H.264 encoder.
+    Both methods raise a ParameterError if a field is out of range, the record does not go with its robot, or a robot
+    has no title, and an OutputError if PyAV was built without its H.264 encoder.
     """
-    times = frame_times(record, size, fps, speed)
-    return encoded(_frames(scene(record, titles, times), heading, size, speed, follow), fps, size)
 
+    record: xr.Dataset  #: see :mod:`chilopod.show.scene.frames`
+    _: KW_ONLY
+    titles: Mapping[Any, str] | Sequence[str]  #: of the robots, by label or in their order
+    heading: str  #: above all panels
+    fps: int = 25  #: frames per second of the film
+    speed: float = 1.0  #: seconds of the walk per second of the film
+    size: tuple[int, int] = (960, 480)  #: width and height, even pixels
+    follow: bool = False  #: True if every panel follows its robot; otherwise all show the same floor with all walks
 
-def poster(
-    record: xr.Dataset,
-    *,
-    titles: Mapping[Any, str] | Sequence[str],
-    heading: str,
-    speed: float = 1.0,
-    size: tuple[int, int] = (960, 480),
-    follow: bool = False,
-) -> bytes:
-    """Frame of the film of :func:`filmed` in its last third, as PNG, with errors likewise."""
-    shown = scene(record, titles, frame_times(record, size, 25, speed))
-    with style.house_style():
-        return telling(Stage(shown, heading, size, speed, follow))
+    def mp4(self) -> bytes:
+        """The film, H.264 in mp4: browsers and presentations play it before it is loaded whole."""
+        times = self._times()
+        with self._stage(times) as stage:
+            return encoded(map(stage.drawn, range(len(times))), self.fps, self.size)
 
+    def poster(self) -> bytes:
+        """Frame of the film in its last third, when it shows the outcome of the walks, as PNG."""
+        times, stream = self._times(), io.BytesIO()
+        with self._stage(times) as stage:
+            imsave(stream, stage.drawn(3 * (len(times) - 1) // 4), format="png")
+        return stream.getvalue()
 
-def telling(stage: Stage) -> bytes:
-    """PNG of the frame of a stage in its last third, when it shows the outcome of the walks."""
-    stream = io.BytesIO()
-    imsave(stream, stage.drawn(3 * (len(stage.shown.frames.time) - 1) // 4), format="png")
-    return stream.getvalue()
+    @contextmanager
+    def _stage(self, times: Array) -> Iterator[Stage]:
+        with style.house_style():
+            yield Stage(self, scene(self.record, self.titles, times))
 
-
-def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
-    """Times of the frames of a film, s; errors as of :func:`filmed` if it cannot be encoded like this."""
-    if not 1 <= fps <= 120:
-        raise ParameterError("must be a frame rate", field="fps", value=fps, allowed="1 to 120 per second")
-    if not _SLOWEST <= speed <= FASTEST:
-        raise ParameterError("must be a speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
-    if any(side % 2 or not _SMALLEST <= side <= LARGEST for side in size):
-        allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
-        raise ParameterError("must be the size of a film", field="size", value=size, allowed=allowed)
-    if not has_encoder():
-        raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
-    recorded = record["time"].values.astype(np.float64)
-    # The last frame is the last sample, with what it came to; the tolerance is for round-off in the duration.
-    count = math.ceil((recorded[-1] - recorded[0]) * fps / speed - 1e-6) + 1
-    times: Array = np.minimum(recorded[0] + np.arange(count) * (speed / fps), recorded[-1])
-    return times
-
-
-def _frames(
-    shown: Scene, heading: str, size: tuple[int, int], speed: float, follow: bool
-) -> Iterator[NDArray[np.uint8]]:
-    """Every frame, (height, width, 4); the next one overwrites it."""
-    with style.house_style():
-        stage = Stage(shown, heading, size, speed, follow)
-        for index in range(len(shown.frames.time)):
-            yield stage.drawn(index)
+    def _times(self) -> Array:
+        """Times of the frames, s."""
+        fps, speed = self.fps, self.speed
+        if not 1 <= fps <= 120:
+            raise ParameterError("must be a frame rate", field="fps", value=fps, allowed="1 to 120 per second")
+        if not _SLOWEST <= speed <= FASTEST:
+            raise ParameterError("must be a speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
+        if any(side % 2 or not _SMALLEST <= side <= LARGEST for side in self.size):
+            allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
+            raise ParameterError("must be the size of a film", field="size", value=self.size, allowed=allowed)
+        if not has_encoder():
+            raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
+        recorded = self.record["time"].values.astype(np.float64)
+        # The last frame is the last sample, with what it came to; the tolerance is for round-off in the duration.
+        count = math.ceil((recorded[-1] - recorded[0]) * fps / speed - 1e-6) + 1
+        times: Array = np.minimum(recorded[0] + np.arange(count) * (speed / fps), recorded[-1])
+        return times
 
 
 class Stage:
     """Frames of the panels: moving parts are drawn anew over the fixed ones."""
 
-    def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float, follow: bool = False) -> None:
-        self.shown, self.size, self.follow = shown, size, follow
-        self.floor = close(shown.frames) if follow else shown.floor
-        self.font = max(12.0, min(size[1] / 32.0, size[0] / 48.0))
-        self.figure = Figure(figsize=(size[0] / PIXEL, size[1] / PIXEL), dpi=PIXEL)
+    def __init__(self, film: Film, shown: Scene) -> None:
+        self.shown, self.size, self.follow = shown, film.size, film.follow
+        self.floor = close(shown.frames) if self.follow else shown.floor
+        width, height = self.size
+        self.font = max(12.0, min(height / 32.0, width / 48.0))
+        self.figure = Figure(figsize=(width / PIXEL, height / PIXEL), dpi=PIXEL)
         self.canvas: Any = FigureCanvasAgg(self.figure)  # matplotlib does not say what its methods take and give
-        width, height = size
         top = height - 0.45 * self.font
         self.clock = self._text(width - GAP, top, "", ha="right", va="top", animated=True)
-        self.pace = "" if speed == 1.0 else f"   ({speed:g}×)"
+        self.pace = "" if film.speed == 1.0 else f"   ({film.speed:g}×)"
         self.clock.set_text(self._time(len(shown.frames.time) - 1))
-        room = width - 3.0 * GAP - self._extent(self.clock)
-        title = self._text(GAP, top, heading, va="top", fontsize=1.2 * self.font, weight="bold")
-        self._fit(title, room)
-        below = self._legend()
-        self._panels(GAP + below, top - 1.9 * self.font)
+        title = self._text(GAP, top, film.heading, va="top", fontsize=1.2 * self.font, weight="bold")
+        self._fit(title, width - 3.0 * GAP - self._extent(self.clock))
+        self._panels(GAP + self._legend(), top - 1.9 * self.font)
         self.known: tuple[object, ...] = ()
         self.background: Any = None
 
@@ -181,6 +158,7 @@ class Stage:
 
     def _legend(self) -> float:
         """Draw the key in as few lines as it takes; returns its height."""
+        cross: dict[str, Any] = {"ls": "", "marker": "+", "ms": 0.8 * self.font, "mew": 2, "color": COLORS["target"]}
         handles: list[Patch | Line2D] = [
             Patch(fc=COLORS["edge"], ec=COLORS["edge"], label="module 1"),
             Patch(fc=COLORS["body"], ec=COLORS["edge"], label="other modules"),
@@ -188,22 +166,12 @@ class Stage:
             _dot("white", COLORS["air"], 0.6 * self.font, label="foot in the air"),
             _dot("white", COLORS["spring"], 0.6 * self.font, 2.5, label="spring (thin: soft)"),
             Line2D([], [], color=COLORS["path"], label="path of module 1"),
+            *([Line2D([], [], **cross, label="target")] if any(self.shown.aims) else []),
         ]
-        if any(self.shown.aims):
-            handles.append(
-                Line2D([], [], ls="", marker="+", ms=0.8 * self.font, mew=2, color=COLORS["target"], label="target")
-            )
         for rows in range(1, len(handles) + 1):
-            legend = self.figure.legend(
-                handles=handles,
-                loc="lower left",
-                ncols=math.ceil(len(handles) / rows),
-                fontsize=max(12.0, 0.85 * self.font),
-                borderaxespad=0.4,
-                columnspacing=1.4,
-                handlelength=1.5,
-                handletextpad=0.5,
-            )
+            spaces = {"borderaxespad": 0.4, "columnspacing": 1.4, "handlelength": 1.5, "handletextpad": 0.5}
+            look = {"ncols": math.ceil(len(handles) / rows), "fontsize": max(12.0, 0.85 * self.font), **spaces}
+            legend = self.figure.legend(handles=handles, loc="lower left", **look)
             if self._extent(legend) <= self.size[0] - GAP:
                 break
             legend.remove()
@@ -223,11 +191,11 @@ class Stage:
 
     def _panels(self, bottom: float, top: float) -> None:
         """Lay the panels out, all of one size, in the middle of the room there is."""
-        said, width = (
-            zip(self.shown.titles, map(caption_of, self.shown.outcomes), strict=True),
-            self.size[0] - 2.0 * GAP,
-        )
-        captions = [[self._text(0.0, 0.0, each, weight="bold", va="top") for each in both] for both in said]
+        width, outcomes = self.size[0] - 2.0 * GAP, [_MARKS[each.kind][0] + each.text for each in self.shown.outcomes]
+        captions = [
+            [self._text(0.0, 0.0, each, weight="bold", va="top") for each in both]
+            for both in zip(self.shown.titles, outcomes, strict=True)
+        ]
         longest = max(sum(map(self._extent, both)) for both in captions) + self.font
         across, tall, columns, lines = self._layout(width, top - bottom, longest)
         caption, rows = self._tall(lines), math.ceil(len(self.shown.titles) / columns)
@@ -242,8 +210,8 @@ class Stage:
 
     def _layout(self, width: float, height: float, longest: float) -> tuple[float, float, int, int]:
         """Width and height of a panel, columns, and lines of a caption: one if there is room for title and outcome."""
-        floor, count = self.floor, len(self.shown.titles)
-        aspect = (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
+        count, (floor_width, floor_height) = len(self.shown.titles), self.floor.size.tolist()
+        aspect = floor_height / floor_width
         for lines in (1, 2):
             sizes = []
             for columns in range(1, count + 1):
@@ -287,7 +255,7 @@ class FilmPanel:
 
         length = frames.robot.module_length
         thin = max(0.8, min(1.5, 0.02 * length * zoom))
-        foot, joint = 2.0 * max(2.0, 0.055 * length * zoom), 2.0 * max(2.0, 0.06 * length * zoom)
+        foot, self.ring = 2.0 * max(2.0, 0.055 * length * zoom), max(2.0, 0.06 * length * zoom)
         n = frames.robot.body.modules
         self.outline = _outline(length)
         offset, side = frames.robot.legs.forward_offset, 0.5 * SLIMNESS * length
@@ -297,8 +265,7 @@ class FilmPanel:
         )
         self.legs = LineCollection([], linewidths=thin)
         self.path = Line2D([], [], color=COLORS["path"], lw=2.0)
-        self.ring = max(2.0, 0.06 * length * zoom)
-        self.joints = axes.scatter([], [], s=joint**2, facecolors="white", zorder=4)
+        self.joints = axes.scatter([], [], s=(2.0 * self.ring) ** 2, facecolors="white", zorder=4)
         self.spring = axes.text(0.985, 0.03, "", transform=axes.transAxes, ha="right", fontsize=max(12.0, 0.85 * font))
         self.swinging = _dot("white", COLORS["air"], foot, thin)
         self.standing = _dot(COLORS["ink"], COLORS["ink"], foot, thin)
@@ -341,7 +308,8 @@ class FilmPanel:
             return (self.lines,)
         if self.follow:
             around = slice(max(0, index - CALM), index + CALM + 1)
-            self._look_at(self.floor.around(np.nanmean(frames.spine[around, robot], axis=(0, 1))))
+            middle = np.nanmean(frames.spine[around, robot], axis=(0, 1))
+            self._look_at(Floor.of(middle, self.floor.size, self.floor.grid))
         headings, feet = frames.headings[index, robot], frames.feet[index, robot]
         self.modules.set_verts(list(_on_modules(centres, headings, self.outline)))
         self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind != "stopped" else 0.45)
@@ -369,23 +337,16 @@ class FilmPanel:
         self.lines.set_segments([*upright, *level])
 
     def _scale_bar(self, axes: Axes, zoom: float, font: float) -> None:
-        floor = self.floor
-        bar = floor.grid if (floor.x1 - floor.x0) > 1.6 * floor.grid else 0.1 * floor.grid
+        grid, (wide, tall) = self.floor.grid, self.floor.size.tolist()
+        bar = grid if wide > 1.6 * grid else 0.1 * grid
         # Of the panel, not of the floor, which may move.
-        wide, tall = floor.x1 - floor.x0, floor.y1 - floor.y0
         x, y, bar_end = 12.0 / zoom / wide, 0.9 * font / zoom / tall, (12.0 / zoom + bar) / wide
         look: dict[str, Any] = {"color": COLORS["ink"], "transform": axes.transAxes}
         axes.plot([x, bar_end], [y, y], lw=3.0, solid_capstyle="butt", **look)
         axes.plot([x, bar_end], [y, y], "|", ms=11.0, mew=1.5, **look)
         halo = [withStroke(linewidth=4.0, foreground="white")]
-        small = max(12.0, 0.85 * font)
-        look |= {"va": "center_baseline", "fontsize": small, "path_effects": halo}
+        look |= {"va": "center_baseline", "fontsize": max(12.0, 0.85 * font), "path_effects": halo}
         axes.text(bar_end + 6.0 / zoom / wide, y, f"{bar:g} m", **look)
-
-
-def caption_of(outcome: Outcome) -> str:
-    """Caption of an outcome: its mark and its name."""
-    return _MARKS[outcome.kind][0] + outcome.text
 
 
 def _dot(face: str, edge: str, size: float, line: float = 1.2, **more: Any) -> Line2D:

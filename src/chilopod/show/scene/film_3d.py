@@ -2,13 +2,15 @@
 
 Both take a record as described in :mod:`chilopod.show.scene.frames` that has ``pose`` as well, from
 :func:`chilopod.twin.simulate` with ``poses=True``. Both need OpenGL, see :mod:`chilopod.twin.gl`; a caller that gets
-their OutputError without it still has :func:`chilopod.show.scene.film.filmed`.
+their OutputError without it still has :class:`chilopod.show.scene.film.Film`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -21,8 +23,7 @@ from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.show import style
 from chilopod.show.scene.aims import places_of
-from chilopod.show.scene.encoder import encoded
-from chilopod.show.scene.film import APART, CALM, GAP, LARGEST, PIXEL, FilmPanel, Stage, frame_times, telling
+from chilopod.show.scene.film import APART, CALM, GAP, LARGEST, PIXEL, Film, FilmPanel, Stage
 from chilopod.show.scene.frames import Scene, scene
 from chilopod.show.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
@@ -35,48 +36,20 @@ _MOST_PICTURES: Final = 60
 _NARROWEST, _LOWEST = 120, 80
 
 
-def film_3d(
-    record: xr.Dataset,
-    *,
-    titles: Mapping[Any, str] | Sequence[str],
-    heading: str,
-    fps: int = 25,
-    speed: float = 1.0,
-    size: tuple[int, int] = (1440, 400),
-    follow: bool = False,
-) -> bytes:
-    """Walks of the twin as a film, side by side, H.264 in mp4, as :func:`chilopod.show.scene.film.filmed`.
+@dataclass(frozen=True)
+class Film3D(Film):
+    """Film of walks of the twin; errors are those of :class:`chilopod.show.scene.film.Film`, a ParameterError if the
+    record has no poses, and an OutputError if there is no OpenGL."""
 
-    Every panel follows its robot, or all show the same piece of floor, with all of all walks. Errors are those of
-    ``filmed``, a ParameterError if the record has no poses, and an OutputError if there is no OpenGL.
-    """
-    times = frame_times(record, size, fps, speed)
-    walks = _Walks(record, titles, times)
-    with gl.context(*size), style.house_style():
-        stage = _Stage3D(walks, heading, size, speed, follow)
-        try:
-            return encoded((stage.drawn(index) for index in range(len(times))), fps, size)
-        finally:
-            stage.studio.close()
+    size: tuple[int, int] = (1440, 400)
 
-
-def poster_3d(
-    record: xr.Dataset,
-    *,
-    titles: Mapping[Any, str] | Sequence[str],
-    heading: str,
-    speed: float = 1.0,
-    size: tuple[int, int] = (1440, 400),
-    follow: bool = False,
-) -> bytes:
-    """Frame of the film of :func:`film_3d` in its last third, as PNG, with errors likewise."""
-    walks = _Walks(record, titles, frame_times(record, size, 25, speed))
-    with gl.context(*size), style.house_style():
-        stage = _Stage3D(walks, heading, size, speed, follow)
-        try:
-            return telling(stage)
-        finally:
-            stage.studio.close()
+    @contextmanager
+    def _stage(self, times: Array) -> Iterator[Stage]:
+        walks = _Walks(self.record, self.titles, times)
+        with gl.context(*self.size), style.house_style():
+            stage = _Stage3D(self, walks)
+            with closing(stage.studio):
+                yield stage
 
 
 def stills(
@@ -90,12 +63,8 @@ def stills(
     """Moments of walks (s, shape (T,)) as pictures of a size (pixels) in one PNG, all of the same piece of floor; a row
     for every robot. The nearest samples are shown.
 
-    Raises
-    ------
-    ParameterError
-        If a time is not in the record, there are too many, or the record is refused by :func:`film_3d`.
-    OutputError
-        If there is no OpenGL.
+    Raises a ParameterError if a time is not in the record, there are too many, or the record is refused by
+    :class:`Film3D`, and an OutputError if there is no OpenGL.
     """
     wanted, recorded = np.atleast_1d(np.asarray(times, dtype=np.float64)), record["time"].values
     robots = record.sizes["robot"]
@@ -111,12 +80,9 @@ def stills(
         allowed = f"{_NARROWEST} to {LARGEST} pixels"
         raise ParameterError("must be the size of a picture", field="size", value=size, allowed=allowed)
     walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
-    with gl.context(*size), style.house_style():
-        studio = Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)
-        try:
-            return style.png(_arranged(walks, studio, heading, size), dpi=PIXEL)
-        finally:
-            studio.close()
+    robot, view = walks.shown.frames.robot, walks.view(size)
+    with gl.context(*size), style.house_style(), closing(Studio(robot, size, view, fine=True)) as studio:
+        return style.png(_arranged(walks, studio, heading, size), dpi=PIXEL)
 
 
 class _Walks:
@@ -127,16 +93,13 @@ class _Walks:
             allowed = "one of the twin, simulated with poses=True"
             raise ParameterError("has no poses to draw", field="record", allowed=allowed)
         recorded = record["time"].values.astype(np.float64)
-        above = np.searchsorted(recorded, times).clip(1, max(1, len(recorded) - 1))
-        above = np.minimum(above, len(recorded) - 1)
-        nearer = np.abs(recorded[above - 1] - times) <= np.abs(recorded[above] - times) + 1e-9
-        self.samples = np.where(nearer, np.maximum(above - 1, 0), above)
+        place = np.interp(times, recorded, np.arange(len(recorded)))
+        self.samples = np.ceil(place - 0.5 - 1e-9).astype(np.intp)  # in the middle the earlier one
         self.shown: Scene = scene(record, titles, recorded[self.samples])
         self.poses: Array = record["pose"].transpose("time", "robot", "coordinate").values
         self.positions: Array = record["position"].transpose("time", "robot", "axis").values
-        good = np.isfinite(self.poses).all(axis=-1)
-        rows = np.where(good, np.arange(len(recorded))[:, None], -1)
-        self.last = np.maximum.accumulate(rows, axis=0)
+        known = np.isfinite(self.poses).all(axis=-1)
+        self.last = np.maximum.accumulate(np.where(known, np.arange(len(recorded))[:, None], -1), axis=0)
 
     def view(self, size: tuple[int, int], robot: int | None = None, index: int = 0) -> View:
         """View of everything, or of the surroundings of a robot at a time."""
@@ -183,10 +146,10 @@ class _Walks:
 class _Stage3D(Stage):
     """A film's heading, clock and key around panels in three dimensions."""
 
-    def __init__(self, walks: _Walks, heading: str, size: tuple[int, int], speed: float, follow: bool) -> None:
+    def __init__(self, film: Film3D, walks: _Walks) -> None:
         self.walks = walks
         self.studio: Studio
-        super().__init__(walks.shown, heading, size, speed, follow)
+        super().__init__(film, walks.shown)
         note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
         renderer = self.canvas.get_renderer()
         key = self.figure.legends[0].get_window_extent(renderer)

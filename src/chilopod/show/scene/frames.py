@@ -82,8 +82,11 @@ def bodies(
     centres = module_centres(position, headings, robot.module_length)
     half = 0.5 * robot.module_length * directions(headings)[0]
     spine = np.concatenate([centres[..., :1, :] + half[..., :1, :], centres - half], axis=-2)
-    reach, stands = _strokes(robot, time)
-    feet = _feet(robot, centres, headings, reach, leg_yaw)
+    phase = (robot.gait.phases(time, robot.body.modules) + _SAME_PHASE) % 1.0
+    stands, stroke, yaw = robot.gait.stands(phase), robot.gait.stroke(phase)[:, None], np.zeros((*headings.shape, 2))
+    yaw[:, :, 0] = leg_yaw
+    places = foot_places(robot.legs.forward_offset, robot.legs.half_width, stroke, yaw)
+    feet = from_modules(centres, headings, places)
 
     # Index of the last sample, at each time, at which the robot walked.
     last = np.maximum.accumulate(np.where(walks, np.arange(len(time))[:, None], 0), axis=0)
@@ -114,20 +117,6 @@ def _interpolated(values: NDArray[Any], recorded: Array, times: Array) -> Array:
     return np.where(share <= _SAME_PHASE, known[below], (1.0 - share) * known[below] + share * known[above])
 
 
-def _strokes(robot: Robot, time: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Distance of every foot ahead of mid-stroke (m), and mask of standing feet, both (T, N, 2)."""
-    phase = (robot.gait.phases(time, robot.body.modules) + _SAME_PHASE) % 1.0
-    return robot.gait.stroke(phase), robot.gait.stands(phase)
-
-
-def _feet(robot: Robot, centres: Array, headings: Array, reach: Array, leg_yaw: Array) -> Array:
-    """Feet on the floor, (T, R, N, 2, 2); `reach` as from :func:`_strokes`, `leg_yaw` (T, R, 2)."""
-    yaw = np.zeros((*headings.shape, 2))
-    yaw[:, :, 0] = leg_yaw
-    places = foot_places(robot.legs.forward_offset, robot.legs.half_width, reach[:, None], yaw)
-    return from_modules(centres, headings, places)
-
-
 @dataclass(frozen=True)
 class Outcome:
     """Outcome of a robot's walk, such as "arrived at 18.4 s", known from a time (s) on; its kind is "arrived",
@@ -149,16 +138,20 @@ class Floor:
     y1: float
     grid: float
 
-    def around(self, middle: Array) -> Floor:
-        """Floor of this size around a place, m, (2,)."""
-        half = 0.5 * np.array([self.x1 - self.x0, self.y1 - self.y0])
-        (x0, y0), (x1, y1) = middle - half, middle + half
-        return Floor(float(x0), float(x1), float(y0), float(y1), self.grid)
+    @classmethod
+    def of(cls, middle: Array, size: Array, grid: float) -> Floor:
+        """Floor of a size around a place, m, (2,)."""
+        (x0, y0), (x1, y1) = (middle - 0.5 * size).tolist(), (middle + 0.5 * size).tolist()
+        return cls(x0, x1, y0, y1, grid)
+
+    @property
+    def size(self) -> Array:
+        """Width and height, m."""
+        return np.array([self.x1 - self.x0, self.y1 - self.y0])
 
     def span(self) -> tuple[Array, float]:
         """Middle of positions on a page, and their largest distance from it, m: the floor with a margin of its size."""
-        middle = np.array([0.5 * (self.x0 + self.x1), 0.5 * (self.y0 + self.y1)])
-        return middle, 1.5 * max(self.x1 - self.x0, self.y1 - self.y0)
+        return np.array([0.5 * (self.x0 + self.x1), 0.5 * (self.y0 + self.y1)]), 1.5 * float(self.size.max())
 
 
 @dataclass(frozen=True)
@@ -264,8 +257,7 @@ def _floor(frames: BodyFrames, aims: Array, radius: float) -> Floor:
     middle, size = 0.5 * (low + high), np.maximum(high - low, 0.5 * robot.body.length)
     size *= 1.0 + 2.0 * _MARGIN
     size = np.array([max(size[0], _TALLEST * size[1]), max(size[1], size[0] / _FLATTEST)])
-    (x0, y0), (x1, y1) = middle - 0.5 * size, middle + 0.5 * size
-    return Floor(float(x0), float(x1), float(y0), float(y1), _grid(float(size.max())))
+    return Floor.of(middle, size, _grid(float(size.max())))
 
 
 def close(frames: BodyFrames) -> Floor:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import xarray as xr
-from jinja2 import Environment, FunctionLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from chilopod import units
@@ -21,6 +19,7 @@ from chilopod.show.scene.frames import Scene, robot_of, scene
 from chilopod.show.scene.outline import SLIMNESS
 from chilopod.show.scene.packing import LARGEST, encoded, packed
 from chilopod.show.style import SCENE, THIN
+from chilopod.show.templates import template
 
 SHOWN: Final = 6
 """Walks of a replay: more are hard to tell apart."""
@@ -62,8 +61,7 @@ def replay(
     record
         Record of any engine, see :mod:`chilopod.show.scene.frames`.
     titles
-        Title of each robot: by its label in the record, or in the order of the record; None: by their numbers, the
-        first six of them.
+        Title of each robot, by its label in the record or in the order there; None: the first six by their numbers.
     heading
         Heading of the page; None: the robot's name.
 
@@ -91,22 +89,15 @@ def replay(
 def _page(name: str, shown: Scene, heading: str, view: str, data: Mapping[str, Any], **words: str) -> str:
     """A template with its contents, and the data that its scripts read; they have an entry ``robots`` with one mapping
     a robot."""
-    folder, time, floor = files("chilopod.show.scene"), shown.frames.time, shown.floor
-    environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=FunctionLoader(lambda file: folder.joinpath(file).read_text(encoding="utf-8")),
-    )
+    time, floor = shown.frames.time, shown.floor
     panels = [
         {"title": title, "alt": f"{title}: the robot on the floor, {view}. Outcome: {outcome.text}."}
         for title, outcome in zip(shown.titles, shown.outcomes, strict=True)
     ]
     robots = [
         {
-            "outcome": {"text": outcome.text, "kind": outcome.kind, "time": outcome.time},
-            "aims": [{"place": aim.place, "since": aim.since, "reached": aim.reached} for aim in aims],
+            "outcome": asdict(outcome),
+            "aims": list(map(asdict, aims)),
             "springs": [encoded(_in_steps(shares)) for shares in springs.T],
             "steers": shown.steers(index),
             **more,
@@ -117,12 +108,12 @@ def _page(name: str, shown: Scene, heading: str, view: str, data: Mapping[str, A
     ]
     common = {
         "time": {"start": float(time[0]), "step": float(np.diff(time[:2]).sum()), "count": len(time)},
-        "floor": {"x0": floor.x0, "x1": floor.x1, "y0": floor.y0, "y1": floor.y1, "grid": floor.grid},
+        "floor": asdict(floor),
         "colors": SCENE,
         "springs": {"thin": THIN, "stiffest": units.from_si(float(np.nanmax(shown.springs, initial=0.0)), "N*mm/deg")},
         "arrivalRadius": shown.arrival_radius,
     }
-    return environment.get_template(name).render(
+    return template("chilopod.show.scene", name).render(
         heading=heading,
         panels=panels,
         colors=SCENE,

@@ -29,12 +29,11 @@ def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
     plan = compiled(shown.frames.robot)
     found = record["pose"].transpose("time", "robot", "coordinate")
     if found.sizes["coordinate"] != plan.model.nq:
-        problem, allowed = (
-            f"has poses of {found.sizes['coordinate']} coordinates",
-            f"{plan.model.nq}, those of its robot",
-        )
-        raise ParameterError(problem, field="record", allowed=allowed)
-    poses = _continued(found.sel(time=shown.frames.time).values, _quaternions(plan.model))
+        problem = f"has poses of {found.sizes['coordinate']} coordinates"
+        raise ParameterError(problem, field="record", allowed=f"{plan.model.nq}, those of its robot")
+    free = plan.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    quaternions = (plan.model.jnt_qposadr[free] + 3).tolist()
+    poses = _continued(found.sel(time=shown.frames.time).values, quaternions)
     origin, step = _scale(shown, poses)
     steps = packed(poses, origin, step)
     pole = plan.model.geom("pole").size
@@ -49,14 +48,9 @@ def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
     }
 
 
-def _quaternions(model: mujoco.MjModel) -> list[int]:
-    """Indices of the coordinates at which quaternions of free joints begin."""
-    free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
-    return [int(at) + 3 for at in model.jnt_qposadr[free]]
-
-
 def _continued(poses: Array, quaternions: Sequence[int]) -> Array:
-    """Poses (T, R, coordinates) that stay as they were once a robot stops, with quaternions that do not jump."""
+    """Poses (T, R, coordinates) that stay as they were once a robot stops; quaternions, which begin at some of the
+    coordinates, do not jump."""
     known = np.isfinite(poses).all(axis=-1)
     last = np.maximum.accumulate(np.where(known, np.arange(len(poses))[:, None], 0), axis=0)
     poses = poses[last, np.arange(poses.shape[1])]
@@ -119,15 +113,6 @@ def _shapes(plan: TwinModel) -> list[dict[str, Any]]:
 
 def _pins(plan: TwinModel) -> list[dict[str, Any]]:
     """The yaw joints, which have no geometry in the model."""
-    model, size = plan.model, [*yaw_joint(plan.model), 0.0]
-    return [
-        {
-            "body": int(model.jnt_bodyid[joint]),
-            "kind": "cylinder",
-            "role": "joint",
-            "size": size,
-            "place": model.jnt_pos[joint].tolist(),
-            "turn": [1.0, 0.0, 0.0, 0.0],
-        }
-        for joint in plan.yaw_joints
-    ]
+    bodies, places = plan.model.jnt_bodyid[plan.yaw_joints].tolist(), plan.model.jnt_pos[plan.yaw_joints].tolist()
+    look = {"kind": "cylinder", "role": "joint", "size": [*yaw_joint(plan.model), 0.0], "turn": [1.0, 0.0, 0.0, 0.0]}
+    return [{"body": body, "place": place, **look} for body, place in zip(bodies, places, strict=True)]

@@ -87,12 +87,8 @@ class Studio:
         self.data = mujoco.MjData(self.model)
         count = robot.body.modules
         self.modules = [int(self.model.body(f"module{i + 1}").id) for i in range(count)]
-        self.shins = np.array(
-            [
-                [[self.model.geom(f"leg{i + 1}_{side}_{part}").id for part in ("lower", "foot")] for side in SIDES]
-                for i in range(count)
-            ]
-        )
+        shins = [[f"leg{i + 1}_{side}_{part}" for part in ("lower", "foot")] for i in range(count) for side in SIDES]
+        self.shins = np.array([[self.model.geom(name).id for name in each] for each in shins]).reshape(count, 2, 2)
         self.springs = [int(self.model.geom(f"spring{i}").id) for i in range(1, count)]
         self.thick: Array = self.model.geom_size[self.springs, 0].copy()
         self.of_robot = np.flatnonzero(self.model.body_rootid[self.model.geom_bodyid] == self.modules[0])
@@ -102,6 +98,9 @@ class Studio:
         self.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self.option = mujoco.MjvOption()
         self.option.geomgroup[POLE_GROUP] = True
+        self.camera = mujoco.MjvCamera()
+        self.camera.azimuth = math.degrees(math.atan2(_AHEAD[1], _AHEAD[0]))
+        self.camera.elevation = math.degrees(math.asin(_AHEAD[2]))
         self.rect = mujoco.MjrRect(0, 0, *size)
         self.pixels = np.zeros((size[1], size[0], 3), np.uint8)
         self.context = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100)
@@ -130,7 +129,8 @@ class Studio:
         model.light_pos[0] = view.middle - view.distance * _LIGHT
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
-        mujoco.mjv_updateScene(model, data, self.option, None, _camera(view), mujoco.mjtCatBit.mjCAT_ALL, scene)
+        self.camera.lookat[:], self.camera.distance = view.middle, view.distance
+        mujoco.mjv_updateScene(model, data, self.option, None, self.camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
         if not self.fine and look.pose is not None:
             self._shade(strength)
         if look.target is not None:
@@ -182,14 +182,6 @@ class Studio:
         scene.ngeom += 1
 
 
-def _camera(view: View) -> Any:
-    camera = mujoco.MjvCamera()
-    camera.lookat[:], camera.distance = view.middle, view.distance
-    camera.azimuth = math.degrees(math.atan2(_AHEAD[1], _AHEAD[0]))
-    camera.elevation = math.degrees(math.asin(_AHEAD[2]))
-    return camera
-
-
 def _dressed(robot: Robot, size: tuple[int, int], view: View, fine: bool) -> Any:
     """The robot's description for pictures."""
     spec = build(robot)
@@ -203,34 +195,15 @@ def _dressed(robot: Robot, size: tuple[int, int], view: View, fine: bool) -> Any
     look.map.znear, look.map.zfar, look.map.shadowclip = 0.05, 8.0, 0.7
     # What shines from the lens and what comes from above add up to 1 on the floor, so that colours stay as they are.
     look.headlight.ambient, look.headlight.diffuse, look.headlight.specular = [0.45] * 3, [0.15] * 3, [0.0] * 3
-    spec.worldbody.add_light(
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        dir=_LIGHT,
-        castshadow=fine,
-        ambient=[0.0] * 3,
-        diffuse=[0.5] * 3,
-        specular=[0.1] * 3,
-    )
-    floor = spec.add_texture(
-        name="tiles",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        mark=mujoco.mjtMark.mjMARK_EDGE,
-        rgb1=to_rgb("#e9eaec"),
-        rgb2=to_rgb("#dcdee1"),
-        markrgb=to_rgb("#c6c9cd"),
-        width=512,
-        height=512,
-    )
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        rgb1=to_rgb("#f4f5f7"),
-        rgb2=to_rgb("#f4f5f7"),
-        width=16,
-        height=96,
-    )
+    light: dict[str, Any] = {"ambient": [0.0] * 3, "diffuse": [0.5] * 3, "specular": [0.1] * 3}
+    above = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    spec.worldbody.add_light(type=above, dir=_LIGHT, castshadow=fine, **light)
+    checker, flat = mujoco.mjtBuiltin.mjBUILTIN_CHECKER, mujoco.mjtBuiltin.mjBUILTIN_FLAT
+    tile: dict[str, Any] = {"rgb1": to_rgb("#e9eaec"), "rgb2": to_rgb("#dcdee1"), "width": 512, "height": 512}
+    tile |= {"mark": mujoco.mjtMark.mjMARK_EDGE, "markrgb": to_rgb("#c6c9cd")}
+    floor = spec.add_texture(name="tiles", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=checker, **tile)
+    sky: dict[str, Any] = {"rgb1": to_rgb("#f4f5f7"), "rgb2": to_rgb("#f4f5f7"), "width": 16, "height": 96}
+    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=flat, **sky)
     # Two by two tiles make the texture, which MuJoCo repeats that many times on 2 m.
     tiles = spec.add_material(name="tiles", texuniform=True, texrepeat=[1.0 / TILE] * 2, specular=0.0, shininess=0.0)
     tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = floor.name
