@@ -2,6 +2,7 @@
 
 import os
 import platform
+from collections import defaultdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -44,7 +45,8 @@ def kept(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def tiny(kept, tmp_path_factory) -> SimpleNamespace:
-    """The main job with every section, as small as it gets: its folder, what was found, what failed, all text painted.
+    """The main job with every section, as small as it gets: its folder, what was found, the fractions that were told of
+    each section, what failed, all text painted.
 
     Tests of one file run in one process, so all that need it are in one.
     """
@@ -54,10 +56,15 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
     from helpers.texts import watched
 
     context, folder = Context(size=Size.TINY, folder=kept), tmp_path_factory.mktemp("tiny")
-    sections = load_sections()
+    sections, told = load_sections(), defaultdict(list)
     with watched() as painted, Report(sections, context, folder) as report:
-        found = reproduce(sections, context, callback=lambda found, section: report.add(found, [section]))
-    return SimpleNamespace(folder=folder, found=found, failures=report.failures, painted=painted)
+        found = reproduce(
+            sections,
+            context,
+            lambda what, done, words: told[what].append(done),
+            lambda found, section: report.add(found, [section]),
+        )
+    return SimpleNamespace(folder=folder, found=found, told=told, failures=report.failures, painted=painted)
 
 
 @pytest.fixture(scope="module")

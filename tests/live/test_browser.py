@@ -26,6 +26,8 @@ pytestmark = [
 
 PATIENCE = 60_000  # ms, on a busy machine
 SOFTWARE_WEBGL = "--enable-unsafe-swiftshader"
+SELDOM = """window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 200);
+window.cancelAnimationFrame = clearTimeout;"""
 READY = "Straight and stable"
 
 
@@ -69,8 +71,10 @@ def opened(page, live):
 
 @contextmanager
 def visit(chromium, live, width=800, height=500, query=""):
-    page = chromium.new_page(viewport={"width": width, "height": height})
+    # Few pixels and few pictures a second, since the processor draws them.
+    page = chromium.new_page(viewport={"width": width, "height": height}, device_scale_factor=0.25)
     page.set_default_timeout(PATIENCE)
+    page.add_init_script(SELDOM)
     page.asked = []
     page.on("request", lambda request: page.asked.append(request.url))
     try:
@@ -144,9 +148,8 @@ def joint_in(page):
     while found is None or found != before:
         before = found
         page.wait_for_timeout(500)
-        red, green, blue = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), float).transpose(
-            2, 0, 1
-        )
+        shown = Image.open(io.BytesIO(page.screenshot(scale="css"))).convert("RGB")
+        red, green, blue = np.asarray(shown, float).transpose(2, 0, 1)
         purple = (red > 1.2 * green) & (red > 1.1 * blue) & (blue > 1.1 * green) & (red > 120.0)
         purple[:200] = purple[:, 920:] = False
         spots, count = ndimage.label(purple)

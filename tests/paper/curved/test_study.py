@@ -7,13 +7,9 @@ from chilopod import stability
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
-from chilopod.paper import statements
-from chilopod.paper.curved import sections as curved_rows
 from chilopod.paper.curved import study as curved_findings
 from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
 from chilopod.paper.printed import variant_robots
-from chilopod.paper.section import Context, Size
-from chilopod.paper.table import OfPlanar, Row
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
 from chilopod.stability.problem.returns import whole_period
@@ -122,29 +118,3 @@ def test_variants_are_the_papers():
     robots = variant_robots(ROBOT)
     assert list(robots) == ["as built", "k2-5 = 28 N*mm/deg", "stride 1.8 cm", "module phase 180 deg"]
     assert robots["stride 1.8 cm"].gait.stride == pytest.approx(0.018)
-
-
-def test_a_small_study_says_what_it_found(kept):
-    seen = []
-    study = curved_findings.curved_study(Context(size=Size.TINY, folder=kept), lambda done, words: seen.append(done))
-    assert seen == sorted(seen)
-    assert seen[-1] == 1.0
-    found = curved_rows.rows(study)
-    said = {row.quantity: row for row in found if isinstance(row, Row)}
-    assert said["joints by how far they bend"].verdict == "agrees"
-    beside = {row.statement: row.result.words for row in found if isinstance(row, OfPlanar)}
-    assert beside[statements.STRAIGHT] == "straight from 41 N*mm/deg up"
-    assert beside[statements.CURVED].startswith("curved up to 10 N*mm/deg, ")
-    assert beside[statements.ONSET].endswith("; the point is at 11.99")
-    points = [beside[each.onset].rpartition(" ")[2] for each in statements.VARIANTS.values()]
-    assert points == ["8.92", "10.79", "11.34"]
-    alike = [100 * (float(study.comparison.equal_spring[row]) - 1) for row in (1, 2, 3)]
-    shown = [beside[each.radius].rpartition("; ")[2] for each in statements.VARIANTS.values()]
-    assert shown == [f"{value:+.0f} % at the same spring" for value in alike]
-    assert study.comparison.criticality.values.tolist() == ["supercritical"] * 2 + ["subcritical"] * 2
-    assert study.comparison.stiffest_k1.values[-1] == pytest.approx(11.483, abs=0.001)
-    assert study.comparison.exact_k1.values == pytest.approx([11.991, 8.919, 10.786, 11.344], abs=1e-3)
-    exact, fitted = study.fits.attrs["exact_k1"], study.fits.critical_k1.values
-    assert (fitted - exact > 0.2).all()
-    assert (np.abs(fitted - study.fits.exact_walks) < 4.0 * study.fits.trial_error).all()
-    assert float(study.agreement.max()) < 1e-6

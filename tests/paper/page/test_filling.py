@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import threading
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -28,6 +29,7 @@ THERE = """new Promise((done) => {
   const look = () => %s ? done(true) : setTimeout(look, 50);
   look();
 })"""
+HASTE = "const wait = setTimeout; window.setTimeout = (call, time) => wait(call, time / 10)"
 CONTEXT = Context()
 
 
@@ -108,12 +110,14 @@ def test_what_is_shown_beside_others_is_drawn_once_more(tmp_path):
     assert seen == [None, 2, 2]
 
 
-def test_new_sections_are_put_in_and_the_readers_place_stays(browser, tmp_path):
+def test_new_sections_are_put_in_and_the_readers_place_stays(browser, monkeypatch, tmp_path):
+    monkeypatch.setattr("chilopod.paper.page.report._BETWEEN_NEWS", 0.2)
     one = replace(ONE, rows=lambda value: [*rows(value), Row("other", "1", Result("2"), "here", Verdict.DIFFERS)])
     with Report([one, TWO], CONTEXT, tmp_path) as report:
         report.add(reproduce([TWO], CONTEXT), [TWO])
         while 'id="two"' not in text(report):
-            pass
+            time.sleep(0.05)
+        browser("Page.addScriptToEvaluateOnNewDocument", source=HASTE)
         browser.open(report.page)
         top = "document.getElementById('two').getBoundingClientRect().top"
         browser.run("window.mark = 'the same page'; document.getElementById('two').scrollIntoView()")

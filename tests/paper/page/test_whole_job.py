@@ -8,14 +8,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chilopod.netcdf import netcdf
+from chilopod.paper import statements
+from chilopod.paper.curved import figures as curved_figures
+from chilopod.paper.curved.sections import CURVED
 from chilopod.paper.fit_data import critical_mode_data, variant_settings
 from chilopod.paper.registry import load_sections
 from chilopod.paper.straight.sections import IDENTIFICATION
+from chilopod.paper.table import OfPlanar, Row
+from chilopod.paper.turning.sections import TURNING
+from chilopod.show import files, style
 from chilopod.tasks.identify import planar
 from helpers.html_page import Page as PAGE
 
 HERE = Path(__file__).parent
 REPLAYS = ["movie-1", "movie-2", "robot-movie-1", "robot-movie-2", "courses-movie"]
+CURVED_PANELS = {
+    each.__name__: each
+    for each in (curved_figures.walks, curved_figures.joints, curved_figures.onset, curved_figures.variants)
+}
 BROKEN = """Promise.all([...document.images].map(async (image) => {
   image.loading = "eager";
   await image.decode().catch(() => {});
@@ -139,3 +150,82 @@ def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
     assert set(variant_settings()) < set(found.profile.data_vars)
     result = found.as_json()
     assert set(result["constants"]) == set(planar.FREE)
+
+
+def test_a_small_study_of_curved_walks_says_what_it_found(tiny):
+    study, seen = tiny.found[CURVED], tiny.told[CURVED.sentence]
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+    found = tiny.found.rows[CURVED]
+    said = {row.quantity: row for row in found if isinstance(row, Row)}
+    assert said["joints by how far they bend"].verdict == "agrees"
+    beside = {row.statement: row.result.words for row in found if isinstance(row, OfPlanar)}
+    assert beside[statements.STRAIGHT] == "straight from 41 N*mm/deg up"
+    assert beside[statements.CURVED].startswith("curved up to 10 N*mm/deg, ")
+    assert beside[statements.ONSET].endswith("; the point is at 11.99")
+    points = [beside[each.onset].rpartition(" ")[2] for each in statements.VARIANTS.values()]
+    assert points == ["8.92", "10.79", "11.34"]
+    alike = [100 * (float(study.comparison.equal_spring[row]) - 1) for row in (1, 2, 3)]
+    shown = [beside[each.radius].rpartition("; ")[2] for each in statements.VARIANTS.values()]
+    assert shown == [f"{value:+.0f} % at the same spring" for value in alike]
+    assert study.comparison.criticality.values.tolist() == ["supercritical"] * 2 + ["subcritical"] * 2
+    assert study.comparison.stiffest_k1.values[-1] == pytest.approx(11.483, abs=0.001)
+    assert study.comparison.exact_k1.values == pytest.approx([11.991, 8.919, 10.786, 11.344], abs=1e-3)
+    exact, fitted = study.fits.attrs["exact_k1"], study.fits.critical_k1.values
+    assert (fitted - exact > 0.2).all()
+    assert (np.abs(fitted - study.fits.exact_walks) < 4.0 * study.fits.trial_error).all()
+    assert float(study.agreement.max()) < 1e-6
+
+
+@pytest.mark.parametrize("name", CURVED_PANELS)
+def test_panels_of_curved_walks_say_what_is_drawn_and_store_it(tiny, name):
+    panel = CURVED_PANELS[name](tiny.found[CURVED])
+    assert panel.alt
+    assert all(panel.text)
+    assert "nan" not in " ".join((panel.alt, *panel.text))
+    assert netcdf(panel.data)
+    assert files.csv(panel.data).count("\n") > 5
+
+
+def test_the_fork_shows_every_mean(tiny):
+    study = tiny.found[CURVED]
+    with style.house_style():
+        axes = curved_figures.walks(study).draw(False).axes
+    (fork,) = (each for each in axes if each.get_ylabel() == "mean angle of joint 1 (deg)")
+    shown = np.concatenate([line.get_ydata() for line in fork.get_lines() if line.get_marker() == "o"])
+    angles = np.rad2deg(study.trials.mean_angle.sel(joint=1))
+    for side in ("left", "right"):
+        here = study.trials.direction == side
+        means = angles.where(here).mean("repeat").where(here.sum("repeat") > 1).values
+        for mean in means[np.isfinite(means)]:
+            assert np.nanmin(np.abs(shown - mean)) < 1e-9
+
+
+@pytest.fixture(scope="module")
+def turns(tiny):
+    return TURNING.figures(tiny.found)
+
+
+def test_paths_are_drawn_with_equal_scales(turns):
+    by_name = {panel.name: panel for panel in turns}
+    with style.house_style():
+        for name, letters in (("turning", ("A ", "B ")), ("turning-without", ("A ", "B "))):
+            axes = [each for each in by_name[name].draw(False).axes if each.get_title(loc="left").startswith(letters)]
+            assert len(axes) == 2
+            assert all(each.get_aspect() == 1.0 for each in axes)
+
+
+def test_every_figure_has_a_name_of_its_own_words_and_a_table(turns):
+    assert len({panel.name for panel in turns}) == len(turns) == 6
+    for panel in turns:
+        text = " ".join((panel.title, panel.alt, *panel.text))
+        assert "nan" not in text and "  " not in text, panel.name  # noqa: PT018
+        assert panel.alt.endswith(".")
+        assert len(files.csv(panel.data).splitlines()) > 10
+
+
+def test_the_shaded_springs_are_those_that_arrive(turns):
+    panel = next(panel for panel in turns if panel.name == "turning-criteria")
+    most = np.isfinite(panel.data.arrival.values).mean(axis=1) > 0.5
+    arrived = panel.data.spring.values[most]
+    assert f"{arrived.min():g} to {arrived.max():g}" in panel.text[0]
