@@ -155,7 +155,7 @@ def test_a_class_that_only_this_process_knows_is_not_kept(tmp_path, caplog):
     assert together(run([trial(Here())])).sizes["robot"] == 1
     assert len(run([trial(Here())], tmp_path)) == 1
     assert list(tmp_path.iterdir()) == []
-    (said,) = [each.message for each in caplog.records]
+    (said,) = [each.message for each in caplog.records if each.name == "chilopod.trials.store"]
     assert said.endswith("it must be defined at the top of a module that can be imported")
 
 

@@ -71,7 +71,7 @@ def test_what_cannot_be_described_walks_and_is_not_kept(tmp_path, caplog):
     assert len({each.file_name for each in asked}) == 3
     assert [record.attrs.get("not kept") for record in run(asked, tmp_path)] == [None] * 3
     assert not tmp_path.exists() or not list(tmp_path.iterdir())
-    (said,) = [each.message for each in caplog.records]
+    (said,) = [each.message for each in caplog.records if each.name == "chilopod.trials.store"]
     assert "Locked: its trials run but are not kept: Locked.lock: an object of type lock, which cannot be" in said
 
 
@@ -97,7 +97,7 @@ def test_a_controller_that_does_not_repeat_itself_is_not_kept(controller, tmp_pa
     records = run([Trial(PLANAR, 0.7, seed, controller=controller) for seed in range(2)], tmp_path)
     assert [each.status.item() for each in records] == ["walked"] * 2
     assert list(tmp_path.iterdir()) == []
-    (said,) = [each.message for each in caplog.records]
+    (said,) = [each.message for each in caplog.records if each.name == "chilopod.trials.store"]
     reason = (
         "changes while it steers"
         if isinstance(controller, Remembering)
@@ -205,7 +205,7 @@ def test_what_answers_otherwise_in_every_process_walks_and_is_not_kept(body, tmp
     sys.modules.pop("own_chance")
     assert record.status.item() == "walked"
     assert len(list((tmp_path / "kept").iterdir())) == (body in DETERMINED)
-    (said,) = [each.message for each in caplog.records] or [""]
+    (said,) = [each.message for each in caplog.records if each.name == "chilopod.trials.store"] or [""]
     assert (f": {BY_CHANCE[body]}, whose result varies from call to call" in said) if body in BY_CHANCE else said == ""
 
 
