@@ -118,14 +118,20 @@ def with_bad_values(chance: Random, quick: bool) -> tuple[list[str], list[str]]:
     if how == 0:
         words.append(chance.choice(sorted(flags())))
     elif how == 1:
-        words.append(any_text(chance))
+        values.append(any_text(chance))
+        words.append(values[-1])
     elif how == 2 and len(words) > 1:
         words.pop(chance.randrange(1, len(words)))
     elif how == 3:
         words.insert(0, "--version")
     elif how < 7:
         words.append("--force")
-    parts = (part for value in values for part in (value[:30], f"error: {Path(value).parent}: ") if len(value) > 2)
+    parts = (
+        part
+        for value in values
+        for part in (value[:30], repr(value)[1:31].rstrip("'"), f"error: {Path(value).parent}: ")
+        if len(value) > 2
+    )
     return words, list(parts)
 
 

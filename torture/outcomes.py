@@ -75,7 +75,8 @@ class Ending:
 _UNRAISED = re.compile(r"^Exception ignored [^\n]*\n(?:[^\n]*\n)*?KeyboardInterrupt", re.MULTILINE)
 # What may stand on stderr beside an error.
 _SAID = re.compile(
-    r"^(?:[^:]+: +\d+ (?:%|s|min|h).*|The page is .*|note: .*|wrote .*|kept .*|the controller took .*|"
+    r"^(?:[^:]+: +\d+ (?:%|s|min|h).*|The page is .*|no browser could be started: open .*|"
+    r"note: .*|wrote .*|kept .*|the controller took .*|"
     r".*: walked again; .*|.*: its trials walk and are not kept: .*|[^:]+: compiling, once on this machine|"
     r"Invalid -W option ignored: .*|)$"  # Python says this of PYTHONWARNINGS before anything of ours runs
 )
