@@ -66,7 +66,7 @@ def _check_completion() -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line on arguments, by default those of this process, and return its exit code.
 
-    That is 0, or 2 for anything the user can put right, 1 for a fault of chilopod, 3 where ``doctor`` finds that
+    The code is 0, or 2 for anything the user can put right, 1 for a fault of chilopod, 3 where ``doctor`` finds that
     something essential is missing, 130 when interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)

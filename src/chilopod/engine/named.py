@@ -96,7 +96,7 @@ class _OwnWalk:
         self._name, self._walk = name, walk
 
     def __getattr__(self, name: str) -> Any:
-        if name == "foresee" and not hasattr(self._walk, name):  # optional, see chilopod.engine.contract.Foresees
+        if name not in vars(Walk) and not hasattr(self._walk, name):  # optional, as in contract.Foresees
             raise AttributeError(name)
         found = _theirs(self._name, name, getattr, self._walk, name)
         return partial(_theirs, self._name, name, found) if callable(found) else found

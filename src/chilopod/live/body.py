@@ -38,10 +38,8 @@ def flat_places(seen: Seen) -> Mapping[str, Placed]:
     the body it might have above its feet, which swing forward lifted by a tenth of a module's length."""
     robot = seen.robot
     n, length, legs, gait = robot.body.modules, robot.module_length, robot.legs, robot.gait
-    flat = bodies(
-        robot, np.array([seen.clock]), seen.pose[None, None, :2], seen.pose[None, None, 2],
-        seen.joint_angles[None, None], seen.leg_yaw[None, None],
-    )  # fmt: skip
+    pose, bends, yaw = (each[None, None] for each in (seen.pose, seen.joint_angles, seen.leg_yaw))
+    flat = bodies(robot, np.array([seen.clock]), pose[..., :2], pose[..., 2], bends, yaw)
     centres, headings, pins = flat.centres[0, 0], flat.headings[0, 0], flat.spine[0, 0, 1:-1]
     turned = _about_z(headings)
 

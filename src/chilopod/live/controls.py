@@ -104,7 +104,7 @@ class Controls:
     def reflect(self, settings: Settings, seen: Seen) -> None:
         """Show the present settings after a wish or the walk itself has changed them.
 
-        What somebody drags is not sent back, because it would jump.
+        A slider that somebody drags is not sent its value back, because it would jump.
         """
         before, self._settings, self._seen = self._settings, settings, seen
         if settings == before:
@@ -152,9 +152,8 @@ class Controls:
     def _add_slider(self, gui: viser.GuiApi, row: Slider) -> None:
         (low, high), value = map(row.at_page, row.limits), row.at_page(row.read(self._settings))
         slider: Any = gui.add_slider(row.label, low, high, row.step, value, hint=row.hint)
-        slider.on_update(
-            lambda event: self._wish(row) if event.client else None
-        )  # and not where :meth:`_show` moves it
+        # An update without a client comes from :meth:`_show`.
+        slider.on_update(lambda event: self._wish(row) if event.client else None)
         self._sliders[row.name] = slider
 
     def _wish(self, row: Slider) -> None:

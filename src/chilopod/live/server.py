@@ -115,11 +115,11 @@ class Live:
         try:
             self.server.gui.configure_theme(show_share_button=False, show_logo=False)
             self.server.gui.set_panel_label("chilopod live")
-            self.server.scene.on_click()(self._clicked)
-            self.server.on_client_connect(self._greet)
             self.gate.pictures = self._picture
             self._compile(robot, engine)
             self._furnish()
+            self.server.scene.on_click()(self._clicked)
+            self.server.on_client_connect(self._greet)  # also those who came while it compiled
         except BaseException:
             self.close()
             raise

@@ -53,7 +53,10 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
     rows = (
         *_springs(file),
         Slider(
-            *("friction", "friction", "friction", "Friction of the floor, relative to the robot file"),
+            name="friction",
+            key="friction",
+            label="friction",
+            hint="Friction of the floor, relative to the robot file",
             unit="",
             si="times that of the robot file",
             limits=(0.3, 3.0),
@@ -63,7 +66,10 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
             keys=(("F", "Floor more slippery"), ("G", "Floor less slippery")),
         ),
         Slider(
-            *("gait.stride", "stride", "stride", "Length of every step, cm"),
+            name="gait.stride",
+            key="stride",
+            label="stride",
+            hint="Length of every step, cm",
             unit="cm",
             si="m",
             limits=(STRIDES[0] * stride, STRIDES[1] * stride),
@@ -73,7 +79,10 @@ def sliders_of(file: Robot) -> dict[str, Slider]:
             shift=True,
         ),
         Slider(
-            *("speed", "speed", "speed", "Seconds of walking that one second shows"),
+            name="speed",
+            key="speed",
+            label="speed",
+            hint="Seconds of walking that one second shows",
             unit="",
             si="times real time",
             limits=(1.0, 20.0),

@@ -41,9 +41,9 @@ def sum_moments(
     """Contact moments of every module at one instant, into ``out``, shape (N, 8): N*s/m, N*s, N*s, N*m*s, N*s/m, N*s/m,
     N*s, N*s.
 
-    Whether each foot stands, how far it is ahead of mid-stroke (m) and its friction (N*s/m) have shape (N, 2). Offset
-    and half-width are the position of a foot at mid-stroke ahead of the centre and to the side of the axis of its
-    module, m. ``yaw`` is that of the two legs of module 1 about their feet at mid-stroke, left positive, rad, shape
+    Contact of each foot (1 or 0), its distance ahead of mid-stroke (m) and its friction (N*s/m) have shape (N, 2).
+    Offset and half-width are the position of a foot at mid-stroke ahead of the centre and to the side of the axis of
+    its module, m. ``yaw`` is that of the two legs of module 1 about their feet at mid-stroke, left positive, rad, shape
     (2,).
     """
     for i in range(contact.shape[0]):
