@@ -117,7 +117,7 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
     said = statements.VARIANTS[name]
     ratio = radius_ratio(base, data)
     law = law_ratio(ratio.compared, printed.ONSET.value, printed.onset(name).value)
-    words = [f"{change(ratio.distance)} at equal distance from its own onset, 1/k1 - 1/k1*"]
+    words = [f"{change(ratio.distance)} at equal distance in 1/k1 from its own onset"]
     if np.isnan(ratio.distance.value):
         words = ["no distance from the onset in common with the robot as built"]
     if ratio.compared:
