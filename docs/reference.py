@@ -132,6 +132,9 @@ def commands_page() -> str:
         usage = command.get_usage(context).partition(": ")[2]
         lines += ["", *_heading(f"``{words}``", "-"), f".. program:: {words}", "", ".. code-block:: text", ""]
         lines += [f"   {usage}", "", _escaped(inspect.cleandoc(command.help or ""))]
+        if command.epilog:
+            example = command.epilog.rpartition("\n")[2].strip()
+            lines += ["", "For example:", "", ".. code-block:: sh", "", f"   {example}"]
         for parameter in command.get_params(context):
             if (record := parameter.get_help_record(context)) is None:
                 continue

@@ -117,10 +117,26 @@ def test_commands_parse():
     lines = [(page, line) for page, text in PAGES.items() for line in COMMAND.findall(text)]
     assert len(lines) > 20
     for page, line in lines:
-        command, words = typer.main.get_command(app), shlex.split(line, comments=True)[1:]
-        while hasattr(command, "commands") and words and words[0] in command.commands:
-            command = command.commands[words.pop(0)]
-        command.make_context(f"{page}: {line}", words)
+        parsed(page, line)
+
+
+def parsed(page, line):
+    command, words = typer.main.get_command(app), shlex.split(line, comments=True)[1:]
+    while hasattr(command, "commands") and words and words[0] in command.commands:
+        command = command.commands[words.pop(0)]
+    command.make_context(f"{page}: {line}", words)
+    return command
+
+
+def test_every_command_has_an_example():
+    pending = [typer.main.get_command(app)]
+    while pending:
+        command = pending.pop()
+        pending += getattr(command, "commands", {}).values()
+        if not hasattr(command, "commands"):
+            shown = command.get_help(typer.Context(command)).partition("\n  Example:\n    ")[2]
+            assert "\n" not in shown.strip()
+            assert parsed("--help", shown).help == command.help
 
 
 def test_every_command_is_in_the_table():

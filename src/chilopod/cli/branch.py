@@ -64,6 +64,8 @@ def branch(
 
     With --out, draws the branch (unstable parts dashed, those out of range dotted) and writes it as netCDF and CSV;
     --resume goes on with it.
+
+    Example: chilopod branch aoi2022-planar --between "7.5 N*mm/deg" "20 N*mm/deg" --out curved
     """
     described = options.described
     chosen = between or (None if resume else _BETWEEN)

@@ -33,7 +33,13 @@ class _Group(TyperGroup):
 
 class _Command(TyperCommand):
     """A command whose mistakes are named as they were typed, ``--duration`` and the text behind it, and whose help
-    lists the choices that are registered."""
+    lists the choices that are registered and ends with an example, the last paragraph of its docstring."""
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        text, _, example = (self.help or "").partition("\n\nExample: ")
+        if example:
+            self.help, self.epilog = text, f"\b\nExample:\n  {' '.join(example.split())}"
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         for option in self.params:

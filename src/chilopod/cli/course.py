@@ -66,7 +66,7 @@ def course(
 
     With --out, draws the way and writes the record, a replay that opens in any browser, and a film.
 
-    For example: chilopod course aoi2022-planar --targets "45 deg, 1.3 m; -60 deg, 1.5 m" --out course
+    Example: chilopod course aoi2022-planar --targets "45 deg, 1.3 m; -60 deg, 1.5 m" --out course
     """
     from chilopod import units
     from chilopod.steering import ON_COURSES, course_named, strategy_named

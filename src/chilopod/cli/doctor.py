@@ -53,6 +53,8 @@ def doctor(as_json: JsonOption = False) -> None:
 
     The exit code is 0, or 3 if an essential part is missing. OpenGL and the encoder are needed only for films and
     pictures in 3-D.
+
+    Example: chilopod doctor --json
     """
     with progress_bar("doctor"):
         found = [*_versions(), *(_guarded(name, look) for name, look in _LOOKS.items())]

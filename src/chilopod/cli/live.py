@@ -72,6 +72,8 @@ def live(options: LiveOptions) -> None:
     Drag the first spring below the pitchfork and the robot bends; click on the floor and it goes there; drag a joint.
     Requests of other web sites are refused. Ctrl-C ends the page and keeps a recording that is under way. Needs: pip
     install "chilopod[live]".
+
+    Example: chilopod live aoi2022-planar --set "springs.stiffness[0]=15 N*mm/deg" --open
     """
     seconds, out = _duration(options.duration), options.out
     check_port(options.port)

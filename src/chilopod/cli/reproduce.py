@@ -87,6 +87,8 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
     minutes; the first line says how long it takes here. The page is there at once and fills in. Trials are kept in the
     folder, so a run that was stopped goes on where it was. It takes no robot and no --set, because the paper's
     numbers hold for its own robot only.
+
+    Example: chilopod reproduce --quick --out report
     """
     if options.overrides:
         problem = "must not be given, because the paper's numbers are those of its own robot"
@@ -197,7 +199,7 @@ def planar(
         Path | None,
         typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
     ] = None,
-    template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False,
+    template: Annotated[bool, typer.Option("--template", help="Print a file for --data (> mine.toml), and end.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Friction, half-width and forward offset of the feet from the critical k1 and its mode, with their uncertainty.
@@ -205,7 +207,7 @@ def planar(
     Writes the profile over the forward offset as a figure and as data, and the robot with the best constants. The
     data are the numbers that the paper prints, or your own.
 
-    For example: chilopod identify planar --template > mine.toml; chilopod identify planar robot.toml --data mine.toml
+    Example: chilopod identify planar --data mine.toml --out identification
     """
     from chilopod.tasks.identify import TEMPLATE, CriticalMode, identify_planar
 
@@ -266,6 +268,8 @@ def twin(
 
     Half an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
     was, and with --force one that has ended goes on with more. The preset aoi2022 is what this finds by default.
+
+    Example: chilopod identify twin aoi2022 --starts 1 --out fit
     """
     from chilopod.output import check_folder
 

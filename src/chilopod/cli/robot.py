@@ -44,7 +44,10 @@ def new(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a new robot file, named after the file, to edit by hand."""
+    """Write a new robot file, named after the file, to edit by hand.
+
+    Example: chilopod robot new my.toml --modules 8
+    """
     robot = read_robot((_WHOLE if twin else _PLANAR) if preset is None else preset, None)
     if twin and robot.twin is None:
         robot = robot.with_twin_of(read_robot(_WHOLE, None))
@@ -56,7 +59,10 @@ def new(
 
 @app.command()
 def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
-    """Print every number of a robot, its unit, and where it comes from."""
+    """Print every number of a robot, its unit, and where it comes from.
+
+    Example: chilopod robot show aoi2022-planar --set "body.mass=10 kg"
+    """
     from chilopod import units
     from chilopod.notebook import aligned
 
@@ -95,7 +101,10 @@ def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fal
 
 @app.command()
 def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
-    """Check that a robot is valid, and list its unusual numbers."""
+    """Check that a robot is valid, and list its unusual numbers.
+
+    Example: chilopod robot check aoi2022-planar --set "gait.stride=10 cm"
+    """
     from chilopod.robot import remarks
 
     described = read_robot(robot, overrides)
@@ -118,7 +127,10 @@ def export(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write the three-dimensional model of a robot, which must have a [twin] section, for other programs."""
+    """Write the three-dimensional model of a robot, which must have a [twin] section, for other programs.
+
+    Example: chilopod robot export aoi2022 --out robot.urdf
+    """
     from chilopod.twin.export import format_of
 
     name, write = format_of(out.suffix)

@@ -17,6 +17,8 @@ def stability(options: RobotOptions, out: OutOption = None) -> None:
     A small disturbance is a sum of modes. A mode grows with its exponent, and by its multiplier from one period T of
     the gait to the next: the walk is stable if every |multiplier| is below 1, every exponent's real part below 0.
     Exponents are the principal logarithms of the multipliers over T: their imaginary parts lie in (-pi/T, pi/T].
+
+    Example: chilopod stability aoi2022-planar --set "springs.stiffness[0]=10 N*mm/deg"
     """
     described = options.described
     files = options.free_in(out, "stability.json")
@@ -41,6 +43,8 @@ def bifurcation(
 
     Every bifurcation in the interval has its kind, its error bound, the mode that grows, and its direction: new walks
     set in gently (supercritical) or by a jump (subcritical).
+
+    Example: chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]" --between "2 N*mm/deg" "75 N*mm/deg"
     """
     described = options.described
     limits = interval(described, parameter, between)

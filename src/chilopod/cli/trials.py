@@ -34,6 +34,8 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     Only the front of every file is read; `chilopod trials check` reads all of it. The column robots counts robots of
     one name that differ in their numbers. A controller of your own has its code in brackets: trials from before and
     after a change of it are rows of their own.
+
+    Example: chilopod trials list report/trials
     """
     from chilopod.memory import in_words
     from chilopod.notebook import aligned
@@ -112,6 +114,8 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
     All of every file is read. Each damaged file is a line; the exit code is 0, or 2 if there is one. A command that
     walks sets such a file aside and walks the trial again. Trials of another version of chilopod or MuJoCo are counted:
     they are whole, but are walked again too.
+
+    Example: chilopod trials check report/trials
     """
     from chilopod.trials.folder import checked, contents
 
@@ -146,6 +150,8 @@ def clean(
     """Remove useless files from a folder of trials: those set aside, and those that killed processes left unfinished.
 
     Files that chilopod has not written, and those that a process is writing, stay and are listed.
+
+    Example: chilopod trials clean report/trials --dry-run
     """
     from chilopod.trials.folder import clean as cleaned
 

@@ -51,6 +51,8 @@ def turn(
     the cost of steering until then, the integral of the squared leg yaw.
 
     With --out, draws the way and writes the record, and a replay that opens in any browser.
+
+    Example: chilopod turn aoi2022-planar --target "45 deg, 1.3 m" --out turn
     """
     from chilopod import units
     from chilopod.steering import Target, strategy_named
