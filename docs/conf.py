@@ -46,6 +46,7 @@ nitpick_ignore_regex = [
 ]
 
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
 smartquotes = False  # --set and "60 s" are typed as they are shown
 
 # Types stand in annotations; Napoleon, which comes with Sphinx, joins them to what the docstrings say.
@@ -79,6 +80,8 @@ sphinx_gallery_conf = {
     "examples_dirs": str(ROOT / "examples"),
     "gallery_dirs": str(ROOT / "docs" / "gallery"),
     "filename_pattern": r"/\d\d_",
+    "image_scrapers": ("extension.scraped",),
+    "thumbnail_size": (480, 360),
     "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": False,
     "min_reported_time": 3600,

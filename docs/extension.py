@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import enum
 import inspect
+import pickle
 import re
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
+import matplotlib.pyplot as plt
 import reference
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+from matplotlib.text import Text
 from numpy.typing import ArrayLike
 from pygments.lexer import Lexer
 from pygments.lexers.shell import BashLexer, BashSessionLexer
@@ -20,6 +24,7 @@ from sphinx.domains.python import PyObject
 from sphinx.environment import BuildEnvironment
 from sphinx.util.typing import stringify_annotation
 from sphinx.writers.html5 import HTML5Translator
+from sphinx_gallery.scrapers import matplotlib_scraper
 
 from chilopod.robot import load_robot
 from chilopod.show.play import play
@@ -99,6 +104,21 @@ def visit_math(self: HTML5Translator, node: nodes.math | nodes.math_block) -> No
     """Formulas as MathML, which browsers draw by themselves: others would load a program from outside."""
     self.body.append(tex2mathml(node.astext(), as_block=isinstance(node, nodes.math_block)))
     raise nodes.SkipNode
+
+
+def scraped(block: tuple[Any, ...], block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
+    """Figures of a block of an example; the first panel of the first one, with large text, is the thumbnail."""
+    if plt.get_fignums() and "thumbnail_path" not in block_vars["file_conf"]:
+        figure = pickle.loads(pickle.dumps(plt.figure(plt.get_fignums()[0])))
+        for text in figure.findobj(Text):
+            text.set_fontsize(1.7 * text.get_fontsize())
+        figure.canvas.draw()
+        panel = figure.axes[0].get_tightbbox().padded(8.0).transformed(figure.dpi_scale_trans.inverted())
+        path = Path(str(block_vars["image_path_iterator"].image_path.format(0)))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, bbox_inches=panel, dpi=150)
+        block_vars["file_conf"]["thumbnail_path"] = path
+    return matplotlib_scraper(block, block_vars, gallery_conf)
 
 
 def play_page(app: Sphinx, failure: Exception | None) -> None:

@@ -12,6 +12,8 @@ import numpy as np
 from chilopod import load_robot
 from chilopod.analysis import pitchfork, straight_walk
 
+plt.style.use("tableau-colorblind10")
+
 robot = load_robot("aoi2022-planar")
 robot
 

@@ -12,6 +12,8 @@ from chilopod import load_robot, units
 from chilopod.analysis import curved_walks
 from chilopod.tasks import walk
 
+plt.style.use("tableau-colorblind10")
+
 spring = "springs.stiffness[0]"
 robot = load_robot("aoi2022-planar").override(spring, "8 N*mm/deg")
 

@@ -33,7 +33,7 @@ for place in record.goal_place.transpose("goal", "axis").values:
     top.add_patch(plt.Circle(place, ARRIVAL_RADIUS, color="C2", alpha=0.4))
 top.set(xlabel="x (m)", ylabel="y (m)", title="path of the front module", aspect="equal")
 bottom.plot(record.time, units.from_si(1.0, "N*mm/deg") * record.stiffness.isel(joint=0), linewidth=1)
-bottom.axhline(units.from_si(done.pitchfork, "N*mm/deg"), color="C3", linestyle="--", label="pitchfork")
+bottom.axhline(units.from_si(done.pitchfork, "N*mm/deg"), color="black", linestyle="--", label="pitchfork")
 bottom.set(xlabel="time (s)", ylabel="$k_1$ (N·mm/deg)", title="the first spring", ylim=(0.0, None))
 bottom.legend()
 plt.show()

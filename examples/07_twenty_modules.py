@@ -12,6 +12,8 @@ import numpy as np
 from chilopod import Robot, units
 from chilopod.analysis import bifurcations, straight_walk
 
+plt.style.use("tableau-colorblind10")
+
 robot = Robot.from_toml("""
 name = "twenty"
 

@@ -16,6 +16,8 @@ from chilopod import load_robot
 from chilopod.engine import Command, Event
 from chilopod.planar import simulate
 
+plt.style.use("tableau-colorblind10")
+
 
 @dataclass(frozen=True)
 class Serpentine:

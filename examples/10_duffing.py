@@ -11,6 +11,8 @@ import numpy as np
 
 from chilopod.stability import begin, follow, from_rhs, locate, switch
 
+plt.style.use("tableau-colorblind10")
+
 
 def duffing(t, x, force):
     return [x[1], force * np.cos(t) - 0.2 * x[1] - x[0] ** 3]

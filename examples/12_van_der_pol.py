@@ -12,6 +12,8 @@ import numpy as np
 
 from chilopod.stability import begin, exponents, follow, from_rhs, multipliers
 
+plt.style.use("tableau-colorblind10")
+
 
 def van_der_pol(t, x, mu):
     return [x[1], mu * (1.0 - x[0] ** 2) * x[1] - x[0]]

@@ -12,6 +12,8 @@ import numpy as np
 
 from chilopod.stability import Event, begin, follow, from_rhs, locate, switch
 
+plt.style.use("tableau-colorblind10")
+
 GRAVITY, KEPT, RATE = 9.81, 0.5, 60.0  # m/s^2, of the speed, rad/s
 
 

@@ -18,6 +18,8 @@ from cmaes import CMA
 
 from chilopod.gym import baseline
 
+plt.style.use("tableau-colorblind10")
+
 TURN = "chilopod.gym:chilopod/Turn-v0"
 
 # %%

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import itertools
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -169,3 +169,28 @@ def picture(draw: Callable[[Axes], object], alt: str, size: tuple[float, float] 
 def disc(x: float, y: float, radius: float, color: str, opacity: float = 1.0) -> str:
     """A disc in a drawing, in px."""
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{color}" fill-opacity="{opacity:g}"/>'
+
+
+def check(answer: object, conditions: Mapping[str, Callable[[Any], object]]) -> None:
+    """Check the answer to an exercise, and print whether it is right.
+
+    Parameters
+    ----------
+    answer
+        Answer; dots (``...``) stand for a missing one.
+    conditions
+        Conditions that the answer must meet, each by the sentence to print where it is not met. They are tried in this
+        order.
+    """
+    if answer is ...:
+        print("Not answered yet. Write your answer in place of the dots, and run the cell again.")
+        return
+    for sentence, holds in conditions.items():
+        try:
+            if holds(answer):
+                continue
+        except Exception as error:  # whatever an answer may be
+            sentence = f"This answer cannot be checked: {error}."
+        print(f"Not yet. {sentence}")
+        return
+    print("Right.")

@@ -199,7 +199,7 @@ def planar(
         Path | None,
         typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
     ] = None,
-    template: Annotated[bool, typer.Option("--template", help="Print a file for --data (> mine.toml), and end.")] = False,
+    template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Friction, half-width and forward offset of the feet from the critical k1 and its mode, with their uncertainty.

@@ -180,7 +180,7 @@ class Walk(Protocol):
         """
 
     def states(self) -> Array:
-        """States of the robots now, for ``initial`` of :meth:`Engine.start` or :meth:`restart`.
+        """States of the robots now, for ``initial`` of :meth:`chilopod.engine.Engine.start` or :meth:`restart`.
 
         At the beginning of a gait cycle another walk can start from these states. They contain neither setpoints nor
         the memory of integrator or solver, so the walks agree to their tolerance.
@@ -205,9 +205,9 @@ class Walk(Protocol):
         which
             Mask of the robots, shape (robots,).
         initial
-            States as for :meth:`Engine.start`, one row for all of them or one each.
+            States as for :meth:`chilopod.engine.Engine.start`, one row for all of them or one each.
         friction
-            Factors as for :meth:`Engine.start`; None keeps those of the walk.
+            Factors as for :meth:`chilopod.engine.Engine.start`; None keeps those of the walk.
         seeds
             Seeds of the noise of their sensors from now on, one each; None continues the noise.
         """
@@ -235,7 +235,7 @@ class Walk(Protocol):
         - at time 0 what the robots started with: position, heading, joint angles, stiffness of the file, straight legs;
         - no number beyond :data:`chilopod.record.LARGEST`;
         - the attributes ``engine`` (name of its traits), ``robot`` (file of the first robot) and ``duration``
-          (:attr:`time`), and others that are numbers or text.
+          (``time``), and others that are numbers or text.
         """
 
 

@@ -179,10 +179,8 @@ COURSES: Mapping[str, tuple[Goal, ...]] = {
 }
 """Courses by name, for a robot as long as the paper's, 1.35 m, which turns within about 0.35 m.
 
-======  ===============================================================
-slalom  gates left and right of the straight path, 1.5 m from each other square  the corners of a square of 2 m, all
-turns to the left eight   a circle of 1 m to the left and one to the right, back each time ======
-===============================================================
+``slalom``: gates left and right of the straight path, 1.5 m from each other; ``square``: the corners of a square of
+2 m, all turns to the left; ``eight``: a circle of 1 m to the left and one to the right, back each time.
 """
 
 

@@ -33,7 +33,10 @@ def compared_rows(data: xr.Dataset) -> list[Row]:
     return [
         *(unprinted(f"{count}: {each.title}", _words(each), _WHERE, _remark(each)) for each in found.values()),
         unprinted(
-            f"{count}: the variable spring", decisions(verdicts(found)), _WHERE, "where the intervals of 95 % decide it"
+            f"{count}: the variable spring",
+            decisions(verdicts(found)),
+            _WHERE,
+            "where the intervals of 95 % decide it, for legs that yaw by 5 deg at most",
         ),
     ]
 

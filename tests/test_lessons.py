@@ -1,0 +1,46 @@
+"""Notebooks for teaching run from top to bottom: exercises wait for an answer, and their answers are right."""
+
+import re
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import nbformat
+import pytest
+
+from chilopod.notebook import check
+
+LESSONS = sorted((Path(__file__).parents[1] / "docs" / "lessons").glob("*.ipynb"))
+ANSWER = re.compile(r"<details><summary>Answer</summary>.*^```python\n(.*?)^```", re.M | re.S)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.stem)
+def test_exercises_wait_for_their_answers(lesson, capsys, monkeypatch):
+    monkeypatch.setattr(plt, "show", lambda: None)
+    mpl.use("Agg")
+    names, waiting, answered = {}, "", 0
+    for cell in nbformat.read(lesson, as_version=4).cells:
+        answer = ANSWER.search(cell.source)
+        if cell.cell_type == "code":
+            exec(cell.source, names)
+            waiting = cell.source if capsys.readouterr().out.startswith("Not answered yet.") else ""
+        elif answer:
+            assert waiting, cell.source
+            open_line = re.compile(r"^(\w+ = \.\.\.|def \w+\(\w+\):\n    return \.\.\.)$", re.MULTILINE)
+            exec(answer[1] + open_line.sub("", waiting, count=1), names)
+            assert capsys.readouterr().out.endswith("Right.\n"), cell.source
+            answered += 1
+    plt.close("all")
+    assert 4 <= answered <= 6
+
+
+def test_an_answer_is_checked(capsys):
+    conditions = {"It is negative.": lambda x: x > 0, "It is no square.": lambda x: (x**0.5).is_integer()}
+    for answer in (..., -1.0, 2.0, "4", 4.0):
+        check(answer, conditions)
+    first, *others = capsys.readouterr().out.splitlines()
+    assert first.startswith("Not answered yet.")
+    assert others[:2] == ["Not yet. It is negative.", "Not yet. It is no square."]
+    assert others[2].startswith("Not yet. This answer cannot be checked: '>' not supported")
+    assert others[3:] == ["Right."]
