@@ -111,7 +111,9 @@ def scraped(block: tuple[Any, ...], block_vars: dict[str, Any], gallery_conf: di
     if plt.get_fignums() and "thumbnail_path" not in block_vars["file_conf"]:
         figure = pickle.loads(pickle.dumps(plt.figure(plt.get_fignums()[0])))
         for text in figure.findobj(Text):
-            text.set_fontsize(1.7 * text.get_fontsize())
+            text.set_fontsize(1.5 * text.get_fontsize())
+        for other in figure.axes[1:]:
+            other.set_visible(False)
         figure.canvas.draw()
         panel = figure.axes[0].get_tightbbox().padded(8.0).transformed(figure.dpi_scale_trans.inverted())
         path = Path(str(block_vars["image_path_iterator"].image_path.format(0)))

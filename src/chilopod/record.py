@@ -214,7 +214,9 @@ def walk_record(
 
     Parameters
     ----------
-    time position, velocity
+    time
+        Times of the samples, s, shape (T,).
+    position, velocity
         Position and velocity of the centre of module 1, m and m/s, shape (T, robots, 2).
     heading, heading_rate
         Heading and heading rate of module 1, rad and rad/s, shape (T, robots).
