@@ -18,7 +18,7 @@ import numpy as np
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import numbers, shape_of
+from chilopod.flows.arguments import UserCode, numbers, shape_of
 from chilopod.frozen import Array
 
 
@@ -212,8 +212,9 @@ def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: f
     """The flow and its derivative of the right shapes, with the system's own bound on its error if wanted; a SpentError
     after a time limit."""
     deadline.check()
-    flow: Any = getattr(system, "flow_with_error" if with_error else "flow")
-    found, n = flow(np.array(x), t0, t1), x.size  # a system may write into its argument
+    name, n = "flow_with_error" if with_error else "flow", x.size
+    with UserCode(name):
+        found: Any = getattr(system, name)(np.array(x), t0, t1)  # a system may write into its argument
     if not (isinstance(found, tuple | list) and len(found) == 2 + with_error):
         what = "(state, derivative, error)" if with_error else "(state, derivative)"
         raise ParameterError(f"must return {what}", field="flow", value=type(found).__name__)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import numbers
+from chilopod.flows.arguments import UserCode, numbers
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.problem.capabilities import (
     Autonomous,
@@ -39,6 +39,7 @@ _APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from 
 _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
 _CROSSING_ROUNDS = 30
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
+_ENDS = 1e-3, 1e-4  # parts of a return, at its ends
 
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
@@ -137,7 +138,8 @@ def return_duration(system: SystemLike) -> float:
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:
-    velocity = numbers(system.velocity(np.array(x)), x.shape, "velocity")
+    with UserCode("velocity"):
+        velocity = numbers(system.velocity(np.array(x)), x.shape, "velocity")
     if not np.isfinite(velocity).all():
         raise AnalysisError("the right-hand side is not finite", field="rhs")
     return velocity
@@ -272,14 +274,32 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
     return None
 
 
+def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
+    """True if the motion jumps just after the start of a return, from state x, or just before its end: the derivative
+    of the flow then does not tend to 1 over shorter and shorter times."""
+    size = sizes(system, x, duration)
+    for after in (True, False):
+        changes = []
+        for part in _ENDS:
+            start = 0.0 if after else (1.0 - part) * duration
+            there = x if after else carried(system, x[None], 0.0, start)[0]
+            derivative = checked_flow(system, there, start, start + part * duration)[1]
+            changes.append(float((np.abs(derivative - np.eye(x.size)) * size / size[:, None]).max()))
+        if changes[1] > max(_ENDS[0], 0.5 * changes[0]):
+            return True
+    return False
+
+
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
     """States at t1 of those at t0, shape (states, n) both, by the cheapest capability of the system; a SpentError
     after a time limit."""
     deadline.check()
     if flows_states(system):
-        return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
+        with UserCode("flow_states"):
+            return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
     if flows_tangents(system):
-        return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
+        with UserCode("flow_tangents"):
+            return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
     return np.array([checked_flow(system, x, t0, t1)[0] for x in states])
 
 
