@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.stability import Ending, Event, Kind, PeriodicSystem, begin, find_orbit, follow, from_rhs, proceed
+from chilopod.stability import (
+    Ending,
+    Event,
+    Kind,
+    PeriodicSystem,
+    begin,
+    find_orbit,
+    follow,
+    from_map,
+    from_rhs,
+    proceed,
+)
 
 
 def of_map(function, dimension, size=1.0):
@@ -181,3 +192,16 @@ def test_time_0_of_an_autonomous_orbit_is_moved_away_from_an_event():
     assert any("time 0 was moved along the orbit, away from an event" in remark for remark in branch.remarks)
     again = find_orbit(family(0.6), branch.points[-1].orbit)
     assert again.period == pytest.approx(branch.points[-1].period, rel=1e-9)
+
+
+def test_the_end_of_a_map_is_no_event():
+    """Images are taken at whole times, and so at time 0."""
+
+    def family(p):
+        root = np.sqrt(0.3 - p)  # no such map beyond
+        return from_map(lambda x: ([0.5 * x[0] + root], [[0.5]]), 1)
+
+    with np.errstate(invalid="raise"):
+        branch = follow(family, begin(family, 0.1, [0.5]), (0.1, 0.5))
+    assert branch.ending is Ending.LOST
+    assert "event" not in branch.reason

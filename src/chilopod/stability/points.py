@@ -70,12 +70,6 @@ def kind_at_plus_one(form: NormalForm) -> Kind:
     return Kind.BRANCH_POINT
 
 
-def is_decided(form: NormalForm) -> bool:
-    """True if the coefficients of a normal form at +1 are known and do not both vanish within their errors."""
-    found = form.status is NormalFormStatus.FOUND
-    return found and (abs(form.quadratic) > form.quadratic_error or abs(form.cubic) > form.cubic_error)
-
-
 def criticality(form: NormalForm) -> Criticality:
     """The verdict of a cubic coefficient, if it is known and decides alone."""
     if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):

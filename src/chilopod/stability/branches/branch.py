@@ -28,8 +28,8 @@ from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_interval
-from chilopod.stability.problem.budget import Budget, UserCode
-from chilopod.stability.problem.capabilities import Family, is_autonomous, returns_per_period
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import carried, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum.errors import VERDICTS
@@ -357,14 +357,14 @@ def followed(
         progress(count, end)
 
     ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
-    last, steps = found[-1], sum(point.special is None for point in found[len(branch.points) :])
-    if ending is Ending.LOST and _at_event(curve, last):
+    if ending is Ending.LOST and _at_event(curve, found[-1]):
         reason = _EVENT_AT_ZERO
-        anchor, left = _elsewhere(curve, last) if steps else None, None if points is None else points - steps
-        if anchor is not None:
-            remarks.append(f"at {last.value:.9g} time 0 was moved along the orbit, away from an event")
-            so_far = replace(branch, points=tuple(found), remarks=tuple(remarks))
-            return followed(curve, so_far, anchor, longest, left, closely, progress, until)
+        steps = sum(point.special is None for point in found[len(branch.points) :])
+        moved = _elsewhere(curve, found[-1]) if steps else None
+        if moved is not None:
+            remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
+            branch, left = replace(branch, points=tuple(found), remarks=tuple(remarks)), points and points - steps
+            return followed(curve, branch, moved, longest, left, closely, progress, until)
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
 
@@ -372,23 +372,27 @@ def followed(
 def _at_event(curve: Curve, last: BranchPoint) -> bool:
     """True if an event is about to pass time 0 of an orbit, where returns are not smooth."""
     system = curve.system(last.value)
-    with contextlib.suppress(AnalysisError), UserCode("flow", last.value):
-        duration = return_duration(system) if last.period is None else last.period / returns_per_period(system)
-        return jumps_at_ends(system, last.orbit, duration)
-    return False
+    try:
+        return jumps_at_ends(system, last.orbit, _duration(system, last))
+    except AnalysisError:
+        return False
 
 
 def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
     """The anchor at another state of the orbit of a point; None if time 0 is fixed, or no state suits."""
     system = curve.system(last.value)
-    for part in _PARTS if is_autonomous(system) and last.period is not None else ():
-        with contextlib.suppress(AnalysisError), UserCode("flow", last.value):
-            x = carried(system, last.orbit[None], 0.0, part * last.period / returns_per_period(system))[0]
-            start = Start(last.value, x, bool(last.tangent[-1] > 0.0), periods=curve.periods, period=last.period)
-            anchor = anchored(curve, start, 0.0)
+    for part in _PARTS if is_autonomous(system) else ():
+        with contextlib.suppress(AnalysisError):
+            x = carried(system, last.orbit[None], 0.0, part * _duration(system, last))[0]
+            rising = bool(last.tangent[-1] > 0.0)
+            anchor = anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)
             if not _at_event(curve, anchor.last):
                 return anchor
     return None
+
+
+def _duration(system: SystemLike, point: BranchPoint) -> float:
+    return return_duration(system) if point.period is None else point.period / returns_per_period(system)
 
 
 def _passed(values: list[float]) -> str:

@@ -19,8 +19,8 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
-from chilopod.stability.problem.budget import SpentError, UserCode
-from chilopod.stability.problem.capabilities import Family, is_autonomous, returns_per_period
+from chilopod.stability.problem.budget import SpentError
+from chilopod.stability.problem.capabilities import Family, checked_flow, given_scale, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
@@ -152,6 +152,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             return False
         return residual <= _CLEAR * self.noise(found.x, found.value, anchor.section)
 
+    def stretches(self, step: Step[Anchor, OnCurve]) -> bool:
+        """True unless the system gives the sizes of its states."""
+        return given_scale(self.system(step.found.value)) is None
+
     def exact(self, anchor: Anchor, found: Returned, row: Array) -> Array | None:
         """The matrix at an orbit near a branch point."""
         if not anchor.leaving:
@@ -215,10 +219,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         duration = return_duration(system) if anchor.section is None else anchor.section.duration
         start = np.append(last.orbit, last.value)
         self.budget.take(2 * FEW_ROUNDS)  # each in parts
-        with UserCode("flow", last.value):
-            nodes = nodes_along(system, last.orbit, duration, count, last.value)
-            free = Free(plane.row, plane.target, start, self.scale)
-            found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], anchor.section, free)
+        nodes = nodes_along(system, last.orbit, duration, count, last.value)
+        free = Free(plane.row, plane.target, start, self.scale)
+        found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], anchor.section, free)
         x, value = found.nodes.states[0], self._inside(found.nodes.value) if plane.edge is None else plane.edge[1]
         system = self.system(value)
         count, velocity, across = returns_per_period(system), None, np.eye(x.size)
@@ -307,9 +310,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """States on an orbit, at even times over some duration, shape (times, n)."""
         system, states = self.system(value), [x]
         self.budget.take()
-        with UserCode("flow", value):
-            for _ in range(_PARTS):
-                states.append(system.flow(np.array(states[-1]), 0.0, duration / _PARTS)[0])
+        for _ in range(_PARTS):
+            states.append(checked_flow(system, states[-1], 0.0, duration / _PARTS)[0])
         return np.array(states)
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.crossing_points.place import critical_multipliers
-from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits.orbit import Orbit
@@ -21,11 +20,9 @@ from chilopod.stability.points import (
     BifurcationPoint,
     Criticality,
     Kind,
-    is_decided,
     kind_at_plus_one,
     with_coefficients,
 )
-from chilopod.stability.problem.budget import UserCode
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.problem.scales import sizes
@@ -91,8 +88,8 @@ def described(
     branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
     symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
     if kind is None and crossing.event is Event.PLUS and not crossing.collision:
-        decided = simple and (form is None or form.status is NormalFormStatus.LINEAR or is_decided(form))
-        if not decided and _is_continuum(system, orbit, mode):
+        decided = form is None or kind_at_plus_one(form) is not Kind.BRANCH_POINT
+        if not (simple and decided) and _is_continuum(system, orbit, mode):
             count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
             said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
             raise ContinuumError(said)
@@ -142,7 +139,7 @@ def _is_continuum(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> bool:
     shift = _ASIDE * ahead / np.linalg.norm(ahead)
     matrix = orbit.image.jacobian * size / size[:, None] - np.eye(size.size)
     across, offs = np.linalg.pinv(matrix, rcond=_CRITICAL), [np.inf]
-    with contextlib.suppress(AnalysisError), np.errstate(all="ignore"), UserCode("flow"):
+    with contextlib.suppress(AnalysisError), np.errstate(all="ignore"):
         for _ in range(_ROUNDS):
             x = orbit.state + size * shift
             residual = (returned_states(system, x[None], orbit.section)[0] - x) / size
@@ -163,8 +160,7 @@ def _formed(
     scale = sizes(system, orbit.state, orbit.period / image.returns)
 
     def mapped(states: Array) -> Array:
-        with UserCode("flow", None):
-            return returned_states(system, states, orbit.section)
+        return returned_states(system, states, orbit.section)
 
     try:
         return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)

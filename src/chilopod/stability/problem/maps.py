@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ChilopodError, ParameterError
 from chilopod.flows.arguments import LARGEST, UserCode, checked_count, numbers
@@ -94,7 +94,7 @@ def _check_derivative(mapped: Callable[[Array], Array], x: Array, state: Array, 
     """
     steps = np.where(x != 0.0, np.abs(x), float(np.abs(x).max()) or 1.0)
 
-    def compared(shift: Array) -> tuple[Array, Array]:
+    def compared(shift: Array) -> tuple[NDArray[np.bool_], Array]:
         with np.errstate(all="ignore"):
             up, down = mapped(x + shift), mapped(x - shift)
         change = 0.5 * (up - down)

@@ -277,17 +277,17 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
 def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
     """True if the motion jumps just after the start of a return, from state x, or just before its end: the derivative
     of the flow then does not tend to 1 over shorter and shorter times."""
-    size = sizes(system, x, duration)
-    for after in (True, False):
-        changes = []
-        for part in _ENDS:
-            start = 0.0 if after else (1.0 - part) * duration
-            there = x if after else carried(system, x[None], 0.0, start)[0]
-            derivative = checked_flow(system, there, start, start + part * duration)[1]
-            changes.append(float((np.abs(derivative - np.eye(x.size)) * size / size[:, None]).max()))
-        if changes[1] > max(_ENDS[0], 0.5 * changes[0]):
-            return True
-    return False
+    size, one = sizes(system, x, duration), np.eye(x.size)
+
+    def change(start: float, part: float) -> float:
+        there = carried(system, x[None], 0.0, start * duration)[0] if start else x
+        derivative = checked_flow(system, there, start * duration, (start + part) * duration)[1]
+        return float((np.abs(derivative - one) * size / size[:, None]).max())
+
+    if change(0.5, _ENDS[0]) == 0.0:
+        return False  # a map has no parts
+    pairs = [(change(0.0, part), change(1.0 - part, part)) for part in _ENDS]
+    return any(near > max(_ENDS[0], 0.5 * far) for far, near in zip(*pairs, strict=True))
 
 
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:

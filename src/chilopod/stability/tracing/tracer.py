@@ -69,8 +69,10 @@ def trace(
 
 
 def _largest(equations: Equations[A, S, R], step: Step[A, S], longest: float) -> float:
-    """Largest next step. Where the cubic through the last points predicts far more than the longest step, the sizes of
-    the states are too small for the curve, and only the change of the parameters is limited by it."""
+    """Largest next step. Where the cubic through the last points predicts far more than the longest step, estimated
+    units are too small for the curve, and only the change of the parameters is limited by that step."""
+    if not equations.stretches(step):
+        return longest
     along = float(np.linalg.norm(step.end.tangent[equations.parameters(step.end)[0]]))
     missed = step.missed / (tolerances.EASY * float(np.linalg.norm(step.moved)))
     straight = step.size * min(tolerances.GROWTH, max(missed, 1e-9) ** -0.25)
