@@ -342,7 +342,7 @@ def followed(
     until: Kind | None = None,
 ) -> Branch:
     """A branch with the points that follow an anchor; it also ends past a special point of the kind ``until``."""
-    curve.first = branch.points[0]
+    curve.first, curve.long_steps = branch.points[0], longest >= LONGEST
     found, remarks = list(branch.points), list(branch.remarks)
 
     def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -98,6 +98,13 @@ class ReturnMap(ReadOnlyArrays):
     period: float
     velocity: Array | None = None
     normal: Array | None = None
+
+    @property
+    def across(self) -> Array:
+        """Projection along the motion onto the section, shape (n, n); the unit matrix without a section."""
+        if self.velocity is None or self.normal is None:
+            return np.eye(self.state.size)
+        return np.eye(self.state.size) - np.outer(self.velocity, self.normal) / float(self.normal @ self.velocity)
 
 
 _STATED = "dimension", "spatial_symmetry", "scale", "velocity"
@@ -222,17 +229,24 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
 
 
 def on_section(
-    system: Autonomous, section: Section, state: Array, jacobian: Array, duration: float, error: float | Array = np.nan
+    system: SystemLike,
+    section: Section | None,
+    state: Array,
+    jacobian: Array,
+    duration: float,
+    error: float | Array = np.nan,
 ) -> ReturnMap:
-    """The return map to a section from a return to it within its duration, and from the derivative over this
+    """The return map from a return within its duration, to a section if there is one, and from the derivative over this
     duration; ``error`` bounds that of the flow without the symmetry."""
-    velocity = _velocity(system, state)
-    across = np.eye(state.size) - np.outer(velocity, section.normal) / float(section.normal @ velocity)
-    turned_across = np.abs(across) if system.symmetry is None else np.abs(across) @ np.abs(system.symmetry)
-    error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())
     _check_finite(state, jacobian)
     count = returns_per_period(system)
-    return ReturnMap(state, across @ jacobian, error, count, count * duration, velocity, section.normal)
+    image = ReturnMap(state, jacobian, error, count, count * duration)
+    if section is None or not is_autonomous(system):
+        return image
+    image = replace(image, velocity=_velocity(system, state), normal=section.normal)
+    turned_across = np.abs(image.across) if system.symmetry is None else np.abs(image.across) @ np.abs(system.symmetry)
+    error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())
+    return replace(image, jacobian=image.across @ jacobian, error=error)
 
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:
