@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.crossing_points.place import critical_multipliers
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits.orbit import Orbit
@@ -88,8 +89,8 @@ def described(
     branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
     symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
     if kind is None and crossing.event is Event.PLUS and not crossing.collision:
-        decided = form is None or kind_at_plus_one(form) is not Kind.BRANCH_POINT
-        if not (simple and decided) and _is_continuum(system, orbit, mode):
+        alone = simple and (form is None or form.status is not NormalFormStatus.SEVERAL_CRITICAL)
+        if not alone and _is_continuum(system, orbit, mode):
             count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
             said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
             raise ContinuumError(said)
