@@ -364,7 +364,11 @@ def followed(
         if moved is not None:
             remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
             branch, left = replace(branch, points=tuple(found), remarks=tuple(remarks)), points and points - steps
-            return followed(curve, branch, moved, longest, left, closely, progress, until)
+
+            def counted(count: int, point: BranchPoint) -> None:
+                progress(steps + count, point)
+
+            return followed(curve, branch, moved, longest, left, closely, counted, until)
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
 
