@@ -234,3 +234,43 @@ def test_switch_takes_the_periods_of_a_branch():
     second = follow(family, switch(family, first)[0], (0.1, 1.0)).special_points[-1]
     assert second.value == pytest.approx(0.9125, abs=1e-9)
     assert [start.periods for each in (second, second.bifurcation) for start in switch(family, each)] == [4, 4]
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_cells_that_lose_their_coupling_are_a_continuum_and_no_bifurcation(symmetric):
+    """Three clocks: without coupling their phases are arbitrary, so orbits form a torus."""
+    turn, swap = np.roll(np.eye(3), 1, axis=0), np.eye(3)[[1, 0, 2]]
+    generators = [np.kron(np.eye(2), each) for each in (turn, swap)] if symmetric else None
+
+    def family(k):
+        def rhs(t, z):
+            x, y = z[:3], z[3:]
+            r, apart = 1 - x**2 - y**2, [k * (np.roll(u, 1) - 2 * u + np.roll(u, -1)) for u in (x, y)]
+            return np.concatenate([r * x - y + apart[0], r * y + x + apart[1]])
+
+        return from_rhs(rhs, 6, None, guess_period=6.3, spatial_symmetry=generators)
+
+    guess = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    branch = follow(family, begin(family, -0.05, guess), (-0.05, 0.06))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert not branch.special_points
+    for remarks in (branch.remarks, locate(family, (-0.05, 0.06), orbit=guess).remarks):
+        assert any("they form a continuum (multipliers at one: 2)" in remark for remark in remarks)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1000.0])
+def test_a_straight_curve_is_followed_in_long_steps_in_any_units(unit):
+    """Stiffness 1 to one side and 5 to the other: the orbit grows as the force, ten thousandfold here."""
+
+    def family(force):
+        def rhs(t, x):
+            spring = np.where(x[0] > 0.0, 5.0 * x[0], x[0])
+            return [x[1], (force * np.cos(t / unit) - spring - 0.1 * unit * x[1]) / unit**2]
+
+        return from_rhs(rhs, 2, 2.0 * np.pi * unit)
+
+    branch = follow(family, begin(family, 2e-4 * unit, [0.0, 0.0]), (2e-4 * unit, 2.0 * unit))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert 20 < len(branch.points) < 50
+    first, last = branch.points[0], branch.points[-1]
+    assert np.allclose(last.orbit, 1e4 * first.orbit, rtol=1e-6)

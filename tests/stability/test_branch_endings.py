@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.stability import Ending, Kind, PeriodicSystem, begin, find_orbit, follow, proceed
+from chilopod.stability import (
+    Ending,
+    Event,
+    Kind,
+    PeriodicSystem,
+    begin,
+    find_orbit,
+    follow,
+    from_map,
+    from_rhs,
+    proceed,
+)
 
 
 def of_map(function, dimension, size=1.0):
@@ -148,3 +159,49 @@ def test_what_cannot_be_is_one_line():
     pitchfork = {p: of_map(lambda x, p=p: (1 + p) * x - x**3, 1) for p in (0.0,)}
     with pytest.raises(AnalysisError, match="branches meet here"):
         follow(lambda p: of_map(lambda x: (1 + p) * x - x**3, 1), begin(pitchfork.get, 0.0, [0.0]), (-1.0, 1.0))
+
+
+def test_an_event_that_passes_time_0_is_named():
+    """A ball on a table whose phase is the parameter: the impact moves through the end of the period."""
+    e, g, w, a = 0.5, 9.81, 60.0, 0.0036
+    table = Event(
+        lambda t, x, p: x[0] - a * np.sin(w * t + p),
+        lambda t, x, p: [x[0], -e * x[1] + (1 + e) * a * w * np.cos(w * t + p)],
+        -1,
+    )
+
+    def family(p):
+        return from_rhs(lambda t, x, p: [x[1], -g], 2, 2 * np.pi / w, args=(p,), events=[table])
+
+    branch = follow(family, begin(family, 2.0, [0.0138, 0.331]), (2.0, 7.5))
+    assert branch.ending is Ending.LOST
+    assert branch.reason.startswith("an event passes time 0 of the orbit")
+
+
+def test_time_0_of_an_autonomous_orbit_is_moved_away_from_an_event():
+    """The wall of an oscillator reaches the state in which the branch began."""
+    wall = Event(lambda t, x, w: x[0] - w, lambda t, x, w: [x[0], -0.9 * x[1]], 1)
+
+    def family(w):
+        return from_rhs(
+            lambda t, x, w: [x[1], (1 - x[0] ** 2) * x[1] - x[0]], 2, None, args=(w,), events=[wall], guess_period=5.5
+        )
+
+    branch = follow(family, begin(family, 1.2, [0.9, 1.6], rising=False), (0.6, 1.2))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert any("time 0 was moved along the orbit, away from an event" in remark for remark in branch.remarks)
+    again = find_orbit(family(0.6), branch.points[-1].orbit)
+    assert again.period == pytest.approx(branch.points[-1].period, rel=1e-9)
+
+
+def test_the_end_of_a_map_is_no_event():
+    """Images are taken at whole times, and so at time 0."""
+
+    def family(p):
+        root = np.sqrt(0.3 - p)  # no such map beyond
+        return from_map(lambda x: ([0.5 * x[0] + root], [[0.5]]), 1)
+
+    with np.errstate(invalid="raise"):
+        branch = follow(family, begin(family, 0.1, [0.5]), (0.1, 0.5))
+    assert branch.ending is Ending.LOST
+    assert "event" not in branch.reason

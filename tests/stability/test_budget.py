@@ -284,3 +284,23 @@ def test_a_search_for_a_fold_ends_with_its_budget():
     spent = Budget(20)
     assert find_fold(family, 0.04, np.array([0.2]), 1.0, False, spent) is None
     assert spent.left == 0
+
+
+def raising(*arguments):
+    raise ValueError("no table")
+
+
+@pytest.mark.parametrize(
+    ("system", "name"),
+    [
+        (lambda: from_rhs(raising, 2, 1.0), "rhs"),
+        (lambda: from_rhs(lambda t, x: raising() if x[0] > 1.0 else [-x[0], -x[1]], 2, 1.0), "rhs"),
+        (lambda: PeriodicSystem(2, 1.0, raising), "flow"),
+        (lambda: from_map(raising, 2), "image"),
+    ],
+)
+@pytest.mark.parametrize("ask", [multipliers, exponents, find_orbit])
+def test_exceptions_of_a_system_name_its_function(system, name, ask):
+    with pytest.raises(AnalysisError, match=f"^{name}: raised ValueError: no table$") as caught:
+        ask(system(), [2.0, 0.0])
+    assert isinstance(caught.value.__cause__, ValueError)

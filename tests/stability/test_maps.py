@@ -118,3 +118,33 @@ def test_a_multiplier_that_only_touches_the_circle_is_a_remark(family):
     (remark,) = found.remarks
     assert "only touches the unit circle" in remark
     assert float(remark.split()[1]) == pytest.approx(0.5, abs=1e-5)
+
+
+def test_a_wrong_derivative_is_refused_once_and_in_one_line():
+    calls = []
+
+    def henon(x, entry=0.3):
+        calls.append(1)
+        return [1.0 - 1.4 * x[0] ** 2 + x[1], 0.3 * x[0]], [[-2.8 * x[0], 1.0], [entry, 0.0]]
+
+    with pytest.raises(ParameterError, match=r"entry \(1, 0\) is 0.4, but a difference gives 0.3"):
+        multipliers(from_map(lambda x: henon(x, 0.4), 2), [0.6, 0.2])
+    system = from_map(henon, 2)
+    calls.clear()
+    assert system.flow(np.zeros(2), 0.0, 1.0)[1][0, 1] == 1.0
+    system.flow(np.zeros(2), 0.0, 1.0)
+    assert len(calls) == 4  # two for the check, which is made once
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        lambda x: ([1.0 - 2.0 * abs(x[0] - 0.5)], [[-2.0]]),  # a kink at the first point
+        lambda x: ([np.sqrt(x[0] - 0.5)], [[1.0 / np.sqrt(max(x[0] - 0.5, 1e-300))]]),  # an edge of its domain
+        lambda x: ([1e-30 * x[0]], [[1e-30]]),
+        lambda x: ([0.5 + 1e-7 * np.sin(1e7 * x[0])], [[np.cos(1e7 * x[0])]]),  # curved within a step
+        lambda x: ([0.3 * x[0] + 1e-8 * np.sin(1e12 * x[0])], [[0.3]]),  # with noise
+    ],
+)
+def test_a_right_derivative_passes_the_check(image):
+    from_map(image, 1).flow(np.array([0.5]), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Checks of the user's input beside a right-hand side, with errors of one line."""
+"""Checks of the user's input beside a right-hand side, and calls of the user's functions, with errors of one line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words
 from chilopod.frozen import Array, read_only
 
 LARGEST = 1_000_000
@@ -21,6 +21,27 @@ SIZES = (1e-6, 1e-3, 1.0, 1e3)
 _SAME = 1e-6
 _NEGLIGIBLE = 1e-9  # change of a state within the shift, relative to its size
 _LONGEST_SHOWN = 60
+
+
+class UserError(AnalysisError):
+    """A user's function raised an exception of its own."""
+
+
+class UserCode:
+    """Context of a call of a user's function, at a value of the parameter in a family: any exception becomes a
+    :class:`UserError` of one line, which an outer context with a value names instead."""
+
+    def __init__(self, field: str, value: object = None) -> None:
+        self._field, self._value = field, value
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, UserError) and error.value is None and self._value is not None:
+            error = error.__cause__
+        if isinstance(error, Exception) and not isinstance(error, ChilopodError):
+            raise UserError(f"raised {in_words(error)}", field=self._field, value=self._value) from error
 
 
 def checked_arguments(
@@ -193,10 +214,12 @@ def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slo
         columns = []
         for t, x in zip(times.tolist(), states.T, strict=True):
             try:
-                with np.errstate(all="ignore"):
+                with np.errstate(all="ignore"), UserCode("rhs"):
                     column = numbers(rhs(t, x.copy(), *args), (n,), "rhs")
-            except (ArithmeticError, ValueError):  # not defined at this state
-                column = np.full(n, np.nan)
+            except UserError as error:
+                if not isinstance(error.__cause__, ArithmeticError | ValueError):
+                    raise
+                column = np.full(n, np.nan)  # not defined at this state
             columns.append(column)
         return np.array(columns).T
 

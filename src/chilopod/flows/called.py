@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import numbers
+from chilopod.flows.arguments import UserCode, numbers
 from chilopod.flows.carrying import TooManySteps, pieces
 from chilopod.flows.jumps import UndeclaredSwitch, longest_step
 from chilopod.frozen import Array
@@ -130,7 +130,8 @@ class CalledFlow:
         return 2.0 * max(off) / float(np.abs(direction).min())
 
     def _slope(self, t: float, x: Array) -> Array:
-        return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
+        with UserCode("rhs"):
+            return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
 
     def _gradient(self, x: Array, sizes: Array) -> tuple[Gradient, float]:
         """The derivative of f near a state, by the best method for f, and its error relative to its largest entry."""
@@ -148,14 +149,16 @@ class CalledFlow:
 
     def _given(self, t: float, x: Array) -> Array:
         assert self.jacobian is not None
-        return numbers(self.jacobian(t, x, *self.args), (x.size, x.size), "jacobian")
+        with UserCode("jacobian"):
+            return numbers(self.jacobian(t, x, *self.args), (x.size, x.size), "jacobian")
 
     def _by_complex_steps(self, t: float, x: Array, sizes: Array) -> Array:
         columns = []
         for j in range(x.size):
             z = x.astype(np.complex128)
             z[j] += 1j * _COMPLEX_STEP * sizes[j]
-            columns.append(np.asarray(self.rhs(t, z, *self.args)).imag / (_COMPLEX_STEP * sizes[j]))
+            with UserCode("rhs"):
+                columns.append(np.asarray(self.rhs(t, z, *self.args)).imag / (_COMPLEX_STEP * sizes[j]))
         return np.array(columns).T
 
     def _by_differences(self, t: float, x: Array, sizes: Array) -> Array:

@@ -176,20 +176,18 @@ def multipliers(
     AnalysisError
         If no orbit is found.
     """
-    if seconds != math.inf:
-        with Deadline(seconds):
-            return multipliers(system, orbit, leading)
-    if leading is None:
-        return _multipliers(find_orbit(system, orbit))
-    check_system(system)
-    count = checked_count("leading", leading, system.dimension - (system.period is None))
-    if flows_tangents(system) and system.dimension >= LARGE:
-        image, size = find_large_orbit(system, orbit)
-        found = leading_multipliers(image, size, count)
-        result = full_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
-        of_period = found.following**image.returns
-    else:
-        result, of_period = _leading_of(_multipliers(find_orbit(system, orbit)), count)
+    with Deadline(seconds):
+        if leading is None:
+            return _multipliers(find_orbit(system, orbit))
+        check_system(system)
+        count = checked_count("leading", leading, system.dimension - (system.period is None))
+        if flows_tangents(system) and system.dimension >= LARGE:
+            image, size = find_large_orbit(system, orbit)
+            found = leading_multipliers(image, size, count)
+            result = full_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
+            of_period = found.following**image.returns
+        else:
+            result, of_period = _leading_of(_multipliers(find_orbit(system, orbit)), count)
     if result.values.size == system.dimension - (system.period is None):
         return result
     remark = (

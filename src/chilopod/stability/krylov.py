@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chilopod.errors import AnalysisError
-from chilopod.flows.arguments import shape_of
+from chilopod.flows.arguments import UserCode, shape_of
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.convergence import RETURN
 from chilopod.stability.problem.budget import Budget
@@ -150,7 +150,8 @@ class TangentMap(ReadOnlyArrays):
         times = [cut * self.duration for cut in cuts] + [self.duration]
         state, images = self.point, directions
         for a, b in zip(times, times[1:], strict=False):
-            state, images = self.system.flow_tangents(np.array(state), np.array(images), a, b)
+            with UserCode("flow_tangents"):
+                state, images = self.system.flow_tangents(np.array(state), np.array(images), a, b)
             shapes, allowed = (shape_of(state), shape_of(images)), (self.point.shape, directions.shape)
             if shapes != allowed:
                 said = "gives shapes {} and {}".format(*shapes)

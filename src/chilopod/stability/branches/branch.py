@@ -7,6 +7,7 @@ pieces: the next step depends only on its end.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
@@ -28,7 +29,8 @@ from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_interval
 from chilopod.stability.problem.budget import Budget
-from chilopod.stability.problem.capabilities import Family
+from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous, returns_per_period
+from chilopod.stability.problem.returns import carried, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum.errors import VERDICTS
 from chilopod.stability.tracing.ending import Ending
@@ -48,6 +50,8 @@ LONGEST = 0.15
 BUDGET = 200_000
 """Default budget of flows of a branch."""
 
+_PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
+_EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
@@ -240,7 +244,7 @@ def follow(
     with allowed:
         if not isinstance(start, Start | BranchPoint):
             start = begin(family, low, start, symmetric=symmetric)
-        branch, anchor = opened(curve, start, step)
+        branch, anchor = opened(curve, start, min(step, longest))
         return followed(curve, branch, anchor, longest, points, closely, progress)
 
 
@@ -312,6 +316,8 @@ def proceed(
     leaving = last.special is not None
     # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = branch.step if leaving else 0.0
+    if longest < LONGEST:  # steps along straight parts are longer than the longest
+        branch = replace(branch, step=min(branch.step, longest))
     with allowed:
         anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
         return followed(curve, branch, anchor, longest, points, closely, progress)
@@ -336,7 +342,7 @@ def followed(
     until: Kind | None = None,
 ) -> Branch:
     """A branch with the points that follow an anchor; it also ends past a special point of the kind ``until``."""
-    curve.first = branch.points[0]
+    curve.first, curve.long_steps = branch.points[0], longest >= LONGEST
     found, remarks = list(branch.points), list(branch.remarks)
 
     def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:
@@ -351,8 +357,46 @@ def followed(
         progress(count, end)
 
     ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
+    if ending is Ending.LOST and _at_event(curve, found[-1]):
+        reason = _EVENT_AT_ZERO
+        steps = sum(point.special is None for point in found[len(branch.points) :])
+        moved = _elsewhere(curve, found[-1]) if steps else None
+        if moved is not None:
+            remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
+            branch, left = replace(branch, points=tuple(found), remarks=tuple(remarks)), points and points - steps
+
+            def counted(count: int, point: BranchPoint) -> None:
+                progress(steps + count, point)
+
+            return followed(curve, branch, moved, longest, left, closely, counted, until)
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
+
+
+def _at_event(curve: Curve, last: BranchPoint) -> bool:
+    """True if an event is about to pass time 0 of an orbit, where returns are not smooth."""
+    system = curve.system(last.value)
+    try:
+        return jumps_at_ends(system, last.orbit, _duration(system, last))
+    except AnalysisError:
+        return False
+
+
+def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
+    """The anchor at another state of the orbit of a point; None if time 0 is fixed, or no state suits."""
+    system = curve.system(last.value)
+    for part in _PARTS if is_autonomous(system) else ():
+        with contextlib.suppress(AnalysisError):
+            x = carried(system, last.orbit[None], 0.0, part * _duration(system, last))[0]
+            rising = bool(last.tangent[-1] > 0.0)
+            anchor = anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)
+            if not _at_event(curve, anchor.last):
+                return anchor
+    return None
+
+
+def _duration(system: SystemLike, point: BranchPoint) -> float:
+    return return_duration(system) if point.period is None else point.period / returns_per_period(system)
 
 
 def _passed(values: list[float]) -> str:

@@ -19,9 +19,9 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
-from chilopod.stability.problem.budget import SpentError, UserCode
-from chilopod.stability.problem.capabilities import Family, is_autonomous, returns_per_period
-from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, section_at
+from chilopod.stability.problem.budget import SpentError
+from chilopod.stability.problem.capabilities import Family, checked_flow, given_scale, is_autonomous
+from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
@@ -44,6 +44,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     """The curve H(x, p) = x of a family, to a precision relative to the sizes of the states."""
 
     first: BranchPoint  # first point of the curve
+    long_steps = False  # True if no step shorter than the default one is wanted
 
     def __init__(
         self, family: Family, scale: float, sizes: Array | None = None, *, precision: float = PRECISION, **returns: Any
@@ -152,6 +153,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             return False
         return residual <= _CLEAR * self.noise(found.x, found.value, anchor.section)
 
+    def stretches(self, step: Step[Anchor, OnCurve]) -> bool:
+        """True unless short steps are wanted, or the system gives the sizes of its states."""
+        return self.long_steps and given_scale(self.system(step.found.value)) is None
+
     def exact(self, anchor: Anchor, found: Returned, row: Array) -> Array | None:
         """The matrix at an orbit near a branch point."""
         if not anchor.leaving:
@@ -215,19 +220,13 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         duration = return_duration(system) if anchor.section is None else anchor.section.duration
         start = np.append(last.orbit, last.value)
         self.budget.take(2 * FEW_ROUNDS)  # each in parts
-        with UserCode("flow", last.value):
-            nodes = nodes_along(system, last.orbit, duration, count, last.value)
-            free = Free(plane.row, plane.target, start, self.scale)
-            found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], anchor.section, free)
+        nodes = nodes_along(system, last.orbit, duration, count, last.value)
+        free = Free(plane.row, plane.target, start, self.scale)
+        found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], anchor.section, free)
         x, value = found.nodes.states[0], self._inside(found.nodes.value) if plane.edge is None else plane.edge[1]
         system = self.system(value)
-        count, velocity, across = returns_per_period(system), None, np.eye(x.size)
-        if section is not None and is_autonomous(system):
-            velocity = np.asarray(system.velocity(x))
-            across -= np.outer(velocity, section.normal) / float(section.normal @ velocity)
-        normal = None if section is None else section.normal
-        image = ReturnMap(x, across @ found.jacobian, np.nan, count, count * found.nodes.duration, velocity, normal)
-        matrix = self.matrix(image.jacobian, across @ found.by_value * self.scale, last.tangent)
+        image = on_section(system, section, x, found.jacobian, found.nodes.duration)
+        matrix = self.matrix(image.jacobian, image.across @ found.by_value * self.scale, last.tangent)
         return (np.append(x, value) - start) / units, x, value, image, matrix
 
     def _inside(self, value: float) -> float:
@@ -307,9 +306,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """States on an orbit, at even times over some duration, shape (times, n)."""
         system, states = self.system(value), [x]
         self.budget.take()
-        with UserCode("flow", value):
-            for _ in range(_PARTS):
-                states.append(system.flow(np.array(states[-1]), 0.0, duration / _PARTS)[0])
+        for _ in range(_PARTS):
+            states.append(checked_flow(system, states[-1], 0.0, duration / _PARTS)[0])
         return np.array(states)
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:

@@ -9,7 +9,7 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import Budget, UserCode
+from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import Family, SystemLike, returns_per_period
 from chilopod.stability.problem.returns import (
     ReturnMap,
@@ -76,10 +76,9 @@ class FamilyReturns:
         """The return map and its derivative."""
         system = self.system(value)
         self.budget.take()
-        with UserCode("flow", value):
-            if section is None and system.period is None:
-                section = section_at(system, x, self.sizes)
-            return return_map(system, x, with_error, section)
+        if section is None and system.period is None:
+            section = section_at(system, x, self.sizes)
+        return return_map(system, x, with_error, section)
 
     def section_at(self, x: Array, value: float, period: float | None) -> Section | None:
         """Section across the motion at a state, if returns need one; by default the system guesses the full period."""
@@ -90,14 +89,12 @@ class FamilyReturns:
     def mapped(self, x: Array, value: float, section: Section | None) -> Array:
         """H at a state."""
         self.budget.take()
-        with UserCode("flow", value):
-            return np.asarray(returned_states(self.system(value), x[None], section)[0])
+        return np.asarray(returned_states(self.system(value), x[None], section)[0])
 
     def noise(self, x: Array, value: float, section: Section | None) -> float:
         """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
         image, system = self.image(x, value, section), self.system(value)
-        with UserCode("flow", value):
-            other = in_parts(system, x, image.period / image.returns)
+        other = in_parts(system, x, image.period / image.returns)
         return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
     def _parameter_step(self, value: float, steepness: float) -> float:

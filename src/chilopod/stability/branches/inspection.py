@@ -24,6 +24,7 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, special_point
 from chilopod.stability.branches.within import Within
+from chilopod.stability.crossing_points.description import ContinuumError
 from chilopod.stability.orbit_blocks import block_of, crossings_in
 from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import flows_with_error
@@ -89,7 +90,11 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
         if (sure or (leaving and event is Event.PLUS)) and not _confirmed(within, place):
             remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which does not count",)
             continue
-        point = special_point(within, place)
+        try:
+            point = special_point(within, place)
+        except ContinuumError as error:
+            remarks += (f"near {near:.9g}: {error.problem}, so it is no bifurcation point",)
+            continue
         if point is None:
             remarks += (f"near {near:.9g}: {event.sentence}, but no multiplier of the orbit found there is critical",)
         else:

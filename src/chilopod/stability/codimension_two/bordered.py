@@ -26,7 +26,7 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
 from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import Budget, UserCode
+from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import SystemLike, given_scale
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.problem.scales import sizes
@@ -257,11 +257,10 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     def _mapped(self, place: Place, section: Section | None, with_error: bool) -> tuple[Place, ReturnMap]:
         self.budget.take()
         system = self.system(place.values)
-        with UserCode("flow", tuple(place.values.tolist())):
-            if self.known:
-                orbit = from_known(system, known_state(system), with_error)
-                return replace(place, state=orbit.state), orbit.image
-            return place, return_map(system, place.state, with_error, section)
+        if self.known:
+            orbit = from_known(system, known_state(system), with_error)
+            return replace(place, state=orbit.state), orbit.image
+        return place, return_map(system, place.state, with_error, section)
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
         size = sizes(system, place.state, image.period / image.returns)

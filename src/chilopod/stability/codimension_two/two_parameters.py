@@ -113,7 +113,9 @@ def follow2(
         def half(sign: float) -> _Half:
             curve.first = spot = first.towards(sign)
             found = _Half(curve, detector, origin, progress)
-            found.ending, found.reason, _ = trace(curve, spot, (step, longest), points, found.look, found.keep)
+            found.ending, found.reason, _ = trace(
+                curve, spot, (min(step, longest), longest), points, found.look, found.keep
+            )
             return found
 
         if outward is not None:

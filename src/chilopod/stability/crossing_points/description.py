@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.crossing_points.place import critical_multipliers
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits.orbit import Orbit
@@ -22,7 +24,6 @@ from chilopod.stability.points import (
     kind_at_plus_one,
     with_coefficients,
 )
-from chilopod.stability.problem.budget import UserCode
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.problem.scales import sizes
@@ -35,6 +36,14 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event
 _EPSILON = float(np.finfo(float).eps)
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
 _SETTLED = 1e-7  # change of the mean from half as many parts; its error is about the square of that
+
+_ASIDE, _ROUNDS = 0.05, 20  # distance of a second orbit, in sizes of the states, and number of its corrections
+_CRITICAL = 1e-6  # distance from one of a critical multiplier, and relative singular value of its direction
+_VANISHES = 1e-9  # residual, relative to the distance, that counts as zero
+
+
+class ContinuumError(AnalysisError):
+    """Orbits form a continuum at a crossing, which is no bifurcation point of one orbit."""
 
 
 def described(
@@ -79,6 +88,12 @@ def described(
     # No orbits branch off from a Krein collision, whatever the symmetries.
     branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
     symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
+    if kind is None and crossing.event is Event.PLUS and not crossing.collision:
+        alone = simple and (form is None or form.status is not NormalFormStatus.SEVERAL_CRITICAL)
+        if not alone and _is_continuum(system, orbit, mode):
+            count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
+            said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
+            raise ContinuumError(said)
     kind = _kind(crossing, k, form, symmetry if breaking else None) if kind is None else kind
     verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
     about: dict[str, Any] = {"criticality": verdict, "multiplicity": critical.size, "symmetry": symmetry}
@@ -117,6 +132,23 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
             return float(np.sqrt(mean))
 
 
+def _is_continuum(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> bool:
+    """True if all terms of the bifurcation equation vanish along a mode: an orbit beside this one, corrected across the
+    critical space alone, returns to itself (Lyapunov-Schmidt reduction). Orbits of a linear map do so uncorrected."""
+    size = sizes(system, orbit.state, orbit.period / orbit.image.returns)
+    ahead = mode.real / size
+    shift = _ASIDE * ahead / np.linalg.norm(ahead)
+    matrix = orbit.image.jacobian * size / size[:, None] - np.eye(size.size)
+    across, offs = np.linalg.pinv(matrix, rcond=_CRITICAL), [np.inf]
+    with contextlib.suppress(AnalysisError), np.errstate(all="ignore"):
+        for _ in range(_ROUNDS):
+            x = orbit.state + size * shift
+            residual = (returned_states(system, x[None], orbit.section)[0] - x) / size
+            offs.append(float(np.abs(residual).max()))
+            shift = shift - across @ residual
+    return offs[-1] <= _VANISHES * _ASIDE < offs[1]
+
+
 def _formed(
     system: SystemLike, orbit: Orbit, event: Event, nu: complex, mode: ComplexArray, left: ComplexArray
 ) -> NormalForm | None:
@@ -129,8 +161,7 @@ def _formed(
     scale = sizes(system, orbit.state, orbit.period / image.returns)
 
     def mapped(states: Array) -> Array:
-        with UserCode("flow", None):
-            return returned_states(system, states, orbit.section)
+        return returned_states(system, states, orbit.section)
 
     try:
         return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)

@@ -28,7 +28,6 @@ from chilopod.stability.problem.capabilities import (
     is_autonomous,
     is_stiff,
     known_orbit,
-    returns_per_period,
     spatial_symmetries,
 )
 from chilopod.stability.problem.returns import (
@@ -329,13 +328,8 @@ def _found(
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         return _bounded(system, x, duration)
-    section, count = section_at(system, x, duration=duration), returns_per_period(system)
-    if end is None:
-        image = return_map(system, x, False, section)
-    elif section is not None and is_autonomous(system):
-        image = on_section(system, section, *end, duration)
-    else:
-        image = ReturnMap(*end, np.nan, count, count * duration)
+    section = section_at(system, x, duration=duration)
+    image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
 
 

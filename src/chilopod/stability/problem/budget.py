@@ -1,33 +1,15 @@
-"""Limits of a search, and conversion of exceptions of a user's functions."""
+"""Limits of a search."""
 
 from __future__ import annotations
 
 import math
 from numbers import Real
 
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words
+from chilopod.errors import ParameterError
+from chilopod.flows.arguments import UserCode, UserError
 from chilopod.flows.deadline import Deadline, SpentError, over
 
 __all__ = ["Budget", "SpentError", "UserCode", "UserError"]
-
-
-class UserCode:
-    """Context of a call of a user's function at a value of the parameter: any exception becomes a
-    :class:`UserError`, an AnalysisError of one line."""
-
-    def __init__(self, field: str, value: object) -> None:
-        self._field, self._value = field, value
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, Exception) and not isinstance(error, ChilopodError):
-            raise UserError(f"raised {in_words(error)}", field=self._field, value=self._value) from error
-
-
-class UserError(AnalysisError):
-    """A user's function raised an exception of its own."""
 
 
 class Budget(Deadline):

@@ -18,7 +18,7 @@ import numpy as np
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import numbers, shape_of
+from chilopod.flows.arguments import UserCode, numbers, shape_of
 from chilopod.frozen import Array
 
 
@@ -32,22 +32,18 @@ class SystemLike(Protocol):
     @property
     def dimension(self) -> int:
         """Number of states n."""
-        ...
 
     @property
     def period(self) -> float | None:
         """Period T; None if the system does not depend on time and the period belongs to the orbit."""
-        ...
 
     @property
     def symmetry(self) -> Array | None:
         """Matrix S, shape (n, n), of finite order k with S f(t, x) = f(t + T/k, S x), or None. H = S flow(T/k) is then
         a return map. The order is 2 unless the system is :class:`CyclicallySymmetric`."""
-        ...
 
     def flow(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
         """State at t1, shape (n,), and its derivative with respect to the state x at t0, shape (n, n)."""
-        ...
 
 
 Family = Callable[[float], SystemLike]
@@ -61,11 +57,9 @@ class Autonomous(SystemLike, Protocol):
     @property
     def guess_period(self) -> float:
         """Approximate period of an orbit."""
-        ...
 
     def velocity(self, x: Array, /) -> Array:
         """dx/dt at state x, shape (n,)."""
-        ...
 
 
 @runtime_checkable
@@ -75,7 +69,6 @@ class ExpandsVelocity(Autonomous, Protocol):
     def velocity_series(self, curves: Array, /) -> Array:
         """Taylor coefficients in s of f(x(s)), shape (curves, orders, n), along curves x(s) = c0 + c1 s + ... with
         these coefficients, of the same shape."""
-        ...
 
 
 @runtime_checkable
@@ -85,7 +78,6 @@ class CyclicallySymmetric(Protocol):
     @property
     def symmetry_order(self) -> int:
         """The smallest k > 1 with S^k = 1."""
-        ...
 
 
 @runtime_checkable
@@ -95,7 +87,6 @@ class Scaled(Protocol):
     @property
     def scale(self) -> Array | None:
         """Positive sizes of the states, shape (n,); or None."""
-        ...
 
 
 @runtime_checkable
@@ -105,7 +96,6 @@ class KnowsOrbit(Protocol):
     @property
     def orbit(self) -> Array | None:
         """State on the orbit at time 0, shape (n,); or None. It is corrected if it does not return to round-off."""
-        ...
 
 
 @runtime_checkable
@@ -116,7 +106,6 @@ class SpatiallySymmetric(Protocol):
     def spatial_symmetry(self) -> Array | None:
         """A matrix P, shape (n, n), with P f(t, x) = f(t, P x), or several that generate a finite group, shape
         (generators, n, n); or None."""
-        ...
 
 
 @runtime_checkable
@@ -126,7 +115,6 @@ class FlowsWithError(Protocol):
     def flow_with_error(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array, float | Array]:
         """As :meth:`SystemLike.flow`, and a bound on the absolute error of the derivative: of every entry, shape
         (n, n), or one number for all of them, which is wide where states have different units."""
-        ...
 
 
 @runtime_checkable
@@ -135,7 +123,6 @@ class FlowsStates(Protocol):
 
     def flow_states(self, states: Array, t0: float, t1: float, /) -> Array:
         """States at t1 of those at t0, shape (states, n) both, without derivatives."""
-        ...
 
 
 @runtime_checkable
@@ -145,7 +132,6 @@ class FlowsTangents(SystemLike, Protocol):
     def flow_tangents(self, x: Array, directions: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
         """State at t1, shape (n,), and its derivative with respect to the state x at t0, times the directions, shape
         (n, any number) as they."""
-        ...
 
 
 @runtime_checkable
@@ -154,12 +140,10 @@ class FlowsMany(KnowsOrbit, Protocol):
 
     def can_flow_with(self, other: Self, /) -> bool:
         """True if :meth:`flow_many` may take the other system along with this one."""
-        ...
 
     def flow_many(self, systems: Sequence[Self], t0: float, t1: float, /) -> tuple[Array, Array]:
         """Derivatives of the flow on the known orbits, shape (systems, n, n), and bounds as in
         :class:`FlowsWithError`, shape (systems,)."""
-        ...
 
 
 @runtime_checkable
@@ -168,11 +152,9 @@ class FlowsVolumes(SystemLike, Protocol):
 
     def is_stiff(self, x: Array, t0: float, t1: float, /) -> bool:
         """True if the derivative of the flow from state x at t0 to t1 does not resolve such a direction."""
-        ...
 
     def flow_volume(self, x: Array, t0: float, t1: float, /) -> tuple[float, float]:
         """Logarithm of the growth of volume from state x at t0 to t1, and a bound on its error."""
-        ...
 
 
 def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
@@ -212,8 +194,9 @@ def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: f
     """The flow and its derivative of the right shapes, with the system's own bound on its error if wanted; a SpentError
     after a time limit."""
     deadline.check()
-    flow: Any = getattr(system, "flow_with_error" if with_error else "flow")
-    found, n = flow(np.array(x), t0, t1), x.size  # a system may write into its argument
+    name, n = "flow_with_error" if with_error else "flow", x.size
+    with UserCode(name):
+        found: Any = getattr(system, name)(np.array(x), t0, t1)  # a system may write into its argument
     if not (isinstance(found, tuple | list) and len(found) == 2 + with_error):
         what = "(state, derivative, error)" if with_error else "(state, derivative)"
         raise ParameterError(f"must return {what}", field="flow", value=type(found).__name__)

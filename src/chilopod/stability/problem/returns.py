@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import numbers
+from chilopod.flows.arguments import UserCode, numbers
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.problem.capabilities import (
     Autonomous,
@@ -39,6 +39,7 @@ _APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from 
 _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
 _CROSSING_ROUNDS = 30
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
+_ENDS = 1e-3, 1e-4  # parts of a return, at its ends
 
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
@@ -98,6 +99,13 @@ class ReturnMap(ReadOnlyArrays):
     velocity: Array | None = None
     normal: Array | None = None
 
+    @property
+    def across(self) -> Array:
+        """Projection along the motion onto the section, shape (n, n); the unit matrix without a section."""
+        if self.velocity is None or self.normal is None:
+            return np.eye(self.state.size)
+        return np.eye(self.state.size) - np.outer(self.velocity, self.normal) / float(self.normal @ self.velocity)
+
 
 _STATED = "dimension", "spatial_symmetry", "scale", "velocity"
 _FLOWS = "flow", "flow_with_error", "flow_states", "flow_tangents"
@@ -137,7 +145,8 @@ def return_duration(system: SystemLike) -> float:
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:
-    velocity = numbers(system.velocity(np.array(x)), x.shape, "velocity")
+    with UserCode("velocity"):
+        velocity = numbers(system.velocity(np.array(x)), x.shape, "velocity")
     if not np.isfinite(velocity).all():
         raise AnalysisError("the right-hand side is not finite", field="rhs")
     return velocity
@@ -220,17 +229,24 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
 
 
 def on_section(
-    system: Autonomous, section: Section, state: Array, jacobian: Array, duration: float, error: float | Array = np.nan
+    system: SystemLike,
+    section: Section | None,
+    state: Array,
+    jacobian: Array,
+    duration: float,
+    error: float | Array = np.nan,
 ) -> ReturnMap:
-    """The return map to a section from a return to it within its duration, and from the derivative over this
+    """The return map from a return within its duration, to a section if there is one, and from the derivative over this
     duration; ``error`` bounds that of the flow without the symmetry."""
-    velocity = _velocity(system, state)
-    across = np.eye(state.size) - np.outer(velocity, section.normal) / float(section.normal @ velocity)
-    turned_across = np.abs(across) if system.symmetry is None else np.abs(across) @ np.abs(system.symmetry)
-    error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())
     _check_finite(state, jacobian)
     count = returns_per_period(system)
-    return ReturnMap(state, across @ jacobian, error, count, count * duration, velocity, section.normal)
+    image = ReturnMap(state, jacobian, error, count, count * duration)
+    if section is None or not is_autonomous(system):
+        return image
+    image = replace(image, velocity=_velocity(system, state), normal=section.normal)
+    turned_across = np.abs(image.across) if system.symmetry is None else np.abs(image.across) @ np.abs(system.symmetry)
+    error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())
+    return replace(image, jacobian=image.across @ jacobian, error=error)
 
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:
@@ -272,14 +288,32 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
     return None
 
 
+def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
+    """True if the motion jumps just after the start of a return, from state x, or just before its end: the derivative
+    of the flow then does not tend to 1 over shorter and shorter times."""
+    size, one = sizes(system, x, duration), np.eye(x.size)
+
+    def change(start: float, part: float) -> float:
+        there = carried(system, x[None], 0.0, start * duration)[0] if start else x
+        derivative = checked_flow(system, there, start * duration, (start + part) * duration)[1]
+        return float((np.abs(derivative - one) * size / size[:, None]).max())
+
+    if change(0.5, _ENDS[0]) == 0.0:
+        return False  # a map has no parts
+    pairs = [(change(0.0, part), change(1.0 - part, part)) for part in _ENDS]
+    return any(near > max(_ENDS[0], 0.5 * far) for far, near in zip(*pairs, strict=True))
+
+
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
     """States at t1 of those at t0, shape (states, n) both, by the cheapest capability of the system; a SpentError
     after a time limit."""
     deadline.check()
     if flows_states(system):
-        return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
+        with UserCode("flow_states"):
+            return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
     if flows_tangents(system):
-        return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
+        with UserCode("flow_tangents"):
+            return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
     return np.array([checked_flow(system, x, t0, t1)[0] for x in states])
 
 

@@ -71,14 +71,12 @@ def return_multipliers(image: ReturnMap) -> ComplexArray:
 
 def _across(image: ReturnMap) -> tuple[Array, Array]:
     """Coordinates on the section of a return map: matrices (n, n-1) from them, and (n-1, n) to them."""
-    n = image.state.size
-    if image.velocity is None or image.normal is None:
-        return np.eye(n), np.eye(n)
+    if image.normal is None:
+        return image.across, image.across
     # Units in which the motion is across the section, so that its basis can be orthonormal.
     units = numerical_balance(image.jacobian)
     basis = normal_basis(image.normal * units)
-    along = np.eye(n) - np.outer(image.velocity, image.normal) / float(image.normal @ image.velocity)
-    return units[:, None] * basis, (basis.T / units) @ along
+    return units[:, None] * basis, (basis.T / units) @ image.across
 
 
 def normal_basis(direction: Array) -> Array:

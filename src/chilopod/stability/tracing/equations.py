@@ -107,6 +107,10 @@ class Equations(ABC, Generic[A, S, R]):
         """True if a step to the first point, by these coordinates, ends at it."""
         return True
 
+    def stretches(self, step: Step[A, S]) -> bool:
+        """True if the units of a curve are estimates, so that steps along straight parts may be longer."""
+        return False
+
     def exact(self, anchor: A, found: R, row: Array) -> Array | None:
         """A new matrix at a solution whose corrector had a weak one; else None."""
         return None

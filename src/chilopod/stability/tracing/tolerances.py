@@ -12,6 +12,9 @@ GROWTH, FALL, RETRY = 1.5, 0.6, 0.5
 FEW, MANY = 4, 7
 """Numbers of corrections up to which the next step grows, and above which it is shorter."""
 
+EASY = 1e-5
+"""Distance of an end from the prediction, relative to the step, above which no step is longer than the longest."""
+
 COUNTED = 1e-10
 """Error above which a correction counts: below it their number depends on rounding."""
 

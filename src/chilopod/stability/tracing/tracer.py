@@ -38,8 +38,7 @@ def trace(
     ``look(step, ending)`` finds the events within a step, and the ending if the curve ends there, or raises a
     ChilopodError if a shorter step may succeed; ``keep(found, count)`` receives the events of accepted step ``count``.
     """
-    longest = sizes[1]
-    size = min(sizes)
+    size, longest = sizes
     if outward(equations.box, anchor.values, anchor.tangent[equations.parameters(anchor)[0]]):
         return Ending.LEFT_INTERVAL, "", size
     for count in itertools.count(1) if points is None else range(1, points + 1):
@@ -61,12 +60,23 @@ def trace(
         if not shortened:  # else the edge of the systems' domain would be met again at once
             few, many = step.corrections <= tolerances.FEW, step.corrections > tolerances.MANY
             size *= tolerances.GROWTH if few else tolerances.FALL if many else 1.0
-        size = min(longest, size)
+        size = min(_largest(equations, step, longest), size)
         keep(found, count)
         if ending is not None:
             return ending, "", size
         anchor = step.end
     return Ending.ENOUGH_POINTS, "", size
+
+
+def _largest(equations: Equations[A, S, R], step: Step[A, S], longest: float) -> float:
+    """Largest next step. Where the cubic through the last points predicts far more than the longest step, estimated
+    units are too small for the curve, and only the change of the parameters is limited by that step."""
+    if not equations.stretches(step):
+        return longest
+    along = float(np.linalg.norm(step.end.tangent[equations.parameters(step.end)[0]]))
+    missed = step.missed / (tolerances.EASY * float(np.linalg.norm(step.moved)))
+    straight = step.size * min(tolerances.GROWTH, max(missed, 1e-9) ** -0.25)
+    return max(longest, min(longest / max(along, 1e-9), straight))
 
 
 def outward(box: Array, values: Array, ahead: Array) -> bool:
