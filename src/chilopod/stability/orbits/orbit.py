@@ -201,6 +201,13 @@ def find_orbit(
         raise failed
 
 
+def near_orbit(
+    system: SystemLike, x: Array, with_error: bool, section: Section | None, duration: float, size: Array, budget: Budget
+) -> Orbit:
+    """The orbit near a state by Newton's method from there alone, with given sizes of the states."""
+    return _solved(system, Nodes(x[None], duration), with_error, budget, section, size=size)
+
+
 def _check_section(section: object, system: SystemLike) -> None:
     if not isinstance(section, Section) or not is_autonomous(system):
         allowed = "a Section, for a system that does not depend on time"
@@ -301,10 +308,12 @@ def _solved(
     budget: Budget | None,
     section: Section | None = None,
     careful: bool = False,
+    size: Array | None = None,
 ) -> Orbit:
-    """The orbit near some nodes, the first on the section: by default across the motion there."""
-    x, duration = start.states[0], start.duration
-    size = sizes(system, x, duration)
+    """The orbit near some nodes, the first on the section: by default across the motion there. The ``size`` of the
+    states, shape (n,), if given, is also that of the section across the orbit."""
+    x, duration, units = start.states[0], start.duration, size
+    size = sizes(system, x, duration) if size is None else size
     section = section or section_at(system, x, size, duration)
     if system.dimension >= LARGE and flows_tangents(system) and len(start.states) == 1:
         with contextlib.suppress(AnalysisError):
@@ -316,20 +325,27 @@ def _solved(
     shared = _shared(system, x, size)
     found = shot(lambda _: system, start, size, section, None, shared, budget, careful)
     end = found.end, found.jacobian
-    return _found(system, found.nodes.states[0], found.nodes.duration, found.sizes, with_error, end)
+    return _found(system, found.nodes.states[0], found.nodes.duration, found.sizes, with_error, end, units)
 
 
 def _found(
-    system: SystemLike, x: Array, duration: float, size: Array, with_error: bool, end: tuple[Array, Array] | None = None
+    system: SystemLike,
+    x: Array,
+    duration: float,
+    size: Array,
+    with_error: bool,
+    end: tuple[Array, Array] | None = None,
+    units: Array | None = None,
 ) -> Orbit:
-    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states. The end
-    of a return there may be given, with its derivative without the change of the time."""
+    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states, and
+    ``units`` to the section. The end of a return there may be given, with its derivative without the change of the
+    time."""
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         return _bounded(system, x, duration)
-    section, count = section_at(system, x, duration=duration), returns_per_period(system)
+    section, count = section_at(system, x, units, duration), returns_per_period(system)
     if end is None:
         image = return_map(system, x, False, section)
     elif section is not None and is_autonomous(system):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import contextlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -13,17 +14,15 @@ from numpy.typing import ArrayLike
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
-from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state, near_orbit
 from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, SpentError, UserCode, UserError
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
-from chilopod.stability.problem.returns import ReturnMap, return_map, return_maps, section_at
+from chilopod.stability.problem.returns import ReturnMap, Section, return_map, return_maps, section_at
 from chilopod.stability.problem.scales import sizes
+from chilopod.stability.unit_circle.crossings import first_values
 
 T = TypeVar("T")
-
-FIRST_STEPS = 8
-"""Number of steps of a followed orbit through the interval, without shortened ones."""
 
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which the search may not resolve a fold."""
@@ -40,6 +39,7 @@ _SAME = 1e-7  # error of a prediction, relative to the sizes, below which a corr
 _HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
 _HALFWAY = 0.25  # largest distance of an orbit halfway from the mean of its neighbours, relative to their distance
 _APART = 0.1  # least distance of a third sample on the curve through two, relative to theirs
+_ACROSS = 0.7  # least cosine between the motion and the normal of a section that is kept
 _BEHIND = 4  # number of samples of a prediction
 _BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
 _TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
@@ -124,6 +124,7 @@ class Samples:
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
         self._bends: dict[float, float] = {}
+        self._normal: Array | None = None  # of the section of the last orbit
         self.orbits = budget
         self._allowed = _RETURNS * budget
         self.budget = Budget(self._allowed, seconds)
@@ -239,10 +240,20 @@ class Samples:
         """A sample near a state, with about the period of a neighbouring sample."""
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
+        duration = beside.image.period / beside.image.returns
         with self.family.asking(value):
-            section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
-            orbit = find_orbit(system, near, self.known, section, settle=False, budget=self.budget)
-            return _sample(value, orbit)
+            section = self._section(system, near, duration)
+            return _sample(value, near_orbit(system, near, self.known, section, duration, self.size, self.budget))
+
+    def _section(self, system: SystemLike, near: Array, duration: float) -> Section | None:
+        """The section through a state, with the normal of the last one while the motion is across that: so the states
+        at time 0 are smooth in the parameter."""
+        section = section_at(system, near, self.size, duration)
+        if section is None:
+            return None
+        if self._normal is None or (section.normal * self.size) @ (self._normal * self.size) < _ACROSS:
+            self._normal = section.normal
+        return replace(section, normal=self._normal)
 
     def _between(self, value: float) -> Sample:
         """A sample between two others, from their orbits."""
@@ -273,9 +284,7 @@ class Samples:
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
         """The orbit at a value by the polynomial through samples; by the straight line through the first two if that
-        differs much, or time 0 is arbitrary on the orbits."""
-        if not self.family.timed:
-            samples = samples[:2]
+        differs much."""
         if len(samples) == 1:
             return samples[0].orbit
         first, second = samples[:2]
@@ -289,9 +298,9 @@ class Samples:
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
     def _followed(self) -> list[Sample]:
-        """Samples of the followed orbit from the lower end."""
+        """Samples of the followed orbit from the lower end, those of the first values of a search among them."""
         path = [self._by_value[self.low]]
-        for value in np.linspace(self.low, self.high, FIRST_STEPS + 1)[1:].tolist():
+        for value in first_values(self.low, self.high)[1:].tolist():
             reached = self._follow(path, value)
             for sample in reached:
                 self._keep(sample)
