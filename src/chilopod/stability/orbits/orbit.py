@@ -202,10 +202,16 @@ def find_orbit(
 
 
 def near_orbit(
-    system: SystemLike, x: Array, with_error: bool, section: Section | None, duration: float, size: Array, budget: Budget
+    system: SystemLike,
+    x: Array,
+    with_error: bool,
+    section: Section | None,
+    duration: float,
+    units: Array,
+    budget: Budget,
 ) -> Orbit:
-    """The orbit near a state by Newton's method from there alone, with given sizes of the states."""
-    return _solved(system, Nodes(x[None], duration), with_error, budget, section, size=size)
+    """The orbit near a state by Newton's method from there alone, with a section at right angles in given units."""
+    return _solved(system, Nodes(x[None], duration), with_error, budget, section, units=units)
 
 
 def _check_section(section: object, system: SystemLike) -> None:
@@ -308,12 +314,12 @@ def _solved(
     budget: Budget | None,
     section: Section | None = None,
     careful: bool = False,
-    size: Array | None = None,
+    units: Array | None = None,
 ) -> Orbit:
-    """The orbit near some nodes, the first on the section: by default across the motion there. The ``size`` of the
-    states, shape (n,), if given, is also that of the section across the orbit."""
-    x, duration, units = start.states[0], start.duration, size
-    size = sizes(system, x, duration) if size is None else size
+    """The orbit near some nodes, the first on the section: by default across the motion there. The section across the
+    orbit is at right angles in ``units`` of the states, shape (n,), by default their sizes."""
+    x, duration = start.states[0], start.duration
+    size = sizes(system, x, duration)
     section = section or section_at(system, x, size, duration)
     if system.dimension >= LARGE and flows_tangents(system) and len(start.states) == 1:
         with contextlib.suppress(AnalysisError):
