@@ -202,15 +202,10 @@ def find_orbit(
 
 
 def near_orbit(
-    system: SystemLike,
-    x: Array,
-    with_error: bool,
-    section: Section | None,
-    duration: float,
-    units: Array,
-    budget: Budget,
+    system: SystemLike, x: Array, with_error: bool, section: Section | None, units: Array, budget: Budget
 ) -> Orbit:
     """The orbit near a state by Newton's method from there alone, with a section at right angles in given units."""
+    duration = return_duration(system) if section is None else section.duration
     return _solved(system, Nodes(x[None], duration), with_error, budget, section, units=units)
 
 

@@ -119,7 +119,8 @@ class Samples:
         self.known = guess is None  # the systems know their orbits
         self.spent = False  # the path ends because the budget was spent
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
-        self.count = self._counted = 0  # orbits computed
+        self.count = 0  # orbits computed
+        self._taken = 0.0  # return maps of those before :meth:`allow`, without the first
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
@@ -166,14 +167,14 @@ class Samples:
 
     def allow(self, returns: int) -> None:
         """Set the limit of further return maps."""
-        self._allowed, self._counted = returns, self.count
-        self.budget.left = returns
+        self._taken += self._allowed - self.budget.left
+        self._allowed = self.budget.left = returns
 
     def affordable(self) -> int:
-        """Number of further orbits, at the mean cost of those since :meth:`allow`."""
+        """Number of further orbits, at the mean cost of those so far."""
         if self.budget.late:
             return 0
-        price = (self._allowed - self.budget.left) / max(self.count - self._counted, 1)
+        price = (self._taken + self._allowed - self.budget.left) / max(self.count, 1)
         # Failed orbits do not predict the cost of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
@@ -240,10 +241,9 @@ class Samples:
         """A sample near a state, with about the period of a neighbouring sample."""
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
-        duration = beside.image.period / beside.image.returns
         with self.family.asking(value):
-            section = self._section(system, near, duration)
-            return _sample(value, near_orbit(system, near, self.known, section, duration, self.size, self.budget))
+            section = self._section(system, near, beside.image.period / beside.image.returns)
+            return _sample(value, near_orbit(system, near, self.known, section, self.size, self.budget))
 
     def _section(self, system: SystemLike, near: Array, duration: float) -> Section | None:
         """The section through a state, with the normal of the last one while the motion is across that: so the states
