@@ -24,6 +24,7 @@ from chilopod.stability.normal_forms.center_manifold import (
 
 _TRIALS = 40  # largest number of sampled amplitudes
 _SHARE = 0.03  # wanted departure of the map from its linear part, relative to the amplitude
+_FAR = 5.0  # largest departure that a step upward for accuracy may reach, relative to the wanted one
 _TOO_FAR = 0.3  # largest useful departure
 _UP, _FIRST_DOWN = 30.0, 0.1  # longest step of the amplitude upward; step where the map cannot be evaluated
 _FAR_DOWN, _LEAST_DOWN = 1e-3, 0.3  # longest and shortest step downward where the map is far from linear
@@ -95,7 +96,9 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
                 radius = best[0].radius if best else radius
             if turned > 1:
                 break
-            factor = max(_toward(share, order) ** 0.5, 2.0) if growing > 0.0 else 0.5
+            # The noise in the coefficient falls with the third power of the amplitude.
+            wanted = min(float(np.cbrt(error / max(_ENOUGH * abs(value), 1e-300))), _toward(share / _FAR, order))
+            factor = max(_toward(share, order) ** 0.5, wanted, 2.0) if growing > 0.0 else 0.5
         bends = 0
         nearer = _within(radius * factor, low, high)
         if nearer is None:

@@ -200,6 +200,14 @@ def find_orbit(
         raise failed
 
 
+def near_orbit(
+    system: SystemLike, x: Array, with_error: bool, section: Section | None, units: Array, budget: Budget
+) -> Orbit:
+    """The orbit near a state by Newton's method from there alone, with a section at right angles in given units."""
+    duration = return_duration(system) if section is None else section.duration
+    return _solved(system, Nodes(x[None], duration), with_error, budget, section, units=units)
+
+
 def _check_section(section: object, system: SystemLike) -> None:
     if not isinstance(section, Section) or not is_autonomous(system):
         allowed = "a Section, for a system that does not depend on time"
@@ -300,8 +308,10 @@ def _solved(
     budget: Budget | None,
     section: Section | None = None,
     careful: bool = False,
+    units: Array | None = None,
 ) -> Orbit:
-    """The orbit near some nodes, the first on the section: by default across the motion there."""
+    """The orbit near some nodes, the first on the section: by default across the motion there. The section across the
+    orbit is at right angles in ``units`` of the states, shape (n,), by default their sizes."""
     x, duration = start.states[0], start.duration
     size = sizes(system, x, duration)
     section = section or section_at(system, x, size, duration)
@@ -315,20 +325,27 @@ def _solved(
     shared = _shared(system, x, size)
     found = shot(lambda _: system, start, size, section, None, shared, budget, careful)
     end = found.end, found.jacobian
-    return _found(system, found.nodes.states[0], found.nodes.duration, found.sizes, with_error, end)
+    return _found(system, found.nodes.states[0], found.nodes.duration, found.sizes, with_error, end, units)
 
 
 def _found(
-    system: SystemLike, x: Array, duration: float, size: Array, with_error: bool, end: tuple[Array, Array] | None = None
+    system: SystemLike,
+    x: Array,
+    duration: float,
+    size: Array,
+    with_error: bool,
+    end: tuple[Array, Array] | None = None,
+    units: Array | None = None,
 ) -> Orbit:
-    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states. The end
-    of a return there may be given, with its derivative without the change of the time."""
+    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states, and
+    ``units`` to the section. The end of a return there may be given, with its derivative without the change of the
+    time."""
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         return _bounded(system, x, duration)
-    section = section_at(system, x, duration=duration)
+    section = section_at(system, x, units, duration)
     image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
 

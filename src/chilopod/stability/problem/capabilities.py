@@ -159,10 +159,9 @@ class FlowsVolumes(SystemLike, Protocol):
 
 def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
     """True if a system does not depend on time."""
-    return system.period is None and isinstance(system, Autonomous)
-
-
-# For protocols with one method these functions equal ``isinstance`` and are twenty times as fast.
+    # These functions equal ``isinstance`` and are twenty times as fast.
+    members = getattr(system, "velocity", None), getattr(system, "guess_period", None)
+    return system.period is None and None not in members
 
 
 def flows_with_error(system: SystemLike) -> TypeGuard[FlowsWithError]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -38,6 +39,7 @@ from chilopod.stability.problem.scales import sizes
 _APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from which the crossing is corrected
 _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
 _CROSSING_ROUNDS = 30
+_BENT = 0.5  # largest part of a correction of the time that the change of the speed adds
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
 _ENDS = 1e-3, 1e-4  # parts of a return, at its ends
 
@@ -264,25 +266,31 @@ def crossing(
         start = (1.0 - approach) * section.duration
         before, derivative = flow(x, 0.0, start)
         _check_finite(before, derivative)
-        rest = _time_to_section(system, before, section, approach * section.duration)
-        if rest is not None:
-            return start, rest, (before, derivative)
+        arrival = _arrival(system, before, section, approach * section.duration)
+        if arrival is not None:
+            return start, arrival[0], (before, derivative)
     said = f"the motion does not come back to where it started after about {section.duration:.6g}"
     raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit and its period")
 
 
-def _time_to_section(system: Autonomous, before: Array, section: Section, rest: float) -> float | None:
-    """Remaining time of a state near its return to the section, by Newton's method; None if it does not arrive, has
-    passed it or crosses it backwards."""
+def _arrival(system: Autonomous, before: Array, section: Section, rest: float) -> tuple[float, Array] | None:
+    """Remaining time of a state near its return to the section, and the state there, by Newton's method with the change
+    of the speed; None if it does not arrive, has passed it or crosses it backwards."""
+    earlier: tuple[float, float] | None = None
     for _ in range(_CROSSING_ROUNDS):
         state = turned(system, carried(system, before[None], 0.0, rest))[0]
-        speed = float(section.normal @ _velocity(system, state))
+        velocity = _velocity(system, state)
+        speed = float(section.normal @ velocity)
         off = float(section.normal @ (state - section.point))
-        if speed == 0.0 or not np.isfinite(off):
+        if speed == 0.0 or not math.isfinite(off):
             return None
-        rest -= off / speed
-        if abs(off / speed) <= _LAST_MOVE * section.duration:
-            return rest if speed > 0.0 else None
+        move = off / speed
+        if earlier is not None and rest != earlier[0]:
+            bent = 0.5 * move * (speed - earlier[1]) / (rest - earlier[0]) / speed
+            move *= 1.0 + min(max(bent, -_BENT), _BENT)
+        earlier, rest = (rest, speed), rest - move
+        if abs(move) <= _LAST_MOVE * section.duration:
+            return (rest, state - move * velocity) if speed > 0.0 else None
         if not 0.0 < rest < _FARTHEST * section.duration:
             return None
     return None
@@ -337,14 +345,14 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     assert is_autonomous(system)
     approach = _APPROACHES[0]
     before = carried(system, states, 0.0, (1.0 - approach) * section.duration)
-    rests = [_time_to_section(system, x, section, approach * section.duration) for x in before]
     result = np.empty_like(states)
-    for i, rest in enumerate(rests):
-        if rest is None:
-            _, rest, (state, _) = crossing(system, states[i], section, functools.partial(checked_flow, system))
+    for i, x in enumerate(before):
+        arrival = _arrival(system, x, section, approach * section.duration)
+        if arrival is None:
+            _, rest, (x, _) = crossing(system, states[i], section, functools.partial(checked_flow, system))
+            result[i] = turned(system, carried(system, x[None], 0.0, rest))[0]
         else:
-            state = before[i]
-        result[i] = turned(system, carried(system, state[None], 0.0, rest))[0]
+            result[i] = arrival[1]
     return result
 
 

@@ -16,9 +16,10 @@ from chilopod.stability.points import Kind
 from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import Family, SystemLike
 from chilopod.stability.problem.returns import ReturnMap
-from chilopod.stability.search.samples import FIRST_STEPS, NEAR_FOLD, Samples
+from chilopod.stability.search.samples import NEAR_FOLD, Samples
 
 _BEFORE = 1e-6  # distance from a fold at which the search for crossings ends, relative to the interval
+_JUST_PAST = 0.125  # farthest fold past the end of an orbit that was followed, relative to the interval
 _TRIES = 2  # starts of curves round a fold
 _FLOWS = 2  # flows of each, for every orbit of the budget
 _CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
@@ -139,7 +140,7 @@ def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool
     return (
         bool(np.isfinite(fold.error_bound))
         # In a fold Newton's method may converge to states that are not orbits.
-        and -max(fold.error_bound, _BEFORE * samples.width) <= further <= samples.width / FIRST_STEPS
+        and -max(fold.error_bound, _BEFORE * samples.width) <= further <= _JUST_PAST * samples.width
         and not samples.jumped(fold.image.state, sample.orbit)
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import contextlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -13,23 +14,21 @@ from numpy.typing import ArrayLike
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
-from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state, near_orbit
 from chilopod.stability.problem.arguments import system_of
 from chilopod.stability.problem.budget import Budget, SpentError, UserCode, UserError
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
-from chilopod.stability.problem.returns import ReturnMap, return_map, return_maps, section_at
+from chilopod.stability.problem.returns import ReturnMap, Section, return_map, return_maps, section_at
 from chilopod.stability.problem.scales import sizes
+from chilopod.stability.unit_circle.crossings import first_values
 
 T = TypeVar("T")
-
-FIRST_STEPS = 8
-"""Number of steps of a followed orbit through the interval, without shortened ones."""
 
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which the search may not resolve a fold."""
 
 _KEPT = 64  # cached systems: those around a point are used repeatedly
-_SHORTEST = 2.0**-10  # shortest step of a followed orbit, relative to the first
+_SHORTEST = 2.0**-11  # shortest step of a followed orbit, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
 _ATTEMPTS = 24  # largest number of steps to a value from the sample beside it: ten halvings, then more
@@ -37,10 +36,11 @@ _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as a
 _BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
 _SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
-_HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
+_HALVED, _CLOSER = 13, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
 _HALFWAY = 0.25  # largest distance of an orbit halfway from the mean of its neighbours, relative to their distance
 _APART = 0.1  # least distance of a third sample on the curve through two, relative to theirs
-_BEHIND = 4  # number of samples of a prediction
+_ACROSS = 0.7  # least cosine between the motion and the normal of a section that is kept
+_BEHIND = 6  # number of samples of a prediction
 _BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
 _TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
 _TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
@@ -119,11 +119,13 @@ class Samples:
         self.known = guess is None  # the systems know their orbits
         self.spent = False  # the path ends because the budget was spent
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
-        self.count = self._counted = 0  # orbits computed
+        self.count = 0  # orbits computed
+        self._taken = 0.0  # return maps of those before :meth:`allow`, without the first
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
         self._bends: dict[float, float] = {}
+        self._normal: Array | None = None  # of the section of the last orbit
         self.orbits = budget
         self._allowed = _RETURNS * budget
         self.budget = Budget(self._allowed, seconds)
@@ -165,14 +167,14 @@ class Samples:
 
     def allow(self, returns: int) -> None:
         """Set the limit of further return maps."""
-        self._allowed, self._counted = returns, self.count
-        self.budget.left = returns
+        self._taken += self._allowed - self.budget.left
+        self._allowed = self.budget.left = returns
 
     def affordable(self) -> int:
-        """Number of further orbits, at the mean cost of those since :meth:`allow`."""
+        """Number of further orbits, at the mean cost of those so far."""
         if self.budget.late:
             return 0
-        price = (self._allowed - self.budget.left) / max(self.count - self._counted, 1)
+        price = (self._taken + self._allowed - self.budget.left) / max(self.count, 1)
         # Failed orbits do not predict the cost of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
@@ -240,9 +242,18 @@ class Samples:
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
         with self.family.asking(value):
-            section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
-            orbit = find_orbit(system, near, self.known, section, settle=False, budget=self.budget)
-            return _sample(value, orbit)
+            section = self._section(system, near, beside.image.period / beside.image.returns)
+            return _sample(value, near_orbit(system, near, self.known, section, self.size, self.budget))
+
+    def _section(self, system: SystemLike, near: Array, duration: float) -> Section | None:
+        """The section through a state, with the normal of the last one while the motion is across that: so the states
+        at time 0 are smooth in the parameter."""
+        section = section_at(system, near, self.size, duration)
+        if section is None:
+            return None
+        if self._normal is None or (section.normal * self.size) @ (self._normal * self.size) < _ACROSS:
+            self._normal = section.normal
+        return replace(section, normal=self._normal)
 
     def _between(self, value: float) -> Sample:
         """A sample between two others, from their orbits."""
@@ -273,9 +284,7 @@ class Samples:
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
         """The orbit at a value by the polynomial through samples; by the straight line through the first two if that
-        differs much, or time 0 is arbitrary on the orbits."""
-        if not self.family.timed:
-            samples = samples[:2]
+        differs much."""
         if len(samples) == 1:
             return samples[0].orbit
         first, second = samples[:2]
@@ -289,9 +298,9 @@ class Samples:
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
     def _followed(self) -> list[Sample]:
-        """Samples of the followed orbit from the lower end."""
+        """Samples of the followed orbit from the lower end, those of the first values of a search among them."""
         path = [self._by_value[self.low]]
-        for value in np.linspace(self.low, self.high, FIRST_STEPS + 1)[1:].tolist():
+        for value in first_values(self.low, self.high)[1:].tolist():
             reached = self._follow(path, value)
             for sample in reached:
                 self._keep(sample)
@@ -304,26 +313,25 @@ class Samples:
     def _to_merging(self, path: list[Sample]) -> list[Sample]:
         """The path up to a pitchfork where the orbit meets another one, which the corrector then follows: a multiplier
         comes to +1 from one side and leaves it to the same side."""
-        for i in range(1, len(path) - 2):
-            behind, ahead, beyond = path[: i + 1], path[i + 1], path[i + 2]
-            while _touches(behind[-2], behind[-1], ahead, beyond):
-                if ahead.value - behind[-1].value <= _MERGED * self.width:
-                    self.merges = True
-                    return behind
-                try:
-                    found = self._inside(behind, ahead)
-                except SpentError:
-                    break
-                if found is None:  # H - 1 is singular where they meet
-                    self.merges = ahead.value - behind[-1].value <= _NEAR_MERGED * self.width
-                    if self.merges:
-                        return behind
-                    break
+        i = 1
+        while i < len(path) - 2:
+            if not _touches(*path[i - 1 : i + 3]):
+                i += 1
+                continue
+            gap = path[i + 1].value - path[i].value
+            try:
+                found = None if gap <= _MERGED * self.width else self._inside(path[: i + 1], path[i + 1])
+            except SpentError:
+                break
+            if found is not None:
                 self._keep(found)
-                if _touches(behind[-2], behind[-1], found, ahead):
-                    ahead, beyond = found, ahead
-                else:
-                    behind.append(found)
+                path.insert(i + 1, found)
+                i = max(i - 1, 1)
+            elif gap <= _NEAR_MERGED * self.width:  # H - 1 is singular where they meet
+                self.merges = True
+                return path[: i + 1]
+            else:
+                i += 1
         return path
 
     def _inside(self, behind: list[Sample], ahead: Sample) -> Sample | None:
@@ -368,7 +376,8 @@ class Samples:
         return path[len(behind) :]
 
     def _turns_back(self, behind: list[Sample], found: Sample) -> bool:
-        """True if a multiplier heads for +1 and is farther from it, on the same side, at the end of a step.
+        """True if a multiplier heads for +1 and is on the same side at the end of a step, where it should have passed
+        or is farther away.
 
         The step may have gone over to an orbit that leaves at a pitchfork; shorter steps tell. Multipliers grow about
         exponentially.
@@ -381,8 +390,8 @@ class Samples:
             return False
         rates = np.log1p(off)
         ahead = rates[1] + (rates[1] - rates[0]) * (found.value - left.value) / (left.value - first.value)
-        heads = np.sign(ahead) != np.sign(rates[1]) or abs(ahead) < abs(rates[1])
-        return bool(heads and abs(rates[2]) > abs(rates[1]))
+        passes = np.sign(ahead) != np.sign(rates[1])
+        return bool(passes or (abs(ahead) < abs(rates[1]) < abs(rates[2])))
 
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
         """True if an orbit that was not predicted is on the branch of the last one: then another lies about halfway
@@ -447,4 +456,4 @@ def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
     if not into < 0.0 < out:
         return False
     meeting = (off[2] - off[1] + into * places[1] - out * places[2]) / (into - out)
-    return bool(off[1] + into * (meeting - places[1]) < _TOUCHING * off[1:3].min())
+    return bool(off[1] + into * (meeting - places[1]) < _TOUCHING * off[1:3].max())

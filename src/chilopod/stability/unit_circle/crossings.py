@@ -83,15 +83,7 @@ def find_crossings(
     least = 2 * first_places(0.0, 1.0).size
     if budget < least:
         raise ParameterError("is too small to begin", field="budget", value=budget, allowed=f"{least} or more")
-    # Over decades the logarithm of a parameter is used.
-    inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
-    a, b = float(inward(low)), float(inward(high))
-
-    def parameter(places: Any) -> Any:
-        # The exact ends, in spite of rounding in the logarithm.
-        inner = np.clip(outward(places), low, high)
-        return np.where(places <= a, low, np.where(places >= b, high, inner))
-
+    a, b, parameter = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
     status = finder.search()
@@ -100,6 +92,26 @@ def find_crossings(
         value, left, right = parameter(np.array([each.value, *each.bracket])).tolist()
         crossings.append(replace(each, value=value, bracket=(left, right)))
     return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), spectra.evaluations)
+
+
+def first_values(low: float, high: float) -> Array:
+    """First values of the parameter at which a search of an interval evaluates matrices, in order."""
+    a, b, parameter = _coordinate(low, high)
+    return np.sort(parameter(first_places(a, b)))
+
+
+def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any]]:
+    """Ends of an interval in a coordinate with an even effect of the parameter, the logarithm over decades, and the
+    parameter at places there."""
+    inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
+    a, b = float(inward(low)), float(inward(high))
+
+    def parameter(places: Any) -> Any:
+        # The exact ends, in spite of rounding in the logarithm.
+        inner = np.clip(outward(places), low, high)
+        return np.where(places <= a, low, np.where(places >= b, high, inner))
+
+    return a, b, parameter
 
 
 class _Finder:
