@@ -194,7 +194,9 @@ def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) ->
                 if move != 0.0:
                     off = max(off, abs(move) / max(size, abs(move)))
         if close:
-            step.columns[:] = right[:, 1:]
+            for i in range(s * n):
+                for k in range(n):
+                    step.columns[i, k] = right[i, 1 + k]
             return True
         if off > 2.0 * before:
             return False
@@ -225,13 +227,13 @@ def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple
         factor = step.jacobian.copy()
         for j in range(s):
             factor -= start[j] * (step.jacobians[j] @ step.columns[j * n : (j + 1) * n])
-        entries = (h * gamma) * (factor @ derivative)
+        entries = factor @ derivative
         for k in range(n):
             for m in range(n):
-                off[k, 1 + m] = entries[k, m]
+                off[k, 1 + m] = h * gamma * entries[k, m]
                 terms[k, 1 + m] = abs(derivative[k, m])
     if not _solve(filtering, inverse):
-        off[:] = math.inf
+        off.fill(math.inf)
         return off, np.zeros(off.shape)
     # No shorter step removes its round-off.
     noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(step.jacobian) @ terms))
@@ -262,7 +264,7 @@ def _estimated(
             worst = max(worst, abs(off[k, 0]) / scale)
     if derivative.shape[0] > 0:
         for i in range(s):
-            reached[i] = step.columns[i * n : (i + 1) * n] @ derivative
+            np.dot(step.columns[i * n : (i + 1) * n], derivative, reached[i])
         for k in range(n):
             for j in range(n):
                 if not near[k, j] or abs(off[k, 1 + j]) <= noise[k, 1 + j]:
@@ -298,6 +300,18 @@ def _predict(nodes: Any, ratio: float, last: Any, moved: Any) -> None:
 
 
 @fused_njit(error_model="numpy")
+def _largest_row(matrix: Any) -> float:
+    """Largest sum of moduli of a row: numba takes seconds to compile ``sum(axis=1)``."""
+    largest = 0.0
+    for i in range(matrix.shape[0]):
+        total = 0.0
+        for j in range(matrix.shape[1]):
+            total += abs(matrix[i, j])
+        largest = max(largest, total)
+    return largest
+
+
+@fused_njit(error_model="numpy")
 def _take(x: Any, step: Any, last: Any, result: Any) -> None:
     """Advance to the end of a step."""
     s, n = step.moved.shape
@@ -311,7 +325,7 @@ def _take(x: Any, step: Any, last: Any, result: Any) -> None:
             for i in range(n):
                 for k in range(n):
                     result.extent[i, k] = max(result.extent[i, k], abs(step.reached[j, i, k]))
-        result.derivative[:] = step.reached[s - 1]
+                    result.derivative[i, k] = step.reached[j, i, k]  # the last remains
 
 
 @fused_njit(error_model="numpy")
@@ -357,7 +371,7 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
             for i in range(n):
                 result.largest[i] = max(result.largest[i], abs(x[i]))
             if h == 0.0:  # the fastest rate limits the first step
-                rate = np.abs(step.jacobian).sum(axis=1).max()
+                rate = _largest_row(step.jacobian)
                 h = min(t1 - t, 1.0 / rate) if rate > 0.0 else t1 - t
             fresh = False
         steps += 1
