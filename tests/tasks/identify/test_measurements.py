@@ -1,0 +1,92 @@
+"""What further measurements would leave open of the planar constants."""
+
+import numpy as np
+import pytest
+
+from chilopod.paper.fit_data import critical_mode_data
+from chilopod.robot import load_robot
+from chilopod.tasks.identify import Identification, Measurement, check, next_measurements, planar, self_test
+from chilopod.tasks.identify.measurements import usual
+
+ROBOT = load_robot("aoi2022-planar")
+DATA = critical_mode_data()
+
+
+@pytest.fixture(scope="module")
+def found():
+    constants, residuals = planar._fit(ROBOT, DATA, np.array([ROBOT.get(path) for path in planar.FREE]))
+    ranges, cut = planar.allowed_ranges(ROBOT, DATA, constants)
+    best = planar.with_constants(ROBOT, constants)
+    rest = dict.fromkeys(("starts", "preset_residuals", "intervals", "valley", "profile"))
+    return Identification(given=ROBOT, data=DATA, best=best, residuals=residuals, ranges=ranges, cut=cut, **rest)
+
+
+def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_not_by_the_worst(found):
+    words = "mode, other springs", "critical k1, gait.", "legs.forward_offset itself"
+    chosen = [each for each in usual(found) if each.name.startswith(words)]
+    ranked = next_measurements(found, chosen).prospects
+    assert len(ranked) == len(chosen)
+    assert ranked[0].measurement.name == "mode, other springs = 20.5 N*mm/deg"
+    assert ranked[-1].measurement.name == "critical k1, gait.module_phase = 180 deg"
+    constants = np.array([found.best.get(path) for path in planar.FREE])
+    for each in (ranked[0], ranked[-1]):
+
+        def residuals(robot, each=each):
+            return (each.measurement.of(robot) - each.predicted) / each.measurement.tolerances(each.predicted)
+
+        there, _ = planar.allowed_ranges(ROBOT, DATA, constants, [residuals])
+        np.testing.assert_allclose(np.ptp(there, axis=1) / np.ptp(found.ranges, axis=1), each.ranges, atol=0.04)
+    assert ranked[0].ranges.max() < 0.8
+    assert ranked[-1].ranges.min() > 0.99
+
+
+def test_measurements_of_known_effect(found):
+    def no_effect(robot):
+        return np.array([1.0])
+
+    def jumps(robot):
+        return np.array([1.0 + (robot.legs.half_width > found.best.legs.half_width)])
+
+    def nothing(robot):
+        return np.array([0.0])
+
+    friction = Measurement("friction itself", lambda robot: np.array([robot.ground.friction]), 1e-9)
+    useless, rough = Measurement("useless", no_effect, 0.1), Measurement("jumps", jumps, 0.1)
+    given = [useless, rough, friction, Measurement("nothing", nothing, 0.1)]
+    ranked = next_measurements(found, given, free=["ground.friction", "legs.half_width"])
+    first, last = ranked.prospects
+    assert (first.measurement, last.measurement) == (friction, useless)
+    assert first.ranges[0] < 1e-6
+    assert first.volume < 1e-6
+    np.testing.assert_allclose([last.volume, *last.ranges], 1.0, atol=1e-9)
+    assert {*ranked.left_out} == {"jumps", "nothing"}
+    assert list(ranked.together) == ["friction itself", "useless"]
+    assert "friction itself" in str(ranked)
+    assert ranked.as_json()["measurements"][0]["range_left"]["ground.friction"] < 1e-6
+
+
+def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch):
+    # Where a range would be found from rounded numbers it is nothing, and everything from scattered ones.
+    monkeypatch.setattr(check, "_fitted", lambda robot, data: (data, np.zeros(3)))
+    monkeypatch.setattr(check, "allowed_ranges", lambda robot, data, best: (np.full((3, 2), np.nan), None))
+    seen = []
+
+    def everything(robot, data, best):
+        seen.append(data)
+        return np.tile([0.0, np.inf], (3, 1))
+
+    monkeypatch.setattr(check, "confidence_intervals", everything)
+    both, first = self_test(ROBOT, DATA, 2, seed=3), self_test(ROBOT, DATA, 1, seed=3)
+    np.testing.assert_array_equal(both.true[:1], first.true)
+    assert seen[0] == seen[2] != seen[1]
+    assert {kind: counts.tolist() for kind, counts in both.covered().items()} == {"rounded": [0] * 3, "normal": [2] * 3}
+    low, high = both.as_json()["normal"]["ground.friction"]["share"]
+    assert (low, high) == (pytest.approx(0.025**0.5), 1.0)  # Clopper and Pearson: two of two
+    assert "ground.friction" in str(both)
+
+
+def test_numbers_are_rounded_as_printed_ones_are():
+    exact = DATA.model_copy(update={"k1": 1.02 * DATA.k1, "components": (0.6352, 0.3581, 0.4756, 0.4649, 0.1632)})
+    there = check.rounded(exact)
+    assert there.k1 == pytest.approx(DATA.k1)
+    np.testing.assert_allclose(there.components, DATA.components[:3] + (0.46, 0.16))
