@@ -89,4 +89,4 @@ def test_numbers_are_rounded_as_printed_ones_are():
     exact = DATA.model_copy(update={"k1": 1.02 * DATA.k1, "components": (0.6352, 0.3581, 0.4756, 0.4649, 0.1632)})
     there = check.rounded(exact)
     assert there.k1 == pytest.approx(DATA.k1)
-    np.testing.assert_allclose(there.components, DATA.components[:3] + (0.46, 0.16))
+    np.testing.assert_allclose(there.components, (*DATA.components[:3], 0.46, 0.16))
