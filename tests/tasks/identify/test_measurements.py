@@ -22,22 +22,23 @@ def found():
 
 
 def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_not_by_the_worst(found):
-    words = "mode, other springs", "critical k1, gait.", "legs.forward_offset itself"
+    words = "mode, other springs", "critical k1, ", "legs.forward_offset itself"
     chosen = [each for each in usual(found) if each.name.startswith(words)]
-    ranked = next_measurements(found, chosen).prospects
+    ranked = next_measurements(found, chosen).rows
     assert len(ranked) == len(chosen)
-    assert ranked[0].measurement.name == "mode, other springs = 20.5 N*mm/deg"
-    assert ranked[-1].measurement.name == "critical k1, gait.module_phase = 180 deg"
-    constants = np.array([found.best.get(path) for path in planar.FREE])
-    for each in (ranked[0], ranked[-1]):
+    assert ranked[0]["measurement"] == "mode, other springs = 20.5 N*mm/deg"
+    assert ranked[-1]["measurement"] == "critical k1, module phase 180 deg"
+    constants, made = np.array([found.best.get(path) for path in planar.FREE]), {each.name: each for each in chosen}
+    for row in (ranked[0], ranked[-1]):
 
-        def residuals(robot, each=each):
-            return (each.measurement.of(robot) - each.predicted) / each.measurement.tolerances(each.predicted)
+        def residuals(robot, row=row):
+            return (made[row["measurement"]].of(robot) - row["predicted_si"]) / row["tolerances_si"]
 
         there, _ = planar.allowed_ranges(ROBOT, DATA, constants, [residuals])
-        np.testing.assert_allclose(np.ptp(there, axis=1) / np.ptp(found.ranges, axis=1), each.ranges, atol=0.04)
-    assert ranked[0].ranges.max() < 0.8
-    assert ranked[-1].ranges.min() > 0.99
+        left = np.ptp(there, axis=1) / np.ptp(found.ranges, axis=1)
+        np.testing.assert_allclose(left, [*row["range_left"].values()], atol=0.04)
+    assert max(ranked[0]["range_left"].values()) < 0.8
+    assert min(ranked[-1]["range_left"].values()) > 0.99
 
 
 def test_measurements_of_known_effect(found):
@@ -54,15 +55,13 @@ def test_measurements_of_known_effect(found):
     useless, rough = Measurement("useless", no_effect, 0.1), Measurement("jumps", jumps, 0.1)
     given = [useless, rough, friction, Measurement("nothing", nothing, 0.1)]
     ranked = next_measurements(found, given, free=["ground.friction", "legs.half_width"])
-    first, last = ranked.prospects
-    assert (first.measurement, last.measurement) == (friction, useless)
-    assert first.ranges[0] < 1e-6
-    assert first.volume < 1e-6
-    np.testing.assert_allclose([last.volume, *last.ranges], 1.0, atol=1e-9)
+    first, last = ranked.rows
+    assert (first["measurement"], last["measurement"]) == ("friction itself", "useless")
+    assert first["range_left"]["ground.friction"] < 1e-6
+    assert first["volume_left"] < 1e-6
+    np.testing.assert_allclose([last["volume_left"], *last["range_left"].values()], 1.0, atol=1e-9)
     assert {*ranked.left_out} == {"jumps", "nothing"}
-    assert list(ranked.together) == ["friction itself", "useless"]
     assert "friction itself" in str(ranked)
-    assert ranked.as_json()["measurements"][0]["range_left"]["ground.friction"] < 1e-6
 
 
 def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch):
@@ -79,8 +78,10 @@ def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch)
     both, first = self_test(ROBOT, DATA, 2, seed=3), self_test(ROBOT, DATA, 1, seed=3)
     np.testing.assert_array_equal(both.true[:1], first.true)
     assert seen[0] == seen[2] != seen[1]
-    assert {kind: counts.tolist() for kind, counts in both.covered().items()} == {"rounded": [0] * 3, "normal": [2] * 3}
-    low, high = both.as_json()["normal"]["ground.friction"]["share"]
+    counts = both.as_json()
+    assert [each["covered"] for each in counts["rounded"].values()] == [0, 0, 0]
+    assert [each["covered"] for each in counts["scattered"].values()] == [2, 2, 2]
+    low, high = counts["scattered"]["ground.friction"]["share"]
     assert (low, high) == (pytest.approx(0.025**0.5), 1.0)  # Clopper and Pearson: two of two
     assert "ground.friction" in str(both)
 

@@ -1,4 +1,4 @@
-"""Critical springs of robots that differ little, by Newton's method, with their derivatives over constants.
+"""Critical springs of robots that differ little.
 
 A search finds every point of an interval. A robot beside one whose critical spring is known has a critical spring
 nearby: there the return map of the straight walk has the multiplier of a pitchfork, -1 over half a period if the gait
@@ -9,7 +9,7 @@ points farther away.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
 
 import numpy as np
 
@@ -23,45 +23,11 @@ from chilopod.stability import Kind
 
 _STEP = 1e-6  # of differences, relative
 _MOST, _FOUND = 12, 1e-12  # steps of Newton's method, and the last one, relative
-_FARTHEST = 0.3  # relative step
-_BESIDE = 0.3  # distance of another multiplier at which Newton's method gives up
+_FARTHEST = 0.3  # relative step, and distance of the multiplier, at which Newton's method gives up
 
 
-@dataclass(frozen=True)
-class CriticalSpring:
-    """Critical spring of a robot's straight walk.
-
-    Attributes
-    ----------
-    robot
-        Robot with the critical spring k1.
-    spring, mode
-        k1, N*m/rad, and the joint angles of the critical mode, of unit norm and positive sum, shape (N-1,).
-    """
-
-    robot: Robot
-    spring: float
-    mode: Array
-    _map: Array
-    _left: Array
-    _right: Array
-    _slope: Array  # of the return map over the spring
-
-    def derivative(self, beside: Sequence[Robot], steps: Array) -> tuple[Array, Array]:
-        """Derivatives of spring and mode over constants, shapes (constants,) and (N-1, constants), from robots that
-        differ from this one by a step of one constant each."""
-        robots = [each.with_value(K1, self.spring) for each in beside]
-        changes = (_maps(robots) - self._map) / np.asarray(steps)[:, None, None]
-        springs = -(self._left @ changes @ self._right) / (self._left @ self._slope @ self._right)
-        totals = changes + springs[:, None, None] * self._slope
-        n, multiplier = len(self._map), self._left @ self._map @ self._right
-        bordered = np.block([[self._map - multiplier * np.eye(n), self._right[:, None]], [self._right, np.zeros(1)]])
-        right = np.vstack([-(totals @ self._right).T, np.zeros(len(springs))])
-        angles = slice(3, 2 + self.robot.body.modules)
-        moved = np.linalg.solve(bordered, right)[:n][angles]
-        part = self._right[angles]
-        norm = np.linalg.norm(part) * np.sign(part.sum())
-        return springs, (moved - np.outer(self.mode, self.mode @ moved)) / norm
+Critical = tuple[float, Array]
+"""Critical k1, N*m/rad, and joint angles of the mode, of unit norm and positive sum, shape (N-1,)."""
 
 
 class Pitchforks:
@@ -71,50 +37,42 @@ class Pitchforks:
     def __init__(self, between: Sequence[float]) -> None:
         self._between, self._near = between, 0.0
 
-    def __call__(self, robot: Robot) -> CriticalSpring | None:
-        """The critical spring of a robot; None if there is none."""
-        point = _critical_spring(robot, self._near) if self._near else None
-        if point is None and (found := searched(robot, self._between)) is not None:
-            point = _critical_spring(robot, found[0])
-        self._near = self._near if point is None else point.spring
-        return point
+    def __call__(self, robot: Robot) -> Critical | None:
+        """Spring and mode of a robot; None if it has no pitchfork."""
+        found = _beside(robot, self._near) if self._near else None
+        if found is None and (other := searched(robot, self._between)) is not None:
+            found = _beside(robot, other[0])
+        self._near = self._near if found is None else found[0]
+        return found
 
 
-def searched(robot: Robot, between: Sequence[float]) -> tuple[float, Array] | None:
-    """Spring, N*m/rad, and mode of the last pitchfork in k1 in an interval; None if there is none."""
-    try:
-        points = bifurcations(robot, K1, (between[0], between[1]), normal_form=False)
-    except AnalysisError:
-        return None
-    points = [each for each in points if each.point.kind is Kind.PITCHFORK]
-    if not points:
-        return None
-    components = points[-1].joint_components.real
-    return points[-1].point.value, components * np.sign(components.sum())
+def searched(robot: Robot, between: Sequence[float]) -> Critical | None:
+    """Spring and mode of the last pitchfork in k1 in an interval; None if there is none."""
+    with suppress(AnalysisError):
+        for each in reversed(bifurcations(robot, K1, (between[0], between[1]), normal_form=False)):
+            if each.point.kind is Kind.PITCHFORK:
+                components = each.joint_components.real
+                return each.point.value, components * np.sign(components.sum())
+    return None
 
 
-def _critical_spring(robot: Robot, near: float) -> CriticalSpring | None:
-    """Critical k1 of a robot near a value, N*m/rad; None if Newton's method finds none."""
-    spring = near
-    try:
+def _beside(robot: Robot, near: float) -> Critical | None:
+    """Spring near another, and mode; None if Newton's method finds none."""
+    spring, target = near, 1.0 if PlanarModel(robot).symmetry is None else -1.0
+    with suppress(AnalysisError, np.linalg.LinAlgError):
         for _ in range(_MOST):
-            robots = [robot.with_value(K1, spring * (1.0 + step)) for step in (0.0, _STEP)]
-            here, there = _maps(robots)
-            target = 1.0 if PlanarModel(robot).symmetry is None else -1.0
+            here, there = _maps([robot.with_value(K1, spring * (1.0 + step)) for step in (0.0, _STEP)])
             values, vectors = np.linalg.eig(here)
             at = int(np.abs(values - target).argmin())
-            if abs(values[at] - target) > _BESIDE or values[at].imag != 0.0:
+            if abs(values[at] - target) > _FARTHEST or values[at].imag != 0.0:
                 return None
             right, left = vectors[:, at].real, np.linalg.inv(vectors)[at].real
-            slope = (there - here) / (_STEP * spring)
-            step = (target - values[at].real) / (left @ slope @ right)
+            slope = left @ (there - here) @ right / (_STEP * spring)
+            step = float((target - values[at].real) / slope)
             if abs(step) <= _FOUND * spring:
-                part = right[3 : 2 + robot.body.modules]
-                mode = part / np.linalg.norm(part) * np.sign(part.sum())
-                return CriticalSpring(robots[0], spring, mode, here, left, right, slope)
-            spring += float(np.clip(step, -_FARTHEST * spring, _FARTHEST * spring))
-    except (AnalysisError, np.linalg.LinAlgError):
-        pass
+                part = right[3 : robot.body.modules + 2]
+                return spring, part / np.linalg.norm(part) * np.sign(part.sum())
+            spring += min(max(step, -_FARTHEST * spring), _FARTHEST * spring)
     return None
 
 

@@ -1,10 +1,9 @@
 """Measurements that would tell most about the planar constants that an identification leaves open.
 
-About the best constants each measurement is linear in the constants. What it would leave of the range of a constant is
-the projection of the polytope in which all data, old and new, are met within their tolerances, if the new ones come out
-as the best constants predict. What it would leave of the volume is that of the ellipsoid for tolerances that are
-standard errors, the criterion of D-optimal design. Measurements are ranked by that, and so are those that are made
-together.
+About the best constants each measurement is linear in them. What it would leave of the range of a constant is the
+projection of the polytope in which all data, old and new, are within their tolerances, if the new ones come out as
+predicted. What it would leave of the volume is that of the ellipsoid for tolerances that are standard errors, the
+criterion of D-optimal design.
 """
 
 from __future__ import annotations
@@ -31,17 +30,15 @@ from chilopod.stability import Kind
 from chilopod.tasks.identify.critical import Pitchforks
 from chilopod.tasks.identify.planar import FREE, Identification, jacobian, scale_of, with_constants
 
-_STEP = 1e-3  # of differences, in the units of `scale_of`
-_AGREE = 0.05  # relative, of differences with this step and its double
-_BEYOND = 2.0  # factor by which critical springs of changed robots may leave the interval of the data
+_STEP, _AGREE = 1e-3, 0.05  # of differences, in units of `scale_of`, and how well they agree with those of its double
+_CHANGES = {ALL: (0.5, 0.7, 1.5), "gait.stride": (0.6, 1.5), "gait.stance": (1.5,)}  # factors
 _ORBIT = 1e-10  # tolerance of the flow of curved walks
-_TOGETHER = 3  # measurements
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measurement that could be made: its name, the numbers as a function of a robot with certain constants, SI, and
-    their tolerance, absolute or relative to the number."""
+    """A measurement that could be made: its name, its numbers as a function of a robot with certain constants, SI, and
+    their tolerance, relative to them or absolute."""
 
     name: str
     of: Callable[[Robot], Array] = field(repr=False)
@@ -50,254 +47,165 @@ class Measurement:
 
     def tolerances(self, numbers: Array) -> Array:
         """Tolerance of each of the numbers."""
-        return np.abs(numbers) * self.tolerance if self.relative else np.full(numbers.shape, self.tolerance)
-
-
-@dataclass(frozen=True)
-class Prospect:
-    """What a measurement would leave open, relative to the present state.
-
-    Attributes
-    ----------
-    measurement, predicted
-        The measurement, and the numbers at the best constants, SI.
-    slopes
-        Their derivatives over the free constants in units of :func:`scale_of`, over their tolerances, shape (numbers,
-        constants).
-    volume, ranges
-        Parts that it would leave of the volume of the constants, and of the range of each, shape (constants,).
-    """
-
-    measurement: Measurement
-    predicted: Array
-    slopes: Array
-    volume: float
-    ranges: Array
+        return self.tolerance * (np.abs(numbers) if self.relative else np.ones(numbers.shape))
 
 
 @dataclass(frozen=True)
 class NextMeasurements(Shown):
-    """Measurements ranked by what they would leave open.
+    """Measurements, that which would leave least of the volume of the free constants first, and measurements that could
+    not be predicted, with the reason.
 
-    Attributes
-    ----------
-    prospects, free
-        The measurements, best first, and the constants that are free.
-    together
-        Names of three measurements of which each is the best beside those before it, and the part of the volume that
-        they leave.
-    left_out
-        Measurements that could not be predicted, with the reason.
+    ``rows`` have, of each ``measurement``, its ``tolerance``, its numbers and their tolerances (``predicted_si``,
+    ``tolerances_si``), and the parts that it would leave of the volume and of the range of each constant.
     """
 
-    prospects: list[Prospect]
-    free: tuple[str, ...]
-    together: dict[str, float]
+    rows: list[dict[str, Any]]
     left_out: dict[str, str]
 
     def as_json(self) -> dict[str, Any]:
-        """Prospects as plain numbers."""
-        rows = [
-            {
-                "measurement": each.measurement.name,
-                "predicted_si": each.predicted.tolist(),
-                "tolerances_si": each.measurement.tolerances(each.predicted).tolist(),
-                "volume_left": each.volume,
-                "range_left": dict(zip(self.free, each.ranges.tolist(), strict=True)),
-            }
-            for each in self.prospects
-        ]
-        return {"measurements": rows, "together": self.together, "left_out": self.left_out}
+        """The fields, as plain numbers."""
+        return {"measurements": self.rows, "left_out": self.left_out}
 
     def lines(self) -> list[str]:
         """The table, best first, and what was left out."""
-        rows: list[Sequence[str]] = [("next measurement", "tolerance", "leaves of the volume", *self.free)]
-        for each in self.prospects:
-            made = each.measurement
-            tolerance = f"{100.0 * made.tolerance:.2g} %" if made.relative else f"{made.tolerance:.2g}"
-            rows.append((made.name, tolerance, *(f"{100.0 * part:.3g} %" for part in (each.volume, *each.ranges))))
-        parts = (f"{name} (with those before it {100.0 * part:.2g} %)" for name, part in self.together.items())
-        said = [f"best together: {'; '.join(parts)}"] if self.together else []
-        return [*aligned(rows), *said, *(f"left out: {name}: {why}" for name, why in self.left_out.items())]
+        table: list[Sequence[str]] = []
+        for row in self.rows:
+            table = table or [("next measurement", "tolerance", "leaves of the volume", *row["range_left"])]
+            parts = (f"{100.0 * part:.3g} %" for part in (row["volume_left"], *row["range_left"].values()))
+            table.append((row["measurement"], row["tolerance"], *parts))
+        return [*aligned(table), *(f"left out: {name}: {why}" for name, why in self.left_out.items())]
 
-    def _lines(self) -> list[str]:
-        return self.lines()
+    _lines = lines
 
 
 def next_measurements(
     found: Identification,
     candidates: Sequence[Measurement] | None = None,
-    free: Sequence[str] = (),
+    free: Sequence[str] = FREE,
     progress: Progress = silent,
 ) -> NextMeasurements:
-    """Rank measurements by what they would leave of the volume of the constants.
-
-    Parameters
-    ----------
-    found
-        Identification of the constants.
-    candidates
-        Measurements; by default those of :func:`usual`.
-    free
-        Constants that are not known, all of :data:`FREE` by default; the others are taken as they were found.
-    progress
-        Function that receives the progress.
-    """
-    robot, data = found.best, found.data
-    free = tuple(free or FREE)
+    """Rank measurements, by default :func:`usual`, by what they would leave of the volume of the constants that are
+    ``free``; the others are taken as they were found."""
     columns = [FREE.index(path) for path in free]
-    best, scale = np.array([robot.get(path) for path in FREE]), scale_of(robot, data)
-    known = jacobian(robot, data, best)[:, columns]
-    now, prospects, left_out = _widths(known, found.residuals), [], {}
-    given = list(usual(found)) if candidates is None else list(candidates)
+    known = jacobian(found.best, found.data, np.array([found.best.get(path) for path in FREE]))[:, columns]
+    now, information = _widths(known, found.residuals), known.T @ known
+    rows, left_out = [], {}
+    given = list(usual(found)) if candidates is None else candidates
     for number, each in enumerate(given):
         progress(number / len(given), each.name)
         try:
-            predicted, slopes = _derivative(each, robot, best, scale, columns)
+            predicted, slopes = _linear(each, found, columns)
         except ChilopodError as error:
             left_out[each.name] = str(error)
             continue
-        tolerances = each.tolerances(predicted)
-        if not tolerances.all():
-            left_out[each.name] = "the number is zero, and so is a tolerance relative to it"
-            continue
-        slopes = slopes / tolerances[:, None]
-        expected = np.append(found.residuals, np.zeros(len(slopes)))
-        ranges = _widths(np.vstack([known, slopes]), expected) / now
-        prospects.append(Prospect(each, predicted, slopes, _volume(known, slopes), ranges))
-    prospects.sort(key=lambda each: each.volume)
-    return NextMeasurements(prospects, free, _together(known, prospects), left_out)
+        left = np.linalg.det(information) / np.linalg.det(information + slopes.T @ slopes)
+        ranges = _widths(np.vstack([known, slopes]), np.append(found.residuals, np.zeros(len(slopes)))) / now
+        rows.append(
+            {
+                "measurement": each.name,
+                "tolerance": f"{100.0 * each.tolerance:.2g} %" if each.relative else f"{each.tolerance:.2g}",
+                "predicted_si": predicted.tolist(),
+                "tolerances_si": each.tolerances(predicted).tolist(),
+                "volume_left": float(np.sqrt(left)),
+                "range_left": dict(zip(free, ranges.tolist(), strict=True)),
+            }
+        )
+    return NextMeasurements(sorted(rows, key=lambda row: row["volume_left"]), left_out)
 
 
-def _volume(known: Array, slopes: Array) -> float:
-    """Part of the volume of the constants that more residuals leave, from derivatives of the old and the new."""
-    before, after = known.T @ known, known.T @ known + slopes.T @ slopes
-    return float(np.sqrt(np.linalg.det(before) / np.linalg.det(after)))
+def _linear(measurement: Measurement, found: Identification, columns: Sequence[int]) -> tuple[Array, Array]:
+    """Predicted numbers, and their derivatives over constants in units of :func:`scale_of`, over their tolerances, by
+    central differences with two steps that must agree."""
+    best, scale = np.array([found.best.get(path) for path in FREE]), scale_of(found.best, found.data)
 
+    def at(move: Array) -> Array:
+        return np.asarray(measurement.of(with_constants(found.best, best + move * scale)))
 
-def _together(known: Array, prospects: Sequence[Prospect]) -> dict[str, float]:
-    chosen: dict[str, float] = {}
-    made = np.zeros((0, known.shape[1]))
-    while len(chosen) < min(_TOGETHER, len(prospects)):
-        rest = [each for each in prospects if each.measurement.name not in chosen]
-        best = min(rest, key=lambda each: _volume(known, np.vstack([made, each.slopes])))
-        made = np.vstack([made, best.slopes])
-        chosen[best.measurement.name] = _volume(known, made)
-    return chosen
-
-
-def _derivative(
-    measurement: Measurement, robot: Robot, best: Array, scale: Array, columns: Sequence[int]
-) -> tuple[Array, Array]:
-    """Predicted numbers and their central differences over free constants in units of :func:`scale_of`, extrapolated
-    from two steps that must agree."""
-    predicted = np.asarray(measurement.of(with_constants(robot, best)))
-    slopes = []
-    for direction in np.eye(len(FREE))[list(columns)]:
-        moves = [step * _STEP * direction * scale for step in (1.0, -1.0, 2.0, -2.0)]
-        near, back, far, far_back = (np.asarray(measurement.of(with_constants(robot, best + move))) for move in moves)
-        fine, coarse = (near - back) / (2.0 * _STEP), (far - far_back) / (4.0 * _STEP)
-        if np.abs(fine - coarse).max() > _AGREE * max(np.abs(fine).max(), 1e-6 * np.abs(predicted).max()):
-            raise AnalysisError("must be smooth in the constants", field=measurement.name)
-        slopes.append((4.0 * fine - coarse) / 3.0)
-    return predicted, np.array(slopes).T
+    predicted = at(np.zeros(len(FREE)))
+    tolerances = measurement.tolerances(predicted)
+    if not tolerances.all():
+        raise AnalysisError("the tolerance must not be zero, as that of a number that is zero")
+    moves = _STEP * np.eye(len(FREE))[columns]
+    fine, coarse = (np.array([at(f * m) - at(-f * m) for m in moves]).T / (2.0 * f * _STEP) for f in (1.0, 2.0))
+    fine, coarse = fine / tolerances[:, None], coarse / tolerances[:, None]
+    if np.abs(fine - coarse).max() > _AGREE * max(np.abs(fine).max(), 1.0):
+        raise AnalysisError("the numbers must be smooth in the constants")
+    return predicted, (4.0 * fine - coarse) / 3.0
 
 
 def _widths(slopes: Array, residuals: Array) -> Array:
     """Widths of the projections of {max |residuals + slopes d| <= max(1, max |residuals|)}, shape (constants,)."""
     most = max(1.0, float(np.abs(residuals).max()))
     sides = np.vstack([slopes, -slopes]), np.concatenate([most - residuals, most + residuals])
-    goals = np.vstack([np.eye(slopes.shape[1]), -np.eye(slopes.shape[1])])
-    least = np.array([linprog(goal, *sides, bounds=(None, None)).fun for goal in goals])
-    return -least[: slopes.shape[1]] - least[slopes.shape[1] :]
+    goals = np.eye(slopes.shape[1])
+    least, negative = (
+        [linprog(sign * goal, *sides, bounds=(None, None)).fun for goal in goals] for sign in (1.0, -1.0)
+    )
+    return -np.array(least) - np.array(negative)
 
 
 def usual(found: Identification) -> Iterator[Measurement]:
-    """Measurements that owners of such a robot could make. Springs, rates, radii and lengths have the relative
-    tolerance of the data's spring, modes that of the data's mode."""
+    """Measurements that owners of such a robot could make: springs, rates, radii and lengths with the relative
+    tolerance of the data's spring, modes with that of the data's mode."""
     robot, data = found.best, found.data
     rough, fine = data.k1_tolerance / data.k1, data.component_tolerance
-    between = data.between[0] / _BEYOND, data.between[1] * _BEYOND
-    yield Measurement("critical k1, twice as exact", _critical({}, data.between, slice(1)), 0.5 * rough)
-    yield Measurement("mode, twice as exact", _critical({}, data.between, slice(1, None)), 0.5 * fine, relative=False)
-    for words, change in _changes(robot).items():
-        yield Measurement(f"critical k1, {words}", _critical(change, between, slice(1)), rough)
-        yield Measurement(f"mode, {words}", _critical(change, between, slice(1, None)), fine, relative=False)
-    yield Measurement("critical spring, all springs alike", _undulation(between, 0), rough)
-    yield Measurement("frequency of undulation there", _undulation(between, 1), rough)
     critical = data.k1 + float(found.residuals[0]) * data.k1_tolerance
-    for factor in (4.0, 2.0, 0.8):
-        what = "decay" if factor > 1.0 else "growth"
-        yield Measurement(
-            f"{what} after a push, {_said(robot, K1, factor * critical)}", _rate(factor * critical), rough
-        )
-    for factor in (0.95, 0.8, 0.6):
-        of = _radius(factor * critical, 1.1 * critical)
-        yield Measurement(f"radius of the curve, {_said(robot, K1, factor * critical)}", of, rough)
-    for path in FREE:
-        yield Measurement(f"{path} itself", _own(path), rough)
 
+    def said(path: str, value: float) -> str:
+        name = {K1: "k1", ALL: "other springs"}.get(path, path)
+        return f"{name} = {units.format(value, robot.unit_of(path), digits=3)}"
 
-def _changes(robot: Robot) -> dict[str, dict[str, float]]:
-    """Changed values of a robot by what is said of them."""
-    changes = {}
-    for path, factors in {ALL: (0.5, 0.7, 1.5), "gait.stride": (0.6, 1.5), "gait.stance": (1.5,)}.items():
+    changes = [("twice as exact", K1, critical, 0.5), ("module phase 180 deg", "gait.module_phase", np.pi, 1.0)]
+    for path, factors in _CHANGES.items():
         present = robot.springs.stiffness[-1] if path == ALL else robot.get(path)
-        for factor in factors:
-            changes[_said(robot, path, factor * present)] = {path: factor * present}
-    return {**changes, "gait.module_phase = 180 deg": {"gait.module_phase": np.pi}}
+        changes += [(said(path, factor * present), path, factor * present, 1.0) for factor in factors]
+    for words, path, value, part in changes:
+        of = _critical(path, value, data.between)
+        yield Measurement(f"critical k1, {words}", lambda robot, of=of: of(robot)[:1], part * rough)
+        yield Measurement(f"mode, {words}", lambda robot, of=of: of(robot)[1:], part * fine, relative=False)
+    for part, words in enumerate(("critical spring", "frequency of undulation")):
+        yield Measurement(f"{words}, all springs alike", _undulation(data.between, part), rough)
+    for words, spring in (("decay", 4.0 * critical), ("decay", 2.0 * critical), ("growth", 0.8 * critical)):
+        yield Measurement(f"{words} after a push, {said(K1, spring)}", _rate(spring), rough)
+    for spring in critical * np.array([0.95, 0.8, 0.6]):
+        yield Measurement(f"radius, {said(K1, spring)}", _radius(spring, 1.1 * critical), rough)
+    for path in FREE:
+        yield Measurement(f"{path} itself", lambda robot, path=path: np.array([robot.get(path)]), rough)
 
 
-def _said(robot: Robot, path: str, value: float) -> str:
-    name = {K1: "k1", ALL: "other springs"}.get(path, path)
-    return f"{name} = {units.format(value, robot.unit_of(path), digits=3)}"
-
-
-def _critical(change: dict[str, float], between: Sequence[float], part: slice) -> Callable[[Robot], Array]:
+def _critical(path: str, value: float, between: Sequence[float]) -> Callable[[Robot], Array]:
+    """Critical spring and mode of a robot with a changed value."""
     pitchforks = Pitchforks(between)
 
     def of(robot: Robot) -> Array:
-        for path, value in change.items():
-            robot = robot.with_value(path, value)
-        point = pitchforks(robot)
+        point = pitchforks(robot.with_value(path, value))
         if point is None:
-            raise AnalysisError("no pitchfork in the interval of the data or beside it", field=K1)
-        return np.append(point.spring, point.mode)[part]
+            raise AnalysisError("there must be a pitchfork in the interval of the data")
+        return np.append(*point)
 
     return of
 
 
-def _undulation(between: tuple[float, float], part: int) -> Callable[[Robot], Array]:
+def _undulation(between: Sequence[float], part: int) -> Callable[[Robot], Array]:
     def of(robot: Robot) -> Array:
-        point = first_loss(robot, ALL, between, Kind.NEIMARK_SACKER, normal_form=False).point
+        point = first_loss(robot, ALL, (between[0], between[1]), Kind.NEIMARK_SACKER, normal_form=False).point
         return np.array([(point.value, point.frequency)[part]])
 
     return of
 
 
-def _own(path: str) -> Callable[[Robot], Array]:
-    return lambda robot: np.array([robot.get(path)])
-
-
 def _rate(spring: float) -> Callable[[Robot], Array]:
-    def of(robot: Robot) -> Array:
-        values = stability.exponents(PlanarModel(robot.with_value(K1, spring))).values
-        return np.array([values.real.max()])
-
-    return of
+    return lambda robot: stability.exponents(PlanarModel(robot.with_value(K1, spring))).values.real.max(keepdims=True)
 
 
 def _radius(spring: float, above: float) -> Callable[[Robot], Array]:
-    orbits: list[Array] = []
+    orbits: list[Array] = []  # the first is followed from the pitchfork, the others are beside it
 
     def of(robot: Robot) -> Array:
         if not orbits:
             orbits.append(curved_walks(robot, K1, (spring, above)).orbit.values[-1])
         model = FollowedModel(robot.with_value(K1, spring), _ORBIT, use_symmetry=False)
         orbit = np.asarray(stability.find_orbit(model, orbits[0], with_error=False, settle=False))
-        radius = float(robot.axis_radius(walk_means([model], [orbit]).mean_angle)[0])
-        if not radius < 1e3 * robot.body.length:
-            raise AnalysisError("the robot must curve", field=K1)
-        return np.array([radius])
+        return np.asarray(robot.axis_radius(walk_means([model], [orbit]).mean_angle))
 
     return of

@@ -31,7 +31,7 @@ from chilopod.notebook import Summary, axes_for
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.tasks.identify.critical import CriticalSpring, Pitchforks, searched
+from chilopod.tasks.identify.critical import Critical, Pitchforks, searched
 from chilopod.tasks.identify.data import CriticalMode
 
 if TYPE_CHECKING:
@@ -184,8 +184,7 @@ def residuals(robot: Robot, data: CriticalMode) -> Array:
     if len(data.components) != count - 1:
         problem = f"must be {count - 1} numbers, one for each joint of {robot.name}"
         raise AnalysisError(problem, field="data components", value=data.components)
-    found = searched(robot, data.between)
-    return np.full(count, _NO_PITCHFORK) if found is None else _off(*found, data)
+    return _off(searched(robot, data.between), robot, data)
 
 
 def with_constants(robot: Robot, constants: Array) -> Robot:
@@ -253,42 +252,28 @@ class _Residuals:
     def __init__(self, robot: Robot, data: CriticalMode, more: Sequence[Callable[[Robot], Array]] = ()) -> None:
         self._robot, self._data, self._scale, self._more = robot, data, scale_of(robot, data), more
         self._pitchfork = Pitchforks(data.between)
-        self._points: dict[bytes, tuple[CriticalSpring | None, Array]] = {}
-
-    def _robot_with(self, scaled: Array) -> Robot:
-        return with_constants(self._robot, scaled * self._scale)
-
-    def _others(self, robot: Robot) -> Array:
-        return np.concatenate([np.zeros(0), *(each(robot) for each in self._more)])
-
-    def _point(self, scaled: Array) -> tuple[CriticalSpring | None, Array]:
-        key = scaled.tobytes()
-        if key not in self._points:
-            robot = self._robot_with(scaled)
-            self._points[key] = self._pitchfork(robot), self._others(robot)
-        return self._points[key]
+        self._values: dict[bytes, Array] = {}
 
     def __call__(self, scaled: Array) -> Array:
-        point, others = self._point(scaled)
-        if point is None:
-            return np.append(np.full(self._robot.body.modules, _NO_PITCHFORK), others)
-        return np.append(_off(point.spring, point.mode, self._data), others)
+        key = scaled.tobytes()
+        if key not in self._values:
+            robot = with_constants(self._robot, scaled * self._scale)
+            off = _off(self._pitchfork(robot), robot, self._data)
+            self._values[key] = np.concatenate([off, *(each(robot) for each in self._more)])
+        return self._values[key]
 
     def jacobian(self, scaled: Array) -> Array:
-        """Derivatives, shape (residuals, 3)."""
-        point, others = self._point(scaled)
-        beside = [self._robot_with(step) for step in scaled + _STEP * np.eye(len(FREE))]
-        slopes = np.zeros((self._robot.body.modules, len(FREE)))
-        if point is not None:
-            springs, modes = point.derivative(beside, np.full(len(FREE), _STEP))
-            slopes = np.vstack([springs / self._data.k1_tolerance, modes / self._data.component_tolerance])
-        return np.vstack([slopes, np.array([self._others(robot) - others for robot in beside]).T / _STEP])
+        """Forward differences, shape (residuals, 3)."""
+        beside = np.array([self(step) for step in scaled + _STEP * np.eye(len(FREE))])
+        return ((beside - self(scaled)) / _STEP).T
 
 
-def _off(spring: float, mode: Array, data: CriticalMode) -> Array:
+def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
     """Spring and mode less the data, over their tolerances."""
-    components = (mode - np.array(data.components)) / data.component_tolerance
-    return np.append((spring - data.k1) / data.k1_tolerance, components)
+    if found is None:
+        return np.full(robot.body.modules, _NO_PITCHFORK)
+    components = (found[1] - np.array(data.components)) / data.component_tolerance
+    return np.append((found[0] - data.k1) / data.k1_tolerance, components)
 
 
 def allowed_ranges(
@@ -318,9 +303,10 @@ def allowed_ranges(
                     method="SLSQP", bounds=bounds, constraints=[within], options={"maxiter": 60, "ftol": 1e-8},
                 ).x  # fmt: skip
                 known = ends.get((constant, side))
-                nearer = known is None or goal @ found < goal @ known
-                searched_off = np.append(residuals(with_constants(robot, found * scale), data), off(found))
-                if nearer and np.abs(searched_off).max() <= _MET:
+                if known is not None and goal @ found >= goal @ known:
+                    continue
+                searched_off = residuals(with_constants(robot, found * scale), data)
+                if np.abs(np.append(searched_off, off(found))).max() <= _MET:
                     ends[constant, side] = found
     ranges, cut = np.full((len(FREE), 2), np.nan), np.zeros((len(FREE), 2), dtype=np.bool_)
     if len(ends) == ranges.size:
@@ -393,32 +379,21 @@ def _fit(robot: Robot, data: CriticalMode, start: Array) -> tuple[Array, Array]:
 
 
 def _smallest(robot: Robot, data: CriticalMode, start: Array) -> Array:
-    """Constants with the offset of ``start`` whose largest residual is smallest, near the fit by least squares."""
+    """Constants with the offset of ``start`` whose largest residual is smallest."""
     off, scale = _Residuals(robot, data), scale_of(robot, data)
 
-    def all_of(free: Array) -> Array:
-        return np.append(free[:2], start[2] / scale[2])
-
-    def within(free: Array) -> Array:
-        found = off(all_of(free))
-        return np.concatenate([free[2] - found, free[2] + found])
-
-    def slopes(free: Array) -> Array:
-        found = off.jacobian(all_of(free))[:, :2]
-        return np.hstack([np.concatenate([-found, found]), np.ones((2 * len(found), 1))])
-
-    near = least_squares(
-        lambda free: off(all_of(free)), start[:2] / scale[:2], lambda free: off.jacobian(all_of(free))[:, :2],
-        (_LEAST[:2], _MOST[:2]), x_scale=0.1,
-    ).x  # fmt: skip
-    last = np.array([0.0, 0.0, 1.0])
+    sides = np.array([[-1.0], [1.0]])
+    within = {
+        "type": "ineq",
+        "fun": lambda free: free[3] + np.kron(sides, off(free[:3])[:, None])[:, 0],
+        "jac": lambda free: np.insert(np.kron(sides, off.jacobian(free[:3])), 3, 1.0, axis=1),
+    }
+    bounds = [*zip(_LEAST[:2], _MOST[:2], strict=True), (start[2] / scale[2],) * 2, (0.0, None)]
     found = minimize(
-        lambda free: free[2], np.append(near, np.abs(off(all_of(near))).max()), jac=lambda free: last,
-        method="SLSQP", bounds=[*zip(_LEAST[:2], _MOST[:2], strict=True), (0.0, None)],
-        constraints=[{"type": "ineq", "fun": within, "jac": slopes}], options={"maxiter": 60, "ftol": 1e-8},
+        lambda free: free[3], np.append(start / scale, np.abs(off(start / scale)).max()), jac=lambda free: np.eye(4)[3],
+        method="SLSQP", bounds=bounds, constraints=[within], options={"maxiter": 60, "ftol": 1e-8},
     ).x  # fmt: skip
-    best = min((all_of(found), all_of(near)), key=lambda scaled: float(np.abs(off(scaled)).max()))
-    return best * scale
+    return found[:3] * scale
 
 
 def _profile(
