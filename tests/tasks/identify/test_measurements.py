@@ -1,11 +1,24 @@
 """What further measurements would leave open of the planar constants."""
 
+import json
+
 import numpy as np
 import pytest
 
+from chilopod.cli import main
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import Identification, Measurement, check, next_measurements, planar, self_test
+from chilopod.tasks import identify
+from chilopod.tasks.identify import (
+    Identification,
+    Measurement,
+    NextMeasurements,
+    SelfTest,
+    check,
+    next_measurements,
+    planar,
+    self_test,
+)
 from chilopod.tasks.identify.measurements import usual
 
 ROBOT = load_robot("aoi2022-planar")
@@ -17,7 +30,8 @@ def found():
     constants, residuals = planar._fit(ROBOT, DATA, np.array([ROBOT.get(path) for path in planar.FREE]))
     ranges, cut = planar.allowed_ranges(ROBOT, DATA, constants)
     best = planar.with_constants(ROBOT, constants)
-    rest = dict.fromkeys(("starts", "preset_residuals", "intervals", "valley", "profile"))
+    rest = {"starts": constants[None], "preset_residuals": residuals, "intervals": ranges, "profile": None}
+    rest["valley"] = np.ones(3), 2.0
     return Identification(given=ROBOT, data=DATA, best=best, residuals=residuals, ranges=ranges, cut=cut, **rest)
 
 
@@ -91,3 +105,19 @@ def test_numbers_are_rounded_as_printed_ones_are():
     there = check.rounded(exact)
     assert there.k1 == pytest.approx(DATA.k1)
     np.testing.assert_allclose(there.components, (*DATA.components[:3], 0.46, 0.16))
+
+
+def test_the_command_ranks_measurements_and_tests_itself(found, tmp_path, monkeypatch, capsys):
+    ranked, tested = NextMeasurements([], {"a push": "none"}), SelfTest(np.ones((1, 3)), *np.zeros((2, 1, 3, 2)))
+    for name, answer in (("identify_planar", found), ("next_measurements", ranked), ("self_test", tested)):
+        monkeypatch.setattr(identify, name, lambda *_, answer=answer, **__: answer)
+    monkeypatch.setattr("chilopod.show.figures.identification.panel", lambda found: None)
+    monkeypatch.setattr("chilopod.show.files.panel_files", lambda *_: [])
+    arguments = ["identify", "planar", "--next", "--check", "1", "--out", str(tmp_path)]
+    assert main([*arguments, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["next"], printed["check"]) == (ranked.as_json(), tested.as_json())
+    assert main([*arguments, "--force"]) == 0
+    out = capsys.readouterr().out
+    assert "left out: a push: none" in out
+    assert "self-test, 1 robots" in out

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -161,16 +162,16 @@ def usual(found: Identification) -> Iterator[Measurement]:
         changes += [(said(path, factor * present), path, factor * present, 1.0) for factor in factors]
     for words, path, value, part in changes:
         of = _critical(path, value, data.between)
-        yield Measurement(f"critical k1, {words}", lambda robot, of=of: of(robot)[:1], part * rough)
-        yield Measurement(f"mode, {words}", lambda robot, of=of: of(robot)[1:], part * fine, relative=False)
+        yield Measurement(f"critical k1, {words}", partial(_part, of, slice(1)), part * rough)
+        yield Measurement(f"mode, {words}", partial(_part, of, slice(1, None)), part * fine, relative=False)
     for part, words in enumerate(("critical spring", "frequency of undulation")):
-        yield Measurement(f"{words}, all springs alike", _undulation(data.between, part), rough)
+        yield Measurement(f"{words}, all springs alike", partial(_undulation, data.between, part), rough)
     for words, spring in (("decay", 4.0 * critical), ("decay", 2.0 * critical), ("growth", 0.8 * critical)):
-        yield Measurement(f"{words} after a push, {said(K1, spring)}", _rate(spring), rough)
+        yield Measurement(f"{words} after a push, {said(K1, spring)}", partial(_rate, spring), rough)
     for spring in critical * np.array([0.95, 0.8, 0.6]):
         yield Measurement(f"radius, {said(K1, spring)}", _radius(spring, 1.1 * critical), rough)
     for path in FREE:
-        yield Measurement(f"{path} itself", lambda robot, path=path: np.array([robot.get(path)]), rough)
+        yield Measurement(f"{path} itself", partial(_own, path), rough)
 
 
 def _critical(path: str, value: float, between: Sequence[float]) -> Callable[[Robot], Array]:
@@ -186,16 +187,21 @@ def _critical(path: str, value: float, between: Sequence[float]) -> Callable[[Ro
     return of
 
 
-def _undulation(between: Sequence[float], part: int) -> Callable[[Robot], Array]:
-    def of(robot: Robot) -> Array:
-        point = first_loss(robot, ALL, (between[0], between[1]), Kind.NEIMARK_SACKER, normal_form=False).point
-        return np.array([(point.value, point.frequency)[part]])
-
-    return of
+def _part(of: Callable[[Robot], Array], part: slice, robot: Robot) -> Array:
+    return of(robot)[part]
 
 
-def _rate(spring: float) -> Callable[[Robot], Array]:
-    return lambda robot: stability.exponents(PlanarModel(robot.with_value(K1, spring))).values.real.max(keepdims=True)
+def _own(path: str, robot: Robot) -> Array:
+    return np.array([robot.get(path)])
+
+
+def _undulation(between: Sequence[float], part: int, robot: Robot) -> Array:
+    point = first_loss(robot, ALL, (between[0], between[1]), Kind.NEIMARK_SACKER, normal_form=False).point
+    return np.array([(point.value, point.frequency)[part]])
+
+
+def _rate(spring: float, robot: Robot) -> Array:
+    return np.array([stability.exponents(PlanarModel(robot.with_value(K1, spring))).values.real.max()])
 
 
 def _radius(spring: float, above: float) -> Callable[[Robot], Array]:
