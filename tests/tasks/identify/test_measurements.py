@@ -1,11 +1,13 @@
 """What further measurements would leave open of the planar constants."""
 
+import dataclasses
 import json
 
 import numpy as np
 import pytest
 
 from chilopod.cli import main
+from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
 from chilopod.tasks import identify
@@ -15,6 +17,7 @@ from chilopod.tasks.identify import (
     NextMeasurements,
     SelfTest,
     check,
+    critical,
     next_measurements,
     planar,
     self_test,
@@ -65,16 +68,19 @@ def test_measurements_of_known_effect(found):
     def nothing(robot):
         return np.array([0.0])
 
+    def infinite(robot):
+        return np.array([np.inf])
+
     friction = Measurement("friction itself", lambda robot: np.array([robot.ground.friction]), 1e-9)
     useless, rough = Measurement("useless", no_effect, 0.1), Measurement("jumps", jumps, 0.1)
-    given = [useless, rough, friction, Measurement("nothing", nothing, 0.1)]
+    given = [useless, rough, friction, *(Measurement(each.__name__, each, 0.1) for each in (nothing, infinite))]
     ranked = next_measurements(found, given, free=["ground.friction", "legs.half_width"])
     first, last = ranked.rows
     assert (first["measurement"], last["measurement"]) == ("friction itself", "useless")
     assert first["range_left"]["ground.friction"] < 1e-6
     assert first["volume_left"] < 1e-6
     np.testing.assert_allclose([last["volume_left"], *last["range_left"].values()], 1.0, atol=1e-9)
-    assert {*ranked.left_out} == {"jumps", "nothing"}
+    assert {*ranked.left_out} == {"jumps", "nothing", "infinite"}
     assert "friction itself" in str(ranked)
 
 
@@ -89,6 +95,7 @@ def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch)
         return np.tile([0.0, np.inf], (3, 1))
 
     monkeypatch.setattr(check, "confidence_intervals", everything)
+    assert check.rounded(DATA.model_copy(update={"k1": 1.02 * DATA.k1})) == DATA
     both, first = self_test(ROBOT, DATA, 2, seed=3), self_test(ROBOT, DATA, 1, seed=3)
     np.testing.assert_array_equal(both.true[:1], first.true)
     assert seen[0] == seen[2] != seen[1]
@@ -100,11 +107,14 @@ def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch)
     assert "ground.friction" in str(both)
 
 
-def test_numbers_are_rounded_as_printed_ones_are():
-    exact = DATA.model_copy(update={"k1": 1.02 * DATA.k1, "components": (0.6352, 0.3581, 0.4756, 0.4649, 0.1632)})
-    there = check.rounded(exact)
-    assert there.k1 == pytest.approx(DATA.k1)
-    np.testing.assert_allclose(there.components, (*DATA.components[:3], 0.46, 0.16))
+def test_data_that_leave_a_combination_open_bound_nothing(found):
+    # The spring and the mode of three modules are two numbers for three constants.
+    robot, far = ROBOT.with_value("body.modules", 3), (0.5 * DATA.k1, 5.0 * DATA.k1)
+    spring, mode = critical.searched(robot, far)
+    data = DATA.model_copy(update={"k1": spring, "components": tuple(mode), "between": far})
+    assert np.isnan(planar.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar.FREE]))).all()
+    with pytest.raises(AnalysisError, match=r"free = .*: must be bounded by the data"):
+        next_measurements(dataclasses.replace(found, best=robot, data=data), [])
 
 
 def test_the_command_ranks_measurements_and_tests_itself(found, tmp_path, monkeypatch, capsys):

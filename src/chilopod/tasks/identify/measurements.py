@@ -29,7 +29,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.tasks.identify.critical import Pitchforks
-from chilopod.tasks.identify.planar import FREE, Identification, jacobian, scale_of, with_constants
+from chilopod.tasks.identify.planar import FREE, Identification, determined, jacobian, scale_of, with_constants
 
 _STEP, _AGREE = 1e-3, 0.05  # of differences, in units of `scale_of`, and how well they agree with those of its double
 _CHANGES = {ALL: (0.5, 0.7, 1.5), "gait.stride": (0.6, 1.5), "gait.stance": (1.5,)}  # factors
@@ -86,9 +86,12 @@ def next_measurements(
     progress: Progress = silent,
 ) -> NextMeasurements:
     """Rank measurements, by default :func:`usual`, by what they would leave of the volume of the constants that are
-    ``free``; the others are taken as they were found."""
+    ``free``; the others are taken as they were found. AnalysisError if the data leave a combination open."""
     columns = [FREE.index(path) for path in free]
     known = jacobian(found.best, found.data, np.array([found.best.get(path) for path in FREE]))[:, columns]
+    if not determined(known):
+        problem = "must be bounded by the data: they leave a combination open"
+        raise AnalysisError(problem, field="free", value=list(free))
     now, information = _widths(known, found.residuals), known.T @ known
     rows, left_out = [], {}
     given = list(usual(found)) if candidates is None else candidates
@@ -120,7 +123,10 @@ def _linear(measurement: Measurement, found: Identification, columns: Sequence[i
     best, scale = np.array([found.best.get(path) for path in FREE]), scale_of(found.best, found.data)
 
     def at(move: Array) -> Array:
-        return np.asarray(measurement.of(with_constants(found.best, best + move * scale)))
+        numbers = np.asarray(measurement.of(with_constants(found.best, best + move * scale)))
+        if not np.isfinite(numbers).all():
+            raise AnalysisError("the numbers must be finite")
+        return numbers
 
     predicted = at(np.zeros(len(FREE)))
     tolerances = measurement.tolerances(predicted)

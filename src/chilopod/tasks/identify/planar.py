@@ -47,6 +47,7 @@ _LEAST, _MOST = np.array([0.05, 0.02, -0.6]), np.array([20.0, 3.0, 1.2])
 _STEP = 1e-6  # of differences, in the same units
 _MOST_MOVES, _LONGEST_MOVE = 40, 0.1  # to the end of an interval, in the same units
 _ROOM = 1e-3  # of chi-square
+_OPEN = 1e-4  # singular value of an open combination, relative to all
 _MET = 1.0 + 1e-6  # residual that counts as 1
 CONFIDENCE = 0.9
 """Level of the intervals for tolerances that are standard errors."""
@@ -140,7 +141,7 @@ class Identification(Summary):
             "constants": constants,
             "valley_si_for_a_metre_of_forward_offset": dict(zip(FREE, self.valley[0].tolist(), strict=True)),
             "valley_flatter_by": self.valley[1],
-            "groups": self.groups(),
+            "groups": {name: [None if np.isnan(x) else x for x in ends] for name, ends in self.groups().items()},
             "residuals": self.residuals.tolist(),
             "largest_residual": float(np.abs(self.residuals).max()),
             "constants_from_every_start_si": self.starts.tolist(),
@@ -157,7 +158,7 @@ class Identification(Summary):
         rows = [(path, *(each[name] for name in ("text", "allowed_text", "interval_text"))) for path, each in constants]
         head = "constant", "best", "allowed by the data", f"{CONFIDENCE:.0%}, if tolerances are standard errors"
         cut = [path for path, each in constants if any(each["cut_by_the_search"])]
-        said = [f"a bound of the search ends the range of {path}: the data allow more" for path in cut]
+        said = [f"the search ends the range of {path}: the data may allow more" for path in cut]
         (friction, half_width, _), flatter = self.valley
         said.append(
             f"10 mm of forward offset with {1e-2 * friction:+.3g} N*s/m of friction and {10.0 * half_width:+.3g} mm of "
@@ -309,37 +310,44 @@ def allowed_ranges(
                 if np.abs(np.append(searched_off, off(found))).max() <= _MET:
                     ends[constant, side] = found
     ranges, cut = np.full((len(FREE), 2), np.nan), np.zeros((len(FREE), 2), dtype=np.bool_)
-    if len(ends) == ranges.size:
-        for (constant, side), found in ends.items():
-            ranges[constant, side] = found[constant] * scale[constant]
-            limit = (_LEAST, _MOST)[side][constant]
-            cut[constant, side] = abs(found[constant] - limit) <= _STEP * abs(limit)
+    if len(ends) == ranges.size or np.abs(off(best / scale)).max() <= _MET:
+        for constant, side in np.ndindex(ranges.shape):
+            # Where no end was found, the data may allow more.
+            found, limit = ends.get((constant, side), best / scale)[constant], (_LEAST, _MOST)[side][constant]
+            ranges[constant, side] = found * scale[constant]
+            cut[constant, side] = (constant, side) not in ends or abs(found - limit) <= _STEP * abs(limit)
     return ranges, cut
 
 
 def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array:
     """Least and largest value of each constant where chi-square is at most so much above its least value as the level
-    :data:`CONFIDENCE` of one constant allows, shape (3, 2), SI; NaN where no such end is found.
+    :data:`CONFIDENCE` of one constant allows, shape (3, 2), SI; NaN where no such end is found, as where the data leave
+    a combination of constants open.
 
     Each end is the fixed point of moves to the end of the ellipsoid that linear residuals would have.
     """
     off, scale = _Residuals(robot, data), scale_of(robot, data)
     most = float((off(best / scale) ** 2).sum() + chi2.ppf(CONFIDENCE, 1))
     intervals = np.full((len(FREE), 2), np.nan)
+    if not determined(off.jacobian(best / scale)):
+        return intervals
+    limits = np.array([_LEAST, _MOST])
     for constant in range(len(FREE)):
         for side, sign in enumerate((-1.0, 1.0)):
             here = best / scale
-            for _ in range(_MOST_MOVES):
-                found, slopes = off(here), off.jacobian(here)
-                spread = np.linalg.inv(slopes.T @ slopes)
-                middle = -spread @ slopes.T @ found
-                room = max(most - ((found + slopes @ middle) ** 2).sum(), 0.0)
-                move = middle + sign * spread[constant] * np.sqrt(room / spread[constant, constant])
-                move *= min(1.0, _LONGEST_MOVE / np.abs(move).max())
-                here, before = np.clip(here + move, _LEAST, _MOST), here
-                if np.abs(here - before).max() < _STEP:
-                    break
-            if (residuals(with_constants(robot, here * scale), data) ** 2).sum() <= most + _ROOM:
+            with suppress(np.linalg.LinAlgError):
+                for _ in range(_MOST_MOVES):
+                    found, slopes = off(here), off.jacobian(here)
+                    spread = np.linalg.inv(slopes.T @ slopes)
+                    middle = -spread @ slopes.T @ found
+                    room = max(most - ((found + slopes @ middle) ** 2).sum(), 0.0)
+                    move = middle + sign * spread[constant] * np.sqrt(room / spread[constant, constant])
+                    move *= min(1.0, _LONGEST_MOVE / np.abs(move).max())
+                    here, before = np.clip(here + move, *limits), here
+                    if np.abs(here - before).max() < _STEP:
+                        break
+            more = most - (residuals(with_constants(robot, here * scale), data) ** 2).sum()
+            if abs(more) <= _ROOM or (more > 0.0 and here[constant] in limits[:, constant]):
                 intervals[constant, side] = here[constant] * scale[constant]
     return intervals
 
@@ -347,6 +355,11 @@ def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array
 def jacobian(robot: Robot, data: CriticalMode, constants: Array) -> Array:
     """Derivatives of the residuals over the constants in units of :func:`scale_of`, shape (N, 3)."""
     return _Residuals(robot, data).jacobian(constants / scale_of(robot, data))
+
+
+def determined(slopes: Array) -> bool:
+    """True if residuals with these derivatives leave no combination of constants open."""
+    return bool(np.linalg.matrix_rank(slopes, tol=_OPEN * np.linalg.norm(slopes)) == slopes.shape[1])
 
 
 def _valley(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, float]:
