@@ -24,6 +24,7 @@ SHORT = {
     "invariances": (run.Invariances(), 8),
     "edited-controllers": (run.EditedControllers(), 8),
     "broken-engines": (run.BrokenEngines(), 2),
+    "known-constants": (run.KnownConstants(), 1),
 }
 
 

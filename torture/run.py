@@ -27,6 +27,7 @@ from edited_controllers import EditedControllers
 from environments import Environments
 from invariances import Invariances
 from kills import KillChains, Kills
+from known_constants import KnownConstants
 from live_clients import LiveClients
 from outcomes import FINE, SENTENCES, Kind
 from processors import Processors
@@ -42,6 +43,7 @@ RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, KillChains, Disks, Streams, Environments),
     *(SameBits, Verbs, Invariances, Processors, LiveClients, EditedControllers, BrokenEngines, Branches),
+    KnownConstants,
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed

@@ -73,6 +73,7 @@ def fit() -> Identification:
     return Identification(
         given=robot, data=critical_mode_data(), best=robot, residuals=off, starts=np.zeros((1, 3)),
         preset_residuals=given, ranges=ranges, cut=np.zeros((3, 2), dtype=bool),
+        intervals=np.full((3, 2), np.nan),
         valley=(np.ones(3), 3.0), profile=profile,
     )  # fmt: skip
 

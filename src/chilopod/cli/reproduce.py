@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from chilopod.paper.page import Report
     from chilopod.paper.section import Found, Section, Size
     from chilopod.robot import Robot
+    from chilopod.tasks.identify import NextMeasurements, SelfTest
 
     Files = Iterable[tuple[Path, bytes]]
 
@@ -200,16 +201,21 @@ def planar(
         typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
     ] = None,
     template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False,
+    measure: Annotated[bool, typer.Option("--next", help="Say which measurements would tell most.")] = False,
+    check: Annotated[
+        int, typer.Option("--check", metavar="N", help="Identify N robots whose constants are known.", min=0, max=10000)
+    ] = 0,
     as_json: JsonOption = False,
 ) -> None:
     """Friction, half-width and forward offset of the feet from the critical k1 and its mode, with their uncertainty.
 
     Writes the profile over the forward offset as a figure and as data, and the robot with the best constants. The
-    data are the numbers that the paper prints, or your own.
+    data are the numbers that the paper prints, or your own. --next ranks measurements by what they would leave of the
+    uncertainty. --check makes up N robots around the answer and counts how often the ranges cover their constants.
 
     Example: chilopod identify planar --data mine.toml --out identification
     """
-    from chilopod.tasks.identify import TEMPLATE, CriticalMode, identify_planar
+    from chilopod.tasks.identify import TEMPLATE, CriticalMode, identify_planar, next_measurements, self_test
 
     if template:
         if data is not None:
@@ -227,9 +233,19 @@ def planar(
     free([*files_of("identification", out), *_identified(out)], force)
     with progress_bar("identification") as progress:
         found = identify_planar(described, measured, points, variants, partial(progress, "identification"))
-    lines = [*found.lines(), f"profile, figure and robot file are in {out}"]
-    result, more = {"robot": described.name, **found.as_json()}, panel_files(identification.panel(found), out, out)
-    _deliver(out, result, found.best, lines, more, force=force, as_json=as_json)
+        more: dict[str, NextMeasurements | SelfTest] = {}
+        if measure:
+            more["next"] = next_measurements(found, progress=partial(progress, "next measurements"))
+        if check:
+            more["check"] = self_test(found.best, measured, check, progress=partial(progress, "self-test"))
+    lines = [
+        *found.lines(),
+        *(line for each in more.values() for line in each.lines()),
+        f"profile, figure and robot file are in {out}",
+    ]
+    result = {"robot": described.name, **found.as_json(), **{name: each.as_json() for name, each in more.items()}}
+    files = panel_files(identification.panel(found), out, out)
+    _deliver(out, result, found.best, lines, files, force=force, as_json=as_json)
 
 
 def _identified(folder: Path) -> tuple[Path, Path]:
@@ -284,9 +300,11 @@ def twin(
     result = {"robot": described.name, **found.as_json()}
     constants = result["constants"].items()
     lines = [
-        *(f"{name} = {value['text']}  (fits as good: {value['good_fits_text']})" for name, value in constants),
-        f"misfit {result['misfit']:.2f} (1: every datum within 5 %), {result['good']} of {result['evaluations']} "
-        "evaluations are below 1",
+        *(
+            f"{name} = {value['text']}  (fits that meet all data: {value['good_fits_text']})"
+            for name, value in constants
+        ),
+        found.words(),
         f"fits and robot file are in {out}",
     ]
     _deliver(out, result, found.best, lines, force=force, as_json=as_json)

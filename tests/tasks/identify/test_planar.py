@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import TEMPLATE, CriticalMode, planar
+from chilopod.tasks.identify import TEMPLATE, CriticalMode, critical, planar
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
@@ -22,7 +23,7 @@ def test_residuals_need_the_number_of_modules_of_the_data():
 
 def test_a_robot_without_a_pitchfork_is_refused(monkeypatch):
     # Of such a robot every search ends where it began.
-    monkeypatch.setattr(planar, "residuals", lambda *_: np.full(6, planar._NO_PITCHFORK))
+    monkeypatch.setattr(critical, "bifurcations", lambda *_, **__: [])
     with pytest.raises(AnalysisError, match="must have a pitchfork on its straight walk"):
         planar.identify_planar(ROBOT, DATA)
 
@@ -32,7 +33,7 @@ def met(constants):
 
 
 def test_ranges_are_the_projection_of_what_the_tolerances_allow():
-    ranges, cut = planar._ranges(ROBOT, DATA, BEST)
+    ranges, cut = planar.allowed_ranges(ROBOT, DATA, BEST)
     # By a program of its own, with sequential linear programming.
     np.testing.assert_allclose(ranges, [[227.695, 259.59], [0.0622, 0.08558], [0.03524, 0.06359]], rtol=1e-3)
     assert not cut.any()
@@ -58,13 +59,13 @@ def test_ranges_hold_the_constants_of_a_robot_of_another_size():
         k1=stiffness(round(point.value, 2)), k1_tolerance=stiffness(0.005), between=interval,
         components=np.round(mode, 2), component_tolerance=0.005,
     )  # fmt: skip
-    ranges, _ = planar._ranges(robot, rounded, true)
+    ranges, _ = planar.allowed_ranges(robot, rounded, true)
     assert ((ranges[:, 0] <= true) & (true <= ranges[:, 1])).all()
 
 
 def test_data_that_contradict_each_other_allow_nothing():
     data = CriticalMode(**{**dict(DATA), "components": DATA.components[::-1]})
-    ranges, _ = planar._ranges(ROBOT, data, BEST)
+    ranges, _ = planar.allowed_ranges(ROBOT, data, BEST)
     assert np.isnan(ranges).all()
 
 
@@ -100,7 +101,7 @@ def test_the_template_is_read_as_the_papers_data(tmp_path):
 
 
 def test_no_direction_changes_the_residuals_less_than_the_valley():
-    scale, (along, flatter) = planar._scale(ROBOT, DATA), planar._valley(ROBOT, DATA, BEST)
+    scale, (along, flatter) = planar.scale_of(ROBOT, DATA), planar._valley(ROBOT, DATA, BEST)
     off = planar.residuals(planar.with_constants(ROBOT, BEST), DATA)
 
     def change(direction):
@@ -113,3 +114,32 @@ def test_no_direction_changes_the_residuals_less_than_the_valley():
     across = [change(each - each @ valley * valley) for each in others]
     assert min(across) == pytest.approx(flatter * least, rel=0.1)
     assert min(across) > 0.99 * flatter * least
+
+
+def test_newtons_method_finds_what_a_search_finds_with_its_derivatives():
+    scale = planar.scale_of(ROBOT, DATA)
+    off, start = planar._Residuals(ROBOT, DATA), BEST / scale
+    off(start)
+    for there in (start * np.array([1.1, 1.05, 0.9]), start):
+        searched = planar.residuals(planar.with_constants(ROBOT, there * scale), DATA)
+        np.testing.assert_allclose(off(there), searched, atol=1e-9)
+    moves = 1e-4 * np.eye(3)
+    changes = [[planar.residuals(planar.with_constants(ROBOT, (start + step) * scale), DATA) for step in (move, -move)]
+               for move in moves]  # fmt: skip
+    slopes = np.array([(after - before) / 2e-4 for after, before in changes]).T
+    np.testing.assert_allclose(off.jacobian(start), slopes, atol=1e-5 * np.abs(slopes).max())
+
+
+def test_an_interval_ends_where_chi_square_of_the_best_others_has_grown_by_its_level():
+    scale, (best, off) = planar.scale_of(ROBOT, DATA), planar._fit(ROBOT, DATA, BEST)
+    for constant, ends in enumerate(planar.confidence_intervals(ROBOT, DATA, best)):
+        others = [index for index in range(3) if index != constant]
+        for end in ends:
+
+            def residuals(free, end=end, constant=constant, others=others):
+                there = np.empty(3)
+                there[constant], there[others] = end, free * scale[others]
+                return planar.residuals(planar.with_constants(ROBOT, there), DATA)
+
+            least = 2.0 * least_squares(residuals, (best / scale)[others], diff_step=1e-5).cost
+            assert least - (off**2).sum() == pytest.approx(2.7055, abs=0.01)

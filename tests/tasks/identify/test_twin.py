@@ -184,3 +184,16 @@ def test_the_preset_is_the_best_of_the_known():
 @pytest.mark.slow
 def test_the_preset_meets_the_base_series():
     assert np.sqrt(np.mean(residuals(ROBOT, base_series(ROBOT, DATA), DATA) ** 2)) <= 1.0
+
+
+def test_a_fit_is_good_if_it_meets_every_datum_and_without_one_none_is_found():
+    fits = known()
+    found = TwinIdentification(ROBOT, DATA, fits)
+    assert 0 < len(found.good) < sum(fit.misfit <= 1.0 for fit in fits)
+    assert all((np.abs(fit.residuals) <= 1.0).all() for fit in found.good)
+    worse = [fit for fit in fits if fit.largest > 1.0]
+    none = TwinIdentification(ROBOT, DATA, worse)
+    assert none.ranges() == {}
+    assert none.as_json()["constants"]["legs.half_width"]["good_fits_text"] == "none found"
+    assert "no evaluation of 33 meets every datum; the nearest misses the" in none.words()
+    assert f"by {min(fit.largest for fit in worse):.2f} tolerances" in none.words()

@@ -1,8 +1,8 @@
-"""Spread of the twin's predictions: the same predictions by other sets of constants that fit as well.
+"""Spread of the twin's predictions: the same predictions by other sets of constants that fit about as well.
 
-``twin_fits.json`` holds the results of ``chilopod identify twin``: sets of constants that meet the base series within
-its tolerance. The most different ones predict the printed results of other experiments, each with few undisturbed
-walks.
+``twin_fits.json`` holds results of ``chilopod identify twin``: sets of constants whose misfit to the base series, a
+root mean square, is 1 or less; not all of them meet every datum within its tolerance. The most different ones predict
+the printed results of other experiments, each with few undisturbed walks.
 """
 
 from __future__ import annotations

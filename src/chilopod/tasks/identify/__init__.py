@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
+    from chilopod.tasks.identify.check import SelfTest, self_test
     from chilopod.tasks.identify.data import TEMPLATE, BaseSeries, CriticalMode
+    from chilopod.tasks.identify.measurements import Measurement, NextMeasurements, next_measurements
     from chilopod.tasks.identify.planar import Identification, identify_planar
     from chilopod.tasks.identify.twin import TwinIdentification, identify_twin
 else:
@@ -13,7 +15,9 @@ else:
         __name__,
         {
             "data": ("TEMPLATE", "BaseSeries", "CriticalMode"),
+            "measurements": ("Measurement", "NextMeasurements", "next_measurements"),
             "planar": ("Identification", "identify_planar"),
+            "check": ("SelfTest", "self_test"),
             "twin": ("TwinIdentification", "identify_twin"),
         },
     )
@@ -23,7 +27,12 @@ __all__ = [
     "BaseSeries",
     "CriticalMode",
     "Identification",
+    "Measurement",
+    "NextMeasurements",
+    "SelfTest",
     "TwinIdentification",
     "identify_planar",
     "identify_twin",
+    "next_measurements",
+    "self_test",
 ]

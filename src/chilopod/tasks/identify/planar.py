@@ -2,13 +2,15 @@
 
 Foot friction, half-width and forward offset are fitted to the critical k1 and the mode of a robot. Every number is
 weighted by its tolerance: a residual of 1 is equal to the tolerance (for printed numbers half their last digit). The
-range of a constant is the projection of the set in which no residual exceeds 1. The profile over the forward offset
-shows the valley: at each offset the other two make the largest residual as small as it can be.
+range of a constant is the projection of the set in which no residual exceeds 1. If the tolerances are standard errors
+of normal scatter instead, the interval of a constant is its profile of chi-square, where the sum of the squared
+residuals is at most 2.71 above the least. The profile over the forward offset shows the valley: at each offset the
+other two make the largest residual as small as it can be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -18,16 +20,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
+from scipy.stats import chi2
 
 from chilopod import units
-from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
-from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
+from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.notebook import Summary, axes_for
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
+from chilopod.tasks.identify.critical import Critical, Pitchforks, searched
 from chilopod.tasks.identify.data import CriticalMode
 
 if TYPE_CHECKING:
@@ -36,12 +40,17 @@ if TYPE_CHECKING:
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""
 
-# Starting points of the fit, in the units of `_scale`: far from the answer, so that agreement is meaningful.
+# Starting points of the fit, in the units of `scale_of`: far from the answer, so that agreement is meaningful.
 _STARTS = ((0.6, 0.2, 0.15), (1.5, 0.45, 0.3), (0.8, 0.4, 0.1))
 _LEAST, _MOST = np.array([0.05, 0.02, -0.6]), np.array([20.0, 3.0, 1.2])
 """Bounds of the search, in the same units."""
 _STEP = 1e-6  # of differences, in the same units
+_MOST_MOVES, _LONGEST_MOVE = 40, 0.1  # to the end of an interval, in the same units
+_ROOM = 1e-3  # of chi-square
+_OPEN = 1e-4  # singular value of an open combination, relative to all
 _MET = 1.0 + 1e-6  # residual that counts as 1
+CONFIDENCE = 0.9
+"""Level of the intervals for tolerances that are standard errors."""
 _BESIDE = 0.25  # of the range of the offset, by which the profile goes beyond it
 _NO_PITCHFORK = 100.0
 _UNITS = {  # of the profile, N*mm/deg where none is given
@@ -72,6 +81,9 @@ class Identification(Summary):
         NaN if there is none.
     cut
         True where a bound of the search ends a range, shape (3, 2).
+    intervals
+        Least and largest value of each constant in its 90 % profile of chi-square, shape (3, 2), SI, if the tolerances
+        are standard errors.
     valley
         Change of the constants, SI, for a metre of forward offset along the direction in which the residuals change
         least, shape (3,), and how many times less they change than in the next direction.
@@ -88,6 +100,7 @@ class Identification(Summary):
     preset_residuals: Array
     ranges: Array
     cut: NDArray[np.bool_]
+    intervals: Array
     valley: tuple[Array, float]
     profile: xr.Dataset
 
@@ -100,7 +113,7 @@ class Identification(Summary):
         """Groups without unit that the critical spring and its mode depend on: value of the best constants, least and
         greatest value that the data allow, NaN where they allow none."""
         robot, (friction, *lengths) = self.given, self.ranges
-        unit, size = _scale(robot, self.data)[:2] / (4.0, 1.0)
+        unit, size = scale_of(robot, self.data)[:2] / (4.0, 1.0)
         best = [self.best.get(path) for path in FREE]
         return {
             "k1/(friction*speed*duty*module_length)": tuple((unit / [best[0], *friction[::-1]]).tolist()),
@@ -111,21 +124,24 @@ class Identification(Summary):
     def as_json(self) -> dict[str, Any]:
         """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
         constants = {}
-        for path in FREE:
+        for path, interval in zip(FREE, self.intervals, strict=True):
             unit, span = self.best.unit_of(path), self.allowed(path)
-            edges = [units.format(edge, unit, digits=3) for edge in span or ()]
+            confident = None if np.isnan(interval).any() else (float(interval[0]), float(interval[1]))
             constants[path] = {
                 "value_si": self.best.get(path),
                 "text": units.format(self.best.get(path), unit, digits=4),
                 "allowed_si": span,
-                "allowed_text": " to ".join(edges) or "nothing",
+                "allowed_text": " to ".join(units.format(each, unit, digits=3) for each in span or ()) or "nothing",
                 "cut_by_the_search": self.cut[FREE.index(path)].tolist(),
+                "interval_si": confident,
+                "interval_text": " to ".join(units.format(each, unit, digits=3) for each in confident or ())
+                or "not found",
             }
         return {
             "constants": constants,
             "valley_si_for_a_metre_of_forward_offset": dict(zip(FREE, self.valley[0].tolist(), strict=True)),
             "valley_flatter_by": self.valley[1],
-            "groups": self.groups(),
+            "groups": {name: [None if np.isnan(x) else x for x in ends] for name, ends in self.groups().items()},
             "residuals": self.residuals.tolist(),
             "largest_residual": float(np.abs(self.residuals).max()),
             "constants_from_every_start_si": self.starts.tolist(),
@@ -139,9 +155,10 @@ class Identification(Summary):
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         constants = self.as_json()["constants"].items()
-        rows = [(path, each["text"], each["allowed_text"]) for path, each in constants]
+        rows = [(path, *(each[name] for name in ("text", "allowed_text", "interval_text"))) for path, each in constants]
+        head = "constant", "best", "allowed by the data", f"{CONFIDENCE:.0%}, if tolerances are standard errors"
         cut = [path for path, each in constants if any(each["cut_by_the_search"])]
-        said = [f"a bound of the search ends the range of {path}: the data allow more" for path in cut]
+        said = [f"the search ends the range of {path}: the data may allow more" for path in cut]
         (friction, half_width, _), flatter = self.valley
         said.append(
             f"10 mm of forward offset with {1e-2 * friction:+.3g} N*s/m of friction and {10.0 * half_width:+.3g} mm of "
@@ -151,7 +168,7 @@ class Identification(Summary):
             names = ["k1", *(f"component {joint}" for joint in range(1, len(self.residuals)))]
             off = ", ".join(f"{name} {each:+.1f}" for name, each in zip(names, self.residuals, strict=True))
             said.append(f"no constants meet all data; the best are off by, in tolerances: {off}")
-        return [], [("constant", "best", "allowed by the data"), *rows], said
+        return [], [head, *rows], said
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the largest residual over the forward offset, where the other constants are fitted again."""
@@ -162,23 +179,13 @@ class Identification(Summary):
         return axes
 
 
-def residuals(robot: Robot, data: CriticalMode, between: tuple[float, float] | None = None) -> Array:
-    """Computed numbers less the data, over their tolerance, shape (N,), of a pitchfork ``between`` two k1, N*m/rad."""
+def residuals(robot: Robot, data: CriticalMode) -> Array:
+    """Computed numbers less the data, over their tolerance, shape (N,)."""
     count = robot.body.modules
     if len(data.components) != count - 1:
         problem = f"must be {count - 1} numbers, one for each joint of {robot.name}"
         raise AnalysisError(problem, field="data components", value=data.components)
-    try:
-        points = bifurcations(robot, K1, between or (data.between[0], data.between[1]), normal_form=False)
-    except AnalysisError:
-        points = []
-    points = [each for each in points if each.point.kind is Kind.PITCHFORK]
-    if not points:
-        return np.full(count, _NO_PITCHFORK)
-    components = points[-1].joint_components.real
-    components = components * np.sign(components.sum())
-    off = (components - np.array(data.components)) / data.component_tolerance
-    return np.concatenate([[(points[-1].point.value - data.k1) / data.k1_tolerance], off])
+    return _off(searched(robot, data.between), robot, data)
 
 
 def with_constants(robot: Robot, constants: Array) -> Robot:
@@ -213,15 +220,9 @@ def identify_planar(
     AnalysisError
         If the robot has another number of modules than the data, or no pitchfork with any constants.
     """
-    scale, fits = _scale(robot, data), []
-    for index, start in enumerate(_STARTS):
-        fits.append(_fit(robot, data, np.array(start) * scale))
-        progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
+    fits = fits_from_every_start(robot, data, progress)
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
-    if (best[1] == _NO_PITCHFORK).all():
-        problem = "must have a pitchfork on its straight walk with some of the constants tried"
-        raise AnalysisError(problem, field="robot", value=robot.name)
-    ranges, cut = _ranges(robot, data, best[0])
+    ranges, cut = allowed_ranges(robot, data, best[0])
     progress(0.4, "ranges")
     return Identification(
         given=robot,
@@ -232,12 +233,13 @@ def identify_planar(
         preset_residuals=residuals(robot, data),
         ranges=ranges,
         cut=cut,
+        intervals=confidence_intervals(robot, data, best[0]),
         valley=_valley(robot, data, best[0]),
         profile=_profile(robot, data, best[0], ranges[2], points, variants, progress),
     )
 
 
-def _scale(robot: Robot, data: CriticalMode) -> Array:
+def scale_of(robot: Robot, data: CriticalMode) -> Array:
     """Units of the constants, SI: only k/(c v duty L), half-width/L and offset/L enter the mode of a slow robot, with
     the critical spring k, speed v and module length L. The paper's robot has the friction 1.0 in them."""
     length, gait = robot.module_length, robot.gait
@@ -245,34 +247,47 @@ def _scale(robot: Robot, data: CriticalMode) -> Array:
 
 
 class _Residuals:
-    """Residuals, each computed once, and their derivatives over the constants in units of :func:`_scale`."""
+    """Residuals, each computed once, and their derivatives over the constants in units of :func:`scale_of`; ``more``
+    are residuals of other data, as functions of a robot."""
 
-    def __init__(self, robot: Robot, data: CriticalMode) -> None:
-        self._robot, self._data, self._scale = robot, data, _scale(robot, data)
+    def __init__(self, robot: Robot, data: CriticalMode, more: Sequence[Callable[[Robot], Array]] = ()) -> None:
+        self._robot, self._data, self._scale, self._more = robot, data, scale_of(robot, data), more
+        self._pitchfork = Pitchforks(data.between)
         self._values: dict[bytes, Array] = {}
 
     def __call__(self, scaled: Array) -> Array:
         key = scaled.tobytes()
         if key not in self._values:
-            self._values[key] = residuals(with_constants(self._robot, scaled * self._scale), self._data)
+            robot = with_constants(self._robot, scaled * self._scale)
+            off = _off(self._pitchfork(robot), robot, self._data)
+            self._values[key] = np.concatenate([off, *(each(robot) for each in self._more)])
         return self._values[key]
 
     def jacobian(self, scaled: Array) -> Array:
-        """Forward differences, shape (N, 3), of the same pitchfork, which takes a third of the time of a search."""
-        here, steps = self(scaled), scaled + _STEP * np.eye(len(FREE))
-        k1 = self._data.k1 + here[0] * self._data.k1_tolerance
-        robots = [with_constants(self._robot, step * self._scale) for step in steps]
-        beside = np.array([residuals(robot, self._data, (0.99 * k1, 1.01 * k1)) for robot in robots])
-        return ((beside - here) / _STEP).T
+        """Forward differences, shape (residuals, 3)."""
+        beside = np.array([self(step) for step in scaled + _STEP * np.eye(len(FREE))])
+        return ((beside - self(scaled)) / _STEP).T
 
 
-def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
+    """Spring and mode less the data, over their tolerances."""
+    if found is None:
+        return np.full(robot.body.modules, _NO_PITCHFORK)
+    components = (found[1] - np.array(data.components)) / data.component_tolerance
+    return np.append((found[0] - data.k1) / data.k1_tolerance, components)
+
+
+def allowed_ranges(
+    robot: Robot, data: CriticalMode, best: Array, more: Sequence[Callable[[Robot], Array]] = ()
+) -> tuple[Array, NDArray[np.bool_]]:
     """Projections of the set {max |residual| <= 1}, shape (3, 2), SI, and where a bound of the search ends them.
 
+    ``more`` are residuals of other data, as functions of a robot.
+
     Each end is a minimum of one constant within the set, by sequential quadratic programming from the best constants
-    and from the ends that were found before: the set is a curved valley.
+    and from the ends that were found before: the set is a curved valley. The residuals at an end are searched.
     """
-    off, scale = _Residuals(robot, data), _scale(robot, data)
+    off, scale = _Residuals(robot, data, more), scale_of(robot, data)
     within = {
         "type": "ineq",
         "fun": lambda scaled: np.concatenate([1.0 - off(scaled), 1.0 + off(scaled)]),
@@ -289,60 +304,109 @@ def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArr
                     method="SLSQP", bounds=bounds, constraints=[within], options={"maxiter": 60, "ftol": 1e-8},
                 ).x  # fmt: skip
                 known = ends.get((constant, side))
-                if np.abs(off(found)).max() <= _MET and (known is None or goal @ found < goal @ known):
+                if known is not None and goal @ found >= goal @ known:
+                    continue
+                searched_off = residuals(with_constants(robot, found * scale), data)
+                if np.abs(np.append(searched_off, off(found))).max() <= _MET:
                     ends[constant, side] = found
     ranges, cut = np.full((len(FREE), 2), np.nan), np.zeros((len(FREE), 2), dtype=np.bool_)
-    if len(ends) == ranges.size:
-        for (constant, side), found in ends.items():
-            ranges[constant, side] = found[constant] * scale[constant]
-            limit = (_LEAST, _MOST)[side][constant]
-            cut[constant, side] = abs(found[constant] - limit) <= _STEP * abs(limit)
+    if len(ends) == ranges.size or np.abs(off(best / scale)).max() <= _MET:
+        for constant, side in np.ndindex(ranges.shape):
+            # Where no end was found, the data may allow more.
+            found, limit = ends.get((constant, side), best / scale)[constant], (_LEAST, _MOST)[side][constant]
+            ranges[constant, side] = found * scale[constant]
+            cut[constant, side] = (constant, side) not in ends or abs(found - limit) <= _STEP * abs(limit)
     return ranges, cut
+
+
+def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array:
+    """Least and largest value of each constant where chi-square is at most so much above its least value as the level
+    :data:`CONFIDENCE` of one constant allows, shape (3, 2), SI; NaN where no such end is found, as where the data leave
+    a combination of constants open.
+
+    Each end is the fixed point of moves to the end of the ellipsoid that linear residuals would have.
+    """
+    off, scale = _Residuals(robot, data), scale_of(robot, data)
+    most = float((off(best / scale) ** 2).sum() + chi2.ppf(CONFIDENCE, 1))
+    intervals = np.full((len(FREE), 2), np.nan)
+    if not determined(off.jacobian(best / scale)):
+        return intervals
+    limits = np.array([_LEAST, _MOST])
+    for constant in range(len(FREE)):
+        for side, sign in enumerate((-1.0, 1.0)):
+            here = best / scale
+            with suppress(np.linalg.LinAlgError):
+                for _ in range(_MOST_MOVES):
+                    found, slopes = off(here), off.jacobian(here)
+                    spread = np.linalg.inv(slopes.T @ slopes)
+                    middle = -spread @ slopes.T @ found
+                    room = max(most - ((found + slopes @ middle) ** 2).sum(), 0.0)
+                    move = middle + sign * spread[constant] * np.sqrt(room / spread[constant, constant])
+                    move *= min(1.0, _LONGEST_MOVE / np.abs(move).max())
+                    here, before = np.clip(here + move, *limits), here
+                    if np.abs(here - before).max() < _STEP:
+                        break
+            more = most - (residuals(with_constants(robot, here * scale), data) ** 2).sum()
+            if abs(more) <= _ROOM or (more > 0.0 and here[constant] in limits[:, constant]):
+                intervals[constant, side] = here[constant] * scale[constant]
+    return intervals
+
+
+def jacobian(robot: Robot, data: CriticalMode, constants: Array) -> Array:
+    """Derivatives of the residuals over the constants in units of :func:`scale_of`, shape (N, 3)."""
+    return _Residuals(robot, data).jacobian(constants / scale_of(robot, data))
+
+
+def determined(slopes: Array) -> bool:
+    """True if residuals with these derivatives leave no combination of constants open."""
+    return bool(np.linalg.matrix_rank(slopes, tol=_OPEN * np.linalg.norm(slopes)) == slopes.shape[1])
 
 
 def _valley(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, float]:
     """Direction in which the residuals change least, SI for a metre of forward offset, and how many times less than in
-    the next direction, from the singular values of the derivative over the constants in units of :func:`_scale`."""
-    scale = _scale(robot, data)
-    _, values, directions = np.linalg.svd(_Residuals(robot, data).jacobian(best / scale))
+    the next direction, from the singular values of the derivative over the constants in units of :func:`scale_of`."""
+    scale = scale_of(robot, data)
+    _, values, directions = np.linalg.svd(jacobian(robot, data, best))
     along = directions[-1] * scale
     return along / along[2], float(values[-2] / values[-1])
 
 
+def fits_from_every_start(robot: Robot, data: CriticalMode, progress: Progress = silent) -> list[tuple[Array, Array]]:
+    """Constants by least squares, SI, and their residuals, from every starting point; AnalysisError if the robot has no
+    pitchfork there."""
+    fits = []
+    for index, start in enumerate(_STARTS):
+        fits.append(_fit(robot, data, np.array(start) * scale_of(robot, data)))
+        progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
+    if all((off == _NO_PITCHFORK).all() for _, off in fits):
+        problem = "must have a pitchfork on its straight walk with some of the constants tried"
+        raise AnalysisError(problem, field="robot", value=robot.name)
+    return fits
+
+
 def _fit(robot: Robot, data: CriticalMode, start: Array) -> tuple[Array, Array]:
     """Least squares over the constants; returns these and the residuals."""
-    off, scale = _Residuals(robot, data), _scale(robot, data)
+    off, scale = _Residuals(robot, data), scale_of(robot, data)
     answer = least_squares(off, start / scale, off.jacobian, (_LEAST, _MOST), x_scale=0.1, xtol=1e-9)
     return answer.x * scale, np.asarray(answer.fun)
 
 
 def _smallest(robot: Robot, data: CriticalMode, start: Array) -> Array:
-    """Constants with the offset of ``start`` whose largest residual is smallest, near the fit by least squares."""
-    off, scale = _Residuals(robot, data), _scale(robot, data)
+    """Constants with the offset of ``start`` whose largest residual is smallest."""
+    off, scale = _Residuals(robot, data), scale_of(robot, data)
 
-    def all_of(free: Array) -> Array:
-        return np.append(free[:2], start[2] / scale[2])
-
-    def within(free: Array) -> Array:
-        found = off(all_of(free))
-        return np.concatenate([free[2] - found, free[2] + found])
-
-    def slopes(free: Array) -> Array:
-        found = off.jacobian(all_of(free))[:, :2]
-        return np.hstack([np.concatenate([-found, found]), np.ones((2 * len(found), 1))])
-
-    near = least_squares(
-        lambda free: off(all_of(free)), start[:2] / scale[:2], lambda free: off.jacobian(all_of(free))[:, :2],
-        (_LEAST[:2], _MOST[:2]), x_scale=0.1,
-    ).x  # fmt: skip
-    last = np.array([0.0, 0.0, 1.0])
+    sides = np.array([[-1.0], [1.0]])
+    within = {
+        "type": "ineq",
+        "fun": lambda free: free[3] + np.kron(sides, off(free[:3])[:, None])[:, 0],
+        "jac": lambda free: np.insert(np.kron(sides, off.jacobian(free[:3])), 3, 1.0, axis=1),
+    }
+    bounds = [*zip(_LEAST[:2], _MOST[:2], strict=True), (start[2] / scale[2],) * 2, (0.0, None)]
     found = minimize(
-        lambda free: free[2], np.append(near, np.abs(off(all_of(near))).max()), jac=lambda free: last,
-        method="SLSQP", bounds=[*zip(_LEAST[:2], _MOST[:2], strict=True), (0.0, None)],
-        constraints=[{"type": "ineq", "fun": within, "jac": slopes}], options={"maxiter": 60, "ftol": 1e-8},
+        lambda free: free[3], np.append(start / scale, np.abs(off(start / scale)).max()), jac=lambda free: np.eye(4)[3],
+        method="SLSQP", bounds=bounds, constraints=[within], options={"maxiter": 60, "ftol": 1e-8},
     ).x  # fmt: skip
-    best = min((all_of(found), all_of(near)), key=lambda scaled: float(np.abs(off(scaled)).max()))
-    return best * scale
+    return found[:3] * scale
 
 
 def _profile(

@@ -43,7 +43,7 @@ VERSION = 3
 """Version of evaluations, increased whenever the same constants would give other bends; other versions are ignored."""
 
 GOOD = 1.0
-"""Misfit below which a set of constants is good: each datum is then within its tolerance."""
+"""Largest residual of a good set of constants: each datum is then within its tolerance."""
 
 _PRIOR = 0.25  # of its range: standard deviation of a constant about the middle
 _POPULATION = 10
@@ -65,8 +65,13 @@ class Fit:
 
     @property
     def misfit(self) -> float:
-        """Root mean square of the residuals."""
+        """Root mean square of the residuals; below 1 some data may be off by more than their tolerance."""
         return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @property
+    def largest(self) -> float:
+        """Largest residual, without its sign; 1 is what the tolerances allow."""
+        return float(np.abs(self.residuals).max())
 
     @property
     def objective(self) -> float:
@@ -82,6 +87,7 @@ class Fit:
             "speeds_m_s": self.speeds.tolist(),
             "residuals": self.residuals.tolist(),
             "misfit": self.misfit,
+            "largest_residual": self.largest,
             "objective": self.objective,
         }
 
@@ -102,29 +108,50 @@ class TwinIdentification(Short):
 
     @property
     def good(self) -> list[Fit]:
-        """Fits that meet the data within their tolerance."""
-        return [fit for fit in self.fits if fit.misfit <= GOOD]
+        """Fits that meet every datum within its tolerance."""
+        return [fit for fit in self.fits if fit.largest <= GOOD]
+
+    @property
+    def nearest(self) -> Fit:
+        """The fit whose largest residual is smallest."""
+        return min(self.fits, key=lambda fit: fit.largest)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Smallest and largest value of each constant among the good fits, SI."""
-        values = np.array([fit.constants for fit in self.good or self.fits[:1]])
+        """Smallest and largest value of each constant among the good fits, SI; empty if there is none."""
+        if not self.good:
+            return {}
+        values = np.array([fit.constants for fit in self.good])
         ends = zip(values.min(axis=0).tolist(), values.max(axis=0).tolist(), strict=True)
         return {each.path: span for each, span in zip(FREE, ends, strict=True)}
 
+    def words(self) -> str:
+        """How many fits meet all data, or how near the nearest comes, and which datum it misses."""
+        best, nearest = self.fits[0], self.nearest
+        said = f"largest residual {best.largest:.2f} (1: every datum within its tolerance), misfit {best.misfit:.2f}; "
+        if self.good:
+            return said + f"{len(self.good)} of {len(self.fits)} evaluations meet every datum"
+        missed = self.data.names[int(np.abs(nearest.residuals).argmax())]
+        return said + (
+            f"no evaluation of {len(self.fits)} meets every datum; the nearest misses the {missed} by "
+            f"{nearest.largest:.2f} tolerances"
+        )
+
     def as_json(self) -> dict[str, Any]:
         """Constants with the ranges of the good fits, and the best fits, as plain numbers and text."""
-        constants = {}
-        for (path, (low, high)), value in zip(self.ranges().items(), self.fits[0].constants, strict=True):
-            unit = self.given.unit_of(path)
-            constants[path] = {
-                "value_si": float(value),
-                "text": units.format(float(value), unit, digits=3),
-                "good_fits_si": [low, high],
-                "good_fits_text": f"{units.format(low, unit, digits=2)} to {units.format(high, unit, digits=2)}",
+        constants, ranges = {}, self.ranges()
+        for each, value in zip(FREE, self.fits[0].constants.tolist(), strict=True):
+            unit, span = self.given.unit_of(each.path), ranges.get(each.path, ())
+            constants[each.path] = {
+                "value_si": value,
+                "text": units.format(value, unit, digits=3),
+                "good_fits_si": list(span) or None,
+                "good_fits_text": " to ".join(units.format(end, unit, digits=2) for end in span) or "none found",
             }
         return {
             "constants": constants,
             "misfit": self.fits[0].misfit,
+            "largest_residual": self.fits[0].largest,
+            "smallest_largest_residual": self.nearest.largest,
             "residuals": dict(zip(self.data.names, self.fits[0].residuals.tolist(), strict=True)),
             "evaluations": len(self.fits),
             "good": len(self.good),
@@ -315,6 +342,6 @@ def identify_twin(
     fits.sort(key=lambda fit: fit.objective)
     progress(0.95, "walks from straight on")
     for index, fit in enumerate(fits[:_MOST_CONFIRMED]):
-        if fit.misfit <= GOOD and confirmed(with_constants(robot, fit.constants), data):
+        if fit.largest <= GOOD and confirmed(with_constants(robot, fit.constants), data):
             return TwinIdentification(robot, data, [fit, *fits[:index], *fits[index + 1 :]])
     return TwinIdentification(robot, data, fits)
