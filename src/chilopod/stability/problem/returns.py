@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers
-from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.stability.problem.capabilities import (
     Autonomous,
     FlowsMany,
@@ -105,8 +105,9 @@ class ReturnMap(ReadOnlyArrays):
     def across(self) -> Array:
         """Projection along the motion onto the section, shape (n, n); the unit matrix without a section."""
         if self.velocity is None or self.normal is None:
-            return np.eye(self.state.size)
-        return np.eye(self.state.size) - np.outer(self.velocity, self.normal) / float(self.normal @ self.velocity)
+            return read_only(np.eye(self.state.size))
+        along = np.outer(self.velocity, self.normal) / float(self.normal @ self.velocity)
+        return read_only(np.eye(self.state.size) - along)
 
 
 _STATED = "dimension", "spatial_symmetry", "scale", "velocity"
