@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, course, doctor, live, play, reproduce, robot, stability, trials, turn, walk
+from chilopod.cli import branch, course, doctor, identify, live, play, reproduce, robot, stability, trials, turn, walk
 from chilopod.cli.commands import new_app
 from chilopod.errors import ChilopodError, ParameterError, briefly, one_line
 from chilopod.process import INTERRUPTED
@@ -36,7 +36,7 @@ app.command("turn", short_help="Pick the spring that leads to a target, and walk
 app.command("course", short_help="Walk from target to target, and report on each.")(course.course)
 app.command("live", short_help="Watch a robot walk in the browser, and change it.")(live.live)
 app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(play.play)
-app.add_typer(reproduce.identify_app, name="identify")
+app.add_typer(identify.app, name="identify")
 app.add_typer(trials.app, name="trials")
 app.command("doctor", short_help="Check the installation, and print what mends it.")(doctor.doctor)
 

@@ -18,7 +18,7 @@ from chilopod.paper.straight.sections import IDENTIFICATION
 from chilopod.paper.table import OfPlanar, Row
 from chilopod.paper.turning.sections import TURNING
 from chilopod.show import files, style
-from chilopod.tasks.identify import planar
+from chilopod.tasks.identify import planar_fit
 from helpers.html_page import Page as PAGE
 
 HERE = Path(__file__).parent
@@ -126,18 +126,18 @@ def test_a_browser_sees_replays_move(tiny, browser, name):
 
 def test_identification_finds_constants_it_was_not_started_from(tiny):
     data, robot = critical_mode_data(), tiny.found.context.robot
-    residuals = planar.residuals(robot, data)
+    residuals = planar_fit.residuals(robot, data)
     assert np.abs(residuals).max() == pytest.approx(0.702, abs=0.001)
     starts = tiny.found[IDENTIFICATION].starts
     assert len(starts) == 3
     for constants in starts:
-        off = planar.residuals(planar.with_constants(robot, constants), data)
+        off = planar_fit.residuals(planar_fit.with_constants(robot, constants), data)
         assert constants == pytest.approx(starts[0], rel=1e-4)
         assert np.abs(off).max() < 1.0
         assert (off**2).sum() < (residuals**2).sum()
     # The preset has what is found, to tenths of N*s/m and of mm.
     tenths = np.array([1.0, 1e3, 1e3])
-    assert (starts[0] * tenths).round(1) == pytest.approx(tenths * [robot.get(path) for path in planar.FREE])
+    assert (starts[0] * tenths).round(1) == pytest.approx(tenths * [robot.get(path) for path in planar_fit.FREE])
 
 
 def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
@@ -149,7 +149,7 @@ def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
     assert np.isfinite(found.profile.uniform).all()
     assert set(variant_settings()) < set(found.profile.data_vars)
     result = found.as_json()
-    assert set(result["constants"]) == set(planar.FREE)
+    assert set(result["constants"]) == set(planar_fit.FREE)
 
 
 def test_a_small_study_of_curved_walks_says_what_it_found(tiny):

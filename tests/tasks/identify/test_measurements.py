@@ -19,7 +19,7 @@ from chilopod.tasks.identify import (
     check,
     critical,
     next_measurements,
-    planar,
+    planar_fit,
     self_test,
 )
 from chilopod.tasks.identify.measurements import usual
@@ -30,28 +30,33 @@ DATA = critical_mode_data()
 
 @pytest.fixture(scope="module")
 def found():
-    constants, residuals = planar._fit(ROBOT, DATA, np.array([ROBOT.get(path) for path in planar.FREE]))
-    ranges, cut = planar.allowed_ranges(ROBOT, DATA, constants)
-    best = planar.with_constants(ROBOT, constants)
+    constants, residuals = planar_fit._fit(ROBOT, DATA, np.array([ROBOT.get(path) for path in planar_fit.FREE]))
+    ranges, cut = planar_fit.allowed_ranges(ROBOT, DATA, constants)
+    best = planar_fit.with_constants(ROBOT, constants)
     rest = {"starts": constants[None], "preset_residuals": residuals, "intervals": ranges, "profile": None}
     rest["valley"] = np.ones(3), 2.0
     return Identification(given=ROBOT, data=DATA, best=best, residuals=residuals, ranges=ranges, cut=cut, **rest)
 
 
-def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_not_by_the_worst(found):
+def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_not_by_the_worst(found, monkeypatch):
     words = "mode, other springs", "critical k1, ", "legs.forward_offset itself"
     chosen = [each for each in usual(found) if each.name.startswith(words)]
     ranked = next_measurements(found, chosen).rows
     assert len(ranked) == len(chosen)
     assert ranked[0]["measurement"] == "mode, other springs = 20.5 N*mm/deg"
     assert ranked[-1]["measurement"] == "critical k1, module phase 180 deg"
-    constants, made = np.array([found.best.get(path) for path in planar.FREE]), {each.name: each for each in chosen}
+    constants, made = np.array([found.best.get(path) for path in planar_fit.FREE]), {each.name: each for each in chosen}
     for row in (ranked[0], ranked[-1]):
 
-        def residuals(robot, row=row):
-            return (made[row["measurement"]].of(robot) - row["predicted_si"]) / row["tolerances_si"]
+        class Residuals(planar_fit._Residuals):
+            def __call__(self, scaled, row=row):
+                robot = planar_fit.with_constants(self._robot, scaled * self._scale)
+                off = (made[row["measurement"]].of(robot) - row["predicted_si"]) / row["tolerances_si"]
+                return np.append(super().__call__(scaled), off)
 
-        there, _ = planar.allowed_ranges(ROBOT, DATA, constants, [residuals])
+        with monkeypatch.context() as patch:
+            patch.setattr(planar_fit, "_Residuals", Residuals)
+            there, _ = planar_fit.allowed_ranges(ROBOT, DATA, constants)
         left = np.ptp(there, axis=1) / np.ptp(found.ranges, axis=1)
         np.testing.assert_allclose(left, [*row["range_left"].values()], atol=0.04)
     assert max(ranked[0]["range_left"].values()) < 0.8
@@ -112,7 +117,9 @@ def test_data_that_leave_a_combination_open_bound_nothing(found):
     robot, far = ROBOT.with_value("body.modules", 3), (0.5 * DATA.k1, 5.0 * DATA.k1)
     spring, mode = critical.searched(robot, far)
     data = DATA.model_copy(update={"k1": spring, "components": tuple(mode), "between": far})
-    assert np.isnan(planar.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar.FREE]))).all()
+    assert np.isnan(
+        planar_fit.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar_fit.FREE]))
+    ).all()
     with pytest.raises(AnalysisError, match=r"free = .*: must be bounded by the data"):
         next_measurements(dataclasses.replace(found, best=robot, data=data), [])
 

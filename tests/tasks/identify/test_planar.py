@@ -9,16 +9,16 @@ from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import TEMPLATE, CriticalMode, critical, planar
+from chilopod.tasks.identify import TEMPLATE, CriticalMode, critical, planar, planar_fit
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
-BEST = np.array([ROBOT.get(path) for path in planar.FREE])
+BEST = np.array([ROBOT.get(path) for path in planar_fit.FREE])
 
 
 def test_residuals_need_the_number_of_modules_of_the_data():
     with pytest.raises(AnalysisError, match="must be 6"):
-        planar.residuals(ROBOT.with_value("body.modules", 7), DATA)
+        planar_fit.residuals(ROBOT.with_value("body.modules", 7), DATA)
 
 
 def test_a_robot_without_a_pitchfork_is_refused(monkeypatch):
@@ -29,11 +29,11 @@ def test_a_robot_without_a_pitchfork_is_refused(monkeypatch):
 
 
 def met(constants):
-    return np.abs(planar.residuals(planar.with_constants(ROBOT, constants), DATA)).max()
+    return np.abs(planar_fit.residuals(planar_fit.with_constants(ROBOT, constants), DATA)).max()
 
 
 def test_ranges_are_the_projection_of_what_the_tolerances_allow():
-    ranges, cut = planar.allowed_ranges(ROBOT, DATA, BEST)
+    ranges, cut = planar_fit.allowed_ranges(ROBOT, DATA, BEST)
     # By a program of its own, with sequential linear programming.
     np.testing.assert_allclose(ranges, [[227.695, 259.59], [0.0622, 0.08558], [0.03524, 0.06359]], rtol=1e-3)
     assert not cut.any()
@@ -53,19 +53,19 @@ def test_ranges_hold_the_constants_of_a_robot_of_another_size():
     settings = ["body.length=0.45 m", "body.mass=2 kg", "gait.stride=1 cm", "springs.stiffness=2 N*mm/deg"]
     robot, true = ROBOT.set_from_text(settings), np.array([90.0, 0.02, 0.012])
     interval = (stiffness(0.1), stiffness(5.0))
-    *_, point = bifurcations(planar.with_constants(robot, true), K1, interval, normal_form=False)
+    *_, point = bifurcations(planar_fit.with_constants(robot, true), K1, interval, normal_form=False)
     mode = point.joint_components.real * np.sign(point.joint_components.real.sum())
     rounded = CriticalMode(
         k1=stiffness(round(point.value, 2)), k1_tolerance=stiffness(0.005), between=interval,
         components=np.round(mode, 2), component_tolerance=0.005,
     )  # fmt: skip
-    ranges, _ = planar.allowed_ranges(robot, rounded, true)
+    ranges, _ = planar_fit.allowed_ranges(robot, rounded, true)
     assert ((ranges[:, 0] <= true) & (true <= ranges[:, 1])).all()
 
 
 def test_data_that_contradict_each_other_allow_nothing():
     data = CriticalMode(**{**dict(DATA), "components": DATA.components[::-1]})
-    ranges, _ = planar.allowed_ranges(ROBOT, data, BEST)
+    ranges, _ = planar_fit.allowed_ranges(ROBOT, data, BEST)
     assert np.isnan(ranges).all()
 
 
@@ -101,12 +101,12 @@ def test_the_template_is_read_as_the_papers_data(tmp_path):
 
 
 def test_no_direction_changes_the_residuals_less_than_the_valley():
-    scale, (along, flatter) = planar.scale_of(ROBOT, DATA), planar._valley(ROBOT, DATA, BEST)
-    off = planar.residuals(planar.with_constants(ROBOT, BEST), DATA)
+    scale, (along, flatter) = planar_fit.scale_of(ROBOT, DATA), planar_fit.valley(ROBOT, DATA, BEST)
+    off = planar_fit.residuals(planar_fit.with_constants(ROBOT, BEST), DATA)
 
     def change(direction):
         there = BEST + 1e-4 * scale * direction / np.linalg.norm(direction)
-        return np.linalg.norm(planar.residuals(planar.with_constants(ROBOT, there), DATA) - off)
+        return np.linalg.norm(planar_fit.residuals(planar_fit.with_constants(ROBOT, there), DATA) - off)
 
     least = change(along / scale)
     others = np.random.default_rng(1).normal(size=(40, 3))
@@ -117,29 +117,30 @@ def test_no_direction_changes_the_residuals_less_than_the_valley():
 
 
 def test_newtons_method_finds_what_a_search_finds_with_its_derivatives():
-    scale = planar.scale_of(ROBOT, DATA)
-    off, start = planar._Residuals(ROBOT, DATA), BEST / scale
+    scale = planar_fit.scale_of(ROBOT, DATA)
+    off, start = planar_fit._Residuals(ROBOT, DATA), BEST / scale
     off(start)
+
+    def at(scaled):
+        return planar_fit.residuals(planar_fit.with_constants(ROBOT, scaled * scale), DATA)
+
     for there in (start * np.array([1.1, 1.05, 0.9]), start):
-        searched = planar.residuals(planar.with_constants(ROBOT, there * scale), DATA)
-        np.testing.assert_allclose(off(there), searched, atol=1e-9)
+        np.testing.assert_allclose(off(there), at(there), atol=1e-9)
     moves = 1e-4 * np.eye(3)
-    changes = [[planar.residuals(planar.with_constants(ROBOT, (start + step) * scale), DATA) for step in (move, -move)]
-               for move in moves]  # fmt: skip
-    slopes = np.array([(after - before) / 2e-4 for after, before in changes]).T
+    slopes = np.array([(at(start + move) - at(start - move)) / 2e-4 for move in moves]).T
     np.testing.assert_allclose(off.jacobian(start), slopes, atol=1e-5 * np.abs(slopes).max())
 
 
 def test_an_interval_ends_where_chi_square_of_the_best_others_has_grown_by_its_level():
-    scale, (best, off) = planar.scale_of(ROBOT, DATA), planar._fit(ROBOT, DATA, BEST)
-    for constant, ends in enumerate(planar.confidence_intervals(ROBOT, DATA, best)):
+    scale, (best, off) = planar_fit.scale_of(ROBOT, DATA), planar_fit._fit(ROBOT, DATA, BEST)
+    for constant, ends in enumerate(planar_fit.confidence_intervals(ROBOT, DATA, best)):
         others = [index for index in range(3) if index != constant]
         for end in ends:
 
             def residuals(free, end=end, constant=constant, others=others):
                 there = np.empty(3)
                 there[constant], there[others] = end, free * scale[others]
-                return planar.residuals(planar.with_constants(ROBOT, there), DATA)
+                return planar_fit.residuals(planar_fit.with_constants(ROBOT, there), DATA)
 
             least = 2.0 * least_squares(residuals, (best / scale)[others], diff_step=1e-5).cost
             assert least - (off**2).sum() == pytest.approx(2.7055, abs=0.01)

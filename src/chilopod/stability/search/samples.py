@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import bisect
-import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError, ParameterError, in_words
+from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state, near_orbit
-from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import Budget, SpentError, UserCode, UserError
-from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
+from chilopod.stability.problem.budget import Budget, SpentError, UserCode
+from chilopod.stability.problem.capabilities import Family, SystemLike
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, return_maps, section_at
 from chilopod.stability.problem.scales import sizes
+from chilopod.stability.search.checked_family import CheckedFamily
 from chilopod.stability.unit_circle.crossings import first_values
 
 T = TypeVar("T")
@@ -27,7 +26,6 @@ T = TypeVar("T")
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which the search may not resolve a fold."""
 
-_KEPT = 64  # cached systems: those around a point are used repeatedly
 _SHORTEST = 2.0**-11  # shortest step of a followed orbit, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
@@ -49,60 +47,6 @@ _MERGED = 1e-5  # gap, relative to the interval, in which they still do
 _JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 
 
-class AskedFamily:
-    """The systems of a family, which must be of one kind."""
-
-    def __init__(self, family: Family) -> None:
-        self.dimension = 0  # 0 until a system is known
-        self.timed = True  # they depend on time
-        self._family = family
-        self._systems: dict[float, SystemLike] = {}
-        self._refused: dict[str, tuple[str, set[float]]] = {}
-
-    def __call__(self, value: float) -> SystemLike:
-        """The system at a value of the parameter."""
-        if value in self._systems:
-            return self._systems[value]
-        with self.asking(value):
-            system = system_of(self._family, value)
-        kind = system.dimension, not is_autonomous(system)
-        if self.dimension == 0:
-            self.dimension, self.timed = kind
-        if kind != (self.dimension, self.timed):
-            what = "dimension" if system.dimension != self.dimension else "kind of period"
-            self._refuse(value, what, f"the family changes its {what}")
-            raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
-        if len(self._systems) >= _KEPT:
-            self._systems.pop(next(iter(self._systems)))
-        self._systems[value] = system
-        return system
-
-    @contextlib.contextmanager
-    def asking(self, value: float) -> Iterator[None]:
-        """Context of calls of the user's functions: an exception means that the system does not exist."""
-        try:
-            with UserCode("family", value):
-                yield
-        except (UserError, ParameterError) as error:
-            if not self.dimension:
-                raise
-            cause = error.__cause__ if isinstance(error, UserError) else error
-            assert cause is not None
-            self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
-            raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
-
-    @property
-    def remarks(self) -> list[str]:
-        """Remarks on values without a system, with the reason, a sentence each."""
-        return [
-            said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
-            for said, values in self._refused.values()
-        ]
-
-    def _refuse(self, value: float, kind: str, why: str) -> None:
-        self._refused.setdefault(kind, (f"{why} at {value:.9g}", set()))[1].add(value)
-
-
 class Samples:
     """Samples of a family between two values of its parameter, each computed once.
 
@@ -114,7 +58,7 @@ class Samples:
     def __init__(
         self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int, seconds: float
     ) -> None:
-        self.family = AskedFamily(family)
+        self.family = CheckedFamily(family)
         self.low, self.high, self.width = low, high, high - low
         self.known = guess is None  # the systems know their orbits
         self.spent = False  # the path ends because the budget was spent
@@ -216,7 +160,7 @@ class Samples:
         for value in values:
             self.budget.take()
             systems.append(self.family(value))
-        with self.family.asking(values[0]) if len(values) == 1 else UserCode("family", values[0]):
+        with self.family.calling(values[0]) if len(values) == 1 else UserCode("family", values[0]):
             states = [known_state(system) for system in systems]
             images = return_maps(systems, states)
         for value, system, state, image in zip(values, systems, states, images, strict=True):
@@ -228,7 +172,7 @@ class Samples:
         system = self.family(value)
 
         def own(settle: bool) -> Sample:
-            with self.family.asking(value):
+            with self.family.calling(value):
                 return _sample(value, find_orbit(system, known_state(system), settle=settle, budget=self.budget))
 
         index = bisect.bisect(self._values, value)
@@ -241,7 +185,7 @@ class Samples:
         """A sample near a state, with about the period of a neighbouring sample."""
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
-        with self.family.asking(value):
+        with self.family.calling(value):
             section = self._section(system, near, beside.image.period / beside.image.returns)
             return _sample(value, near_orbit(system, near, self.known, section, self.size, self.budget))
 

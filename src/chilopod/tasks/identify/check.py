@@ -15,10 +15,18 @@ from chilopod.notebook import Shown, aligned
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.statistics import LEVEL
-from chilopod.tasks.identify import planar
 from chilopod.tasks.identify.critical import searched
 from chilopod.tasks.identify.data import CriticalMode
-from chilopod.tasks.identify.planar import CONFIDENCE, FREE, allowed_ranges, confidence_intervals, scale_of
+from chilopod.tasks.identify.planar_fit import (
+    CONFIDENCE,
+    FREE,
+    allowed_ranges,
+    best_of,
+    confidence_intervals,
+    fits_from_every_start,
+    scale_of,
+    with_constants,
+)
 
 _SIZES, _BESIDE = 3.0, 1.25  # largest factor of length, mass and springs, and of the constants
 _DRAWS = 100
@@ -60,8 +68,7 @@ class SelfTest(Shown):
 
 
 def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progress: Progress = silent) -> SelfTest:
-    """Identify the constants of robots that are made up around a robot, as which of them depends on ``seed`` and its
-    number alone.
+    """Identify the constants of robots that are made up around a robot. Each depends on ``seed`` and its number alone.
 
     Length, mass and springs differ by factors of a third to three, and constants in units of the robot by factors of
     0.8 to 1.25. Each is identified from its critical spring and mode rounded to twice the tolerances of the data, and
@@ -80,8 +87,7 @@ def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progr
 
 
 def _fitted(robot: Robot, data: CriticalMode) -> tuple[CriticalMode, Array]:
-    fits = planar.fits_from_every_start(robot, data)
-    return data, min(fits, key=lambda fit: float((fit[1] ** 2).sum()))[0]
+    return data, best_of(fits_from_every_start(robot, data))[0]
 
 
 def made_up(robot: Robot, data: CriticalMode, rng: np.random.Generator) -> tuple[Robot, Array, CriticalMode]:
@@ -97,7 +103,7 @@ def made_up(robot: Robot, data: CriticalMode, rng: np.random.Generator) -> tuple
         sizes = {name: spring * getattr(data, name) for name in ("k1", "k1_tolerance")}
         exact = data.model_copy(update={**sizes, "between": tuple(spring * each for each in data.between)})
         constants = groups * _BESIDE ** rng.uniform(-1.0, 1.0, len(FREE)) * scale_of(other, exact)
-        found = searched(planar.with_constants(other, constants), exact.between)
+        found = searched(with_constants(other, constants), exact.between)
         if found is not None:
             return other, constants, exact.model_copy(update={"k1": found[0], "components": tuple(found[1].tolist())})
     raise AnalysisError("must have neighbours with a pitchfork", field="robot", value=robot.name)
