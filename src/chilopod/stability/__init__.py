@@ -22,19 +22,7 @@ from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.problem.budget import Budget
-from chilopod.stability.problem.capabilities import (
-    Autonomous,
-    CyclicallySymmetric,
-    ExpandsVelocity,
-    FlowsMany,
-    FlowsStates,
-    FlowsTangents,
-    FlowsWithError,
-    KnowsOrbit,
-    Scaled,
-    SpatiallySymmetric,
-    SystemLike,
-)
+from chilopod.stability.problem.capabilities import Autonomous, Capabilities, SystemLike
 from chilopod.stability.problem.maps import from_map
 from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.problem.system import PeriodicSystem
@@ -52,21 +40,15 @@ __all__ = [
     "Branch",
     "BranchPoint",
     "Budget",
+    "Capabilities",
     "CodimensionTwo",
     "Criticality",
     "Curve2",
-    "CyclicallySymmetric",
     "Ending",
     "Equilibrium",
     "Event",
-    "ExpandsVelocity",
     "Exponents",
-    "FlowsMany",
-    "FlowsStates",
-    "FlowsTangents",
-    "FlowsWithError",
     "Kind",
-    "KnowsOrbit",
     "Located",
     "Multipliers",
     "NormalForm",
@@ -77,10 +59,8 @@ __all__ = [
     "Point2",
     "Result",
     "ReturnMap",
-    "Scaled",
     "SearchStatus",
     "Section",
-    "SpatiallySymmetric",
     "SpecialPoint2",
     "Start",
     "Start2",

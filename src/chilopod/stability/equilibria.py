@@ -27,9 +27,9 @@ from chilopod.stability.problem.capabilities import (
     Autonomous,
     Family,
     SystemLike,
-    expands_velocity,
     given_scale,
     is_autonomous,
+    offers,
 )
 from chilopod.stability.problem.returns import section_at
 from chilopod.stability.spectrum.errors import SAFETY, disturbed, eigenvalue_errors
@@ -222,7 +222,7 @@ def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> A
 def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
     """Taylor coefficients in s of f(x(s)) along curves x(s) = c0 + c1 s + ..., shape (curves, orders, n), and bounds on
     their errors; at s = 1 a state has moved by about its size."""
-    if expands_velocity(system):
+    if offers(system, "velocity_series"):
         found = system.velocity_series(curves)
         return found, np.zeros_like(found)
     orders = curves.shape[1]

@@ -20,7 +20,7 @@ from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.problem.arguments import check_system
-from chilopod.stability.problem.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
+from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, is_stiff, offers
 from chilopod.stability.problem.returns import return_maps
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
@@ -181,7 +181,7 @@ def multipliers(
             return _multipliers(find_orbit(system, orbit))
         check_system(system)
         count = checked_count("leading", leading, system.dimension - (system.period is None))
-        if flows_tangents(system) and system.dimension >= LARGE:
+        if offers(system, "flow_tangents") and system.dimension >= LARGE:
             image, size = find_large_orbit(system, orbit)
             found = leading_multipliers(image, size, count)
             result = full_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)

@@ -27,7 +27,7 @@ from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equ
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.problem.arguments import check_arguments, checked_interval
 from chilopod.stability.problem.budget import SpentError, UserCode
-from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
+from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, given_scale, offers
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.search.extent import Fold
 from chilopod.stability.search.locate import Found, Located, located
@@ -226,7 +226,7 @@ def _scale(system: Autonomous, start: Equilibrium) -> Array | None:
     """Sizes of the states, shape (n,), for an equilibrium at zero: there the terms of second or third order of the
     right-hand side are as large as the linear ones along some directions."""
     given = given_scale(system)
-    if given is not None or start.state.any() or not expands_velocity(system):
+    if given is not None or start.state.any() or not offers(system, "velocity_series"):
         return given
     n = start.state.size
     units = numerical_balance(start.jacobian)

@@ -24,7 +24,7 @@ from chilopod.flows.arguments import UserCode, shape_of
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.convergence import RETURN
 from chilopod.stability.problem.budget import Budget
-from chilopod.stability.problem.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
+from chilopod.stability.problem.capabilities import Capabilities, given_scale, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import (
     CUTS,
     REPEATED,
@@ -122,7 +122,7 @@ def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Arr
 class TangentMap(ReadOnlyArrays):
     """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`), its derivative H' as a product."""
 
-    system: FlowsTangents
+    system: Capabilities
     point: Array  # state at time 0, shape (n,)
     state: Array  # H(point)
     duration: float  # duration of a return
@@ -171,7 +171,7 @@ class TangentMap(ReadOnlyArrays):
         return directions - along
 
 
-def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None) -> TangentMap:
+def tangent_map(system: Capabilities, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
     velocity, normal = None, None
     duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
@@ -184,7 +184,7 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
     return TangentMap(system, x, state, duration, returns_per_period(system), velocity, normal)
 
 
-def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
+def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
     """Sizes of the states, shape (n,), as in :func:`chilopod.stability.problem.scales.sizes`, without the matrix: the
     largest value of a state during a return, or its change within a part of it when the others are disturbed at random
     by their own sizes (the one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 2000)."""
@@ -217,7 +217,7 @@ def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
 
 
 def closed_orbit(
-    system: FlowsTangents,
+    system: Capabilities,
     x: Array,
     section: Section | None = None,
     farthest: float = np.inf,

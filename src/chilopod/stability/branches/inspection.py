@@ -27,7 +27,7 @@ from chilopod.stability.branches.within import Within
 from chilopod.stability.crossing_points.description import ContinuumError
 from chilopod.stability.orbit_blocks import block_of, crossings_in
 from chilopod.stability.problem.budget import SpentError
-from chilopod.stability.problem.capabilities import flows_with_error
+from chilopod.stability.problem.capabilities import offers
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
@@ -83,7 +83,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     touches = any(each.crossing.event is Event.PLUS and each.crossing.change == 0 for each in places)
     if (flipped and not branching) or (touches and not flipped and step.size > _TELLING):
         raise AnalysisError("the step landed on another curve", field="step")
-    sure = flows_with_error(curve.system(step.found.value))
+    sure = offers(curve.system(step.found.value), "flow_with_error")
     found: list[tuple[float, BranchPoint]] = []
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event

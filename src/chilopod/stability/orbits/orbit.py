@@ -21,13 +21,13 @@ from chilopod.stability.orbits.shooting import Nodes, shot
 from chilopod.stability.problem.arguments import check_arguments, check_system
 from chilopod.stability.problem.budget import Budget, SpentError
 from chilopod.stability.problem.capabilities import (
-    FlowsTangents,
+    Capabilities,
     SystemLike,
-    flows_tangents,
     given_scale,
     is_autonomous,
     is_stiff,
     known_orbit,
+    offers,
     spatial_symmetries,
 )
 from chilopod.stability.problem.returns import (
@@ -217,7 +217,7 @@ def _check_section(section: object, system: SystemLike) -> None:
     positive("section.duration", section.duration)
 
 
-def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
+def find_large_orbit(system: Capabilities, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
     """As :func:`find_orbit`, for a large system: the return map on the orbit without its derivative as a matrix, and
     the sizes of the states, shape (n,). If that method fails, :func:`find_orbit` takes over."""
     x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
@@ -315,7 +315,7 @@ def _solved(
     x, duration = start.states[0], start.duration
     size = sizes(system, x, duration)
     section = section or section_at(system, x, size, duration)
-    if system.dimension >= LARGE and flows_tangents(system) and len(start.states) == 1:
+    if system.dimension >= LARGE and offers(system, "flow_tangents") and len(start.states) == 1:
         with contextlib.suppress(AnalysisError):
             closed, _ = closed_orbit(system, x, section, budget=budget)
             return _found(system, closed.point, closed.duration, size, with_error)

@@ -1,9 +1,7 @@
-"""Required and optional interfaces of a periodic system.
+"""Interfaces of a periodic system: required members (:class:`SystemLike`, :class:`Autonomous`), and optional ones.
 
-Every capability is a protocol: a system implements it through its methods. The analyses test it by ``isinstance``, or
-by the functions at the end of this module for protocols with one member. A member that is None counts as missing, so
-instances of one class may differ (as those of :class:`chilopod.stability.PeriodicSystem`). Methods and properties must
-exist on the system or its class: from Python 3.12 on, ``isinstance`` ignores the results of ``__getattr__``.
+The optional members are those of :class:`Capabilities`. A missing one and one that is None are the same, so instances
+of one class may differ (as those of :class:`chilopod.stability.PeriodicSystem`).
 
 Throughout, n is the number of states; times are in the unit of the system's period, states in its own units; a
 derivative has the derivative of state i with respect to state j at the start in row i, column j.
@@ -12,17 +10,16 @@ derivative has the derivative of state i with respect to state j at the start in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, Self, TypeGuard, runtime_checkable
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers, shape_of
 from chilopod.frozen import Array
 
 
-@runtime_checkable
 class SystemLike(Protocol):
     """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow, which every analysis needs.
 
@@ -40,7 +37,7 @@ class SystemLike(Protocol):
     @property
     def symmetry(self) -> Array | None:
         """Matrix S, shape (n, n), of finite order k with S f(t, x) = f(t + T/k, S x), or None. H = S flow(T/k) is then
-        a return map. The order is 2 unless the system is :class:`CyclicallySymmetric`."""
+        a return map. The order is 2 unless the system has a ``symmetry_order``."""
 
     def flow(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
         """State at t1, shape (n,), and its derivative with respect to the state x at t0, shape (n, n)."""
@@ -50,7 +47,6 @@ Family = Callable[[float], SystemLike]
 """The system at a value of a parameter."""
 
 
-@runtime_checkable
 class Autonomous(SystemLike, Protocol):
     """Systems that do not depend on time: the period of an orbit is an unknown, and every instant may be time 0."""
 
@@ -62,134 +58,74 @@ class Autonomous(SystemLike, Protocol):
         """dx/dt at state x, shape (n,)."""
 
 
-@runtime_checkable
-class ExpandsVelocity(Autonomous, Protocol):
-    """Systems that know their right-hand side f with all derivatives; else differences are used."""
-
-    def velocity_series(self, curves: Array, /) -> Array:
-        """Taylor coefficients in s of f(x(s)), shape (curves, orders, n), along curves x(s) = c0 + c1 s + ... with
-        these coefficients, of the same shape."""
-
-
-@runtime_checkable
-class CyclicallySymmetric(Protocol):
-    """Systems with a symmetry of another order than 2, such as the shift along a ring of oscillators."""
+class Capabilities(Autonomous, Protocol):
+    """Every member that a system may have; the analyses use each one that is there."""
 
     @property
     def symmetry_order(self) -> int:
-        """The smallest k > 1 with S^k = 1."""
-
-
-@runtime_checkable
-class Scaled(Protocol):
-    """Systems that define a large change of every state, in its own unit; else the orbit determines it."""
+        """The smallest k > 1 with S^k = 1, for a symmetry such as the shift along a ring of oscillators; else 2."""
 
     @property
     def scale(self) -> Array | None:
-        """Positive sizes of the states, shape (n,); or None."""
-
-
-@runtime_checkable
-class KnowsOrbit(Protocol):
-    """Systems that know their periodic orbit, so that no guess is needed."""
+        """Positive sizes of large changes of the states, shape (n,); else the orbit determines them."""
 
     @property
     def orbit(self) -> Array | None:
-        """State on the orbit at time 0, shape (n,); or None. It is corrected if it does not return to round-off."""
-
-
-@runtime_checkable
-class SpatiallySymmetric(Protocol):
-    """Systems with symmetries that hold at every instant, such as a reflection, which identify pitchforks."""
+        """State on the orbit at time 0, so that no guess is needed. It is corrected if it does not return to
+        round-off."""
 
     @property
     def spatial_symmetry(self) -> Array | None:
         """A matrix P, shape (n, n), with P f(t, x) = f(t, P x), or several that generate a finite group, shape
-        (generators, n, n); or None."""
-
-
-@runtime_checkable
-class FlowsWithError(Protocol):
-    """Systems that bound the error of their flow; else a second computation estimates it."""
+        (generators, n, n). Such symmetries, as a reflection, identify pitchforks."""
 
     def flow_with_error(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array, float | Array]:
         """As :meth:`SystemLike.flow`, and a bound on the absolute error of the derivative: of every entry, shape
-        (n, n), or one number for all of them, which is wide where states have different units."""
-
-
-@runtime_checkable
-class FlowsStates(Protocol):
-    """Systems that carry many states together; else each flow is computed separately."""
+        (n, n), or one number for all of them, which is wide where states have different units. Else a second
+        computation estimates it."""
 
     def flow_states(self, states: Array, t0: float, t1: float, /) -> Array:
         """States at t1 of those at t0, shape (states, n) both, without derivatives."""
 
-
-@runtime_checkable
-class FlowsTangents(SystemLike, Protocol):
-    """Systems that carry some directions instead of the full derivative, which suffices for large systems."""
-
     def flow_tangents(self, x: Array, directions: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
         """State at t1, shape (n,), and its derivative with respect to the state x at t0, times the directions, shape
-        (n, any number) as they."""
+        (n, any number) as they, which suffices for large systems."""
 
+    def flow_many(self, systems: Sequence[Any], t0: float, t1: float, /) -> tuple[Array, Array]:
+        """Derivatives of the flow on the known orbits of systems of this class, for sweeps, shape (systems, n, n), and
+        bounds on their errors, shape (systems,)."""
 
-@runtime_checkable
-class FlowsMany(KnowsOrbit, Protocol):
-    """Systems that compute derivatives along the known orbits of many systems of their class together, for sweeps."""
-
-    def can_flow_with(self, other: Self, /) -> bool:
-        """True if :meth:`flow_many` may take the other system along with this one."""
-
-    def flow_many(self, systems: Sequence[Self], t0: float, t1: float, /) -> tuple[Array, Array]:
-        """Derivatives of the flow on the known orbits, shape (systems, n, n), and bounds as in
-        :class:`FlowsWithError`, shape (systems,)."""
-
-
-@runtime_checkable
-class FlowsVolumes(SystemLike, Protocol):
-    """Systems that resolve the decay of volumes where a direction vanishes within a step of the integration."""
+    def can_flow_with(self, other: Any, /) -> bool:
+        """True if :meth:`flow_many` may take another system of this class along with this one."""
 
     def is_stiff(self, x: Array, t0: float, t1: float, /) -> bool:
-        """True if the derivative of the flow from state x at t0 to t1 does not resolve such a direction."""
+        """True if the derivative of the flow from state x at t0 to t1 does not resolve a direction that vanishes within
+        a step of the integration."""
 
     def flow_volume(self, x: Array, t0: float, t1: float, /) -> tuple[float, float]:
-        """Logarithm of the growth of volume from state x at t0 to t1, and a bound on its error."""
+        """Logarithm of the growth of volume from state x at t0 to t1, and a bound on its error; for stiff systems."""
+
+    def velocity_series(self, curves: Array, /) -> Array:
+        """Taylor coefficients in s of f(x(s)), shape (curves, orders, n), along curves x(s) = c0 + c1 s + ... with
+        these coefficients, of the same shape; else differences are used."""
+
+
+def offers(system: object, member: str) -> TypeGuard[Capabilities]:
+    """True if a system has an optional member."""
+    return getattr(system, member, None) is not None
 
 
 def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
     """True if a system does not depend on time."""
-    # These functions equal ``isinstance`` and are twenty times as fast.
-    members = getattr(system, "velocity", None), getattr(system, "guess_period", None)
-    return system.period is None and None not in members
+    return system.period is None and offers(system, "velocity") and offers(system, "guess_period")
 
 
-def flows_with_error(system: SystemLike) -> TypeGuard[FlowsWithError]:
-    """True if a system bounds the error of its flow."""
-    return getattr(system, "flow_with_error", None) is not None
-
-
-def expands_velocity(system: SystemLike) -> TypeGuard[ExpandsVelocity]:
-    """True if a system knows its right-hand side with all derivatives."""
-    return getattr(system, "velocity_series", None) is not None
-
-
-def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[FlowsVolumes]:
+def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[Capabilities]:
     """True if a return from state x at time 0 contracts some directions more than its derivative resolves."""
-    return getattr(system, "flow_volume", None) is not None and system.is_stiff(x, 0.0, duration)  # type: ignore[attr-defined]
+    return offers(system, "flow_volume") and system.is_stiff(x, 0.0, duration)
 
 
-def flows_states(system: SystemLike) -> TypeGuard[FlowsStates]:
-    """True if a system carries many states together."""
-    return getattr(system, "flow_states", None) is not None
-
-
-def flows_tangents(system: SystemLike) -> TypeGuard[FlowsTangents]:
-    """True if a system carries directions instead of the full derivative."""
-    return getattr(system, "flow_tangents", None) is not None
-
-
-def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: float, with_error: bool = False) -> Any:
+def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error: bool = False) -> Any:
     """The flow and its derivative of the right shapes, with the system's own bound on its error if wanted; a SpentError
     after a time limit."""
     deadline.check()
@@ -203,26 +139,25 @@ def checked_flow(system: SystemLike | FlowsWithError, x: Array, t0: float, t1: f
     usual = type(state) is type(derivative) is np.ndarray and state.dtype == derivative.dtype == np.float64
     if usual and not with_error and state.shape == (n,) and derivative.shape == (n, n):
         return found
-    shapes = [shape_of(each) for each in found]
-    if shapes[:2] != [(n,), (n, n)] or shapes[2:] not in ([], [()], [(n, n)]):
-        said = f"gives shapes {' and '.join(map(str, shapes))}"
-        raise AnalysisError(said, field="flow", allowed=f"({n},) and ({n}, {n})")
-    parts = [numbers(each, np.shape(each), "flow") for each in found]
-    return tuple(each if each.ndim else float(each) for each in parts)
+    state, derivative = numbers(state, (n,), name), numbers(derivative, (n, n), name)
+    if not with_error:
+        return state, derivative
+    error = numbers(found[2], (n, n) if shape_of(found[2]) else (), name)
+    return state, derivative, error if error.ndim else float(error)
 
 
 def known_orbit(system: SystemLike) -> Array | None:
-    """The system's own state on its orbit (see :class:`KnowsOrbit`), or None."""
+    """The system's own state on its orbit or None."""
     return getattr(system, "orbit", None)
 
 
 def given_scale(system: SystemLike) -> Array | None:
-    """The system's own sizes of its states (see :class:`Scaled`), or None."""
+    """The system's own sizes of its states or None."""
     return getattr(system, "scale", None)
 
 
 def spatial_symmetries(system: SystemLike) -> tuple[Array, ...]:
-    """Generators of the spatial symmetries of a system (see :class:`SpatiallySymmetric`); may be empty."""
+    """Generators of the spatial symmetries; may be empty."""
     given = getattr(system, "spatial_symmetry", None)
     if given is None:
         return ()

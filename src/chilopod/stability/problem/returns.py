@@ -25,13 +25,10 @@ from chilopod.flows.arguments import UserCode, numbers
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.stability.problem.capabilities import (
     Autonomous,
-    FlowsMany,
     SystemLike,
     checked_flow,
-    flows_states,
-    flows_tangents,
-    flows_with_error,
     is_autonomous,
+    offers,
     returns_per_period,
 )
 from chilopod.stability.problem.scales import sizes
@@ -159,7 +156,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     """The flow with an error bound, the system's own or an estimate from a computation in parts: a step-controlled
     integrator makes independent errors in the two computations, and one with fixed steps should provide its own
     bound."""
-    if flows_with_error(system):
+    if offers(system, "flow_with_error"):
         state, derivative, error = checked_flow(system, x, t0, t1, with_error=True)
         return state, derivative, error
     state, derivative = checked_flow(system, x, t0, t1)
@@ -317,10 +314,10 @@ def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
     """States at t1 of those at t0, shape (states, n) both, by the cheapest capability of the system; a SpentError
     after a time limit."""
     deadline.check()
-    if flows_states(system):
+    if offers(system, "flow_states"):
         with UserCode("flow_states"):
             return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
-    if flows_tangents(system):
+    if offers(system, "flow_tangents"):
         with UserCode("flow_tangents"):
             return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
     return np.array([checked_flow(system, x, t0, t1)[0] for x in states])
@@ -360,7 +357,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
 def return_maps(systems: Sequence[SystemLike], orbits: Sequence[Array]) -> list[ReturnMap]:
     """The return maps of many systems at states on their orbits, with errors, together if possible."""
     first = systems[0]
-    if len(systems) > 1 and isinstance(first, FlowsMany):
+    if len(systems) > 1 and offers(first, "flow_many"):
         alike = [system for system in systems if isinstance(system, type(first)) and first.can_flow_with(system)]
         if len(alike) == len(systems):
             count, period = returns_per_period(first), _period(first)

@@ -18,7 +18,7 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray
-from chilopod.stability.problem.capabilities import FlowsVolumes, SystemLike
+from chilopod.stability.problem.capabilities import Capabilities, SystemLike
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.cut import Cut, moderate_cut, section_basis
 from chilopod.stability.spectrum.errors import DRAWS, SAFETY, disturbed
@@ -160,7 +160,7 @@ def _moved(
     return SAFETY * moved
 
 
-def split_stiff(system: FlowsVolumes, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
+def split_stiff(system: Capabilities, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
     """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and the errors of the
     logarithms; AnalysisError if more than one direction decays too fast to be resolved."""
     cut = moderate_cut(system, x, image, unresolved=1)
