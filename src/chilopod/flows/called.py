@@ -130,13 +130,16 @@ class CalledFlow:
         return 2.0 * max(off) / float(np.abs(direction).min())
 
     def _slope(self, t: float, x: Array) -> Array:
-        with UserCode("rhs"):
-            return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
+        return self._value("rhs", t, x, x.shape)
+
+    def _value(self, name: str, t: float, x: Array, shape: tuple[int, ...]) -> Array:
+        with UserCode(name):
+            return numbers(getattr(self, name)(t, x, *self.args), shape, name)
 
     def _gradient(self, x: Array, sizes: Array) -> tuple[Gradient, float]:
         """The derivative of f near a state, by the best method for f, and its error relative to its largest entry."""
         if self.jacobian is not None:
-            return self._given, _ANALYTIC_FLOOR
+            return lambda t, x: self._value("jacobian", t, x, (x.size, x.size)), _ANALYTIC_FLOOR
         if _is_analytic(self.rhs, self.args, x, sizes, self.times):
             return lambda t, x: self._by_complex_steps(t, x, sizes), _ANALYTIC_FLOOR
         said = (
@@ -146,11 +149,6 @@ class CalledFlow:
         if deadline.first_time(said):
             warnings.warn(said, NotAnalytic, stacklevel=4)
         return lambda t, x: self._by_differences(t, x, sizes), _DIFFERENCE_FLOOR
-
-    def _given(self, t: float, x: Array) -> Array:
-        assert self.jacobian is not None
-        with UserCode("jacobian"):
-            return numbers(self.jacobian(t, x, *self.args), (x.size, x.size), "jacobian")
 
     def _by_complex_steps(self, t: float, x: Array, sizes: Array) -> Array:
         columns = []

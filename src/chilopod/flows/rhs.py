@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import (
+    LARGEST,
     Slopes,
     check_shape,
     check_timeless,
-    checked_arguments,
+    checked_count,
     finite_array,
     sampled,
 )
@@ -29,7 +30,7 @@ from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_jacobian, eva
 from chilopod.flows.tracing.traced import Untraceable
 from chilopod.frozen import Array, read_only
 
-TOLERANCE = 1e-14
+TOLERANCE, _COARSEST = 1e-14, 1e-3
 _SAME = 1e-6
 _FLOOR = 0.01  # truncation of a Taylor step relative to the tolerance: a small one costs almost nothing
 _ESTIMATED = 100.0
@@ -85,15 +86,21 @@ class RightHandSide:
         method: object = self.method
         if not (isinstance(method, str) and method in get_args(Method)):
             raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
-        self.dimension, self.args, self.tolerance = checked_arguments(
-            self.rhs, self.dimension, self.args, self.tolerance
-        )
+        if not callable(self.rhs):
+            raise ParameterError("must be a function", field="rhs", value=self.rhs, allowed="rhs(t, x, *args)")
+        self.dimension = checked_count("dimension", self.dimension, LARGEST)
+        if not isinstance(self.args, tuple):
+            raise ParameterError("must be a tuple", field="args", value=self.args, allowed="such as (0.5,)")
+        if not 0.0 < finite_array(self.tolerance, (), "tolerance") <= _COARSEST:
+            allowed = f"0 to {_COARSEST:g}"
+            raise ParameterError("is out of range", field="tolerance", value=self.tolerance, allowed=allowed)
+        self.tolerance = float(self.tolerance)
         self.events = checked_events(self.events)
-        if isinstance(self.switch_times, tuple) and not self.switch_times:
-            self.edges, self.times = _unswitched(self.duration)
-        else:
-            self.edges = _edges(self.switch_times, self.duration)
-            self.times = np.asarray(self.edges[:-1] + 0.4142 * np.diff(self.edges))
+        given = self.switch_times
+        self.edges = (
+            _unswitched(self.duration) if isinstance(given, tuple) and not given else _edges(given, self.duration)
+        )
+        self.times = self.edges[:-1] + 0.4142 * np.diff(self.edges)
         if self.autonomous and self.edges.size > 2:
             raise ParameterError("need a period", field="switch_times", value=self.switch_times, allowed="none")
         self.start = None if self.orbit is None else finite_array(self.orbit, (self.dimension,), "orbit")
@@ -146,13 +153,10 @@ class RightHandSide:
         def slopes(t: Array, x: Array) -> Array:
             return evaluate(tape, tape.slopes, t, x, params)
 
-        made: list[ImplicitFlow] = []  # made at first use, as it samples the whole period
-
+        @functools.cache  # made at first use, as it samples the whole period
         def implicit() -> ImplicitFlow:
-            if not made:
-                fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
-                made.append(ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance))
-            return made[0]
+            fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
+            return ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance)
 
         if self.method == "implicit":
             stiff = implicit()
@@ -224,7 +228,7 @@ def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
     """
     latest: tuple[bytes, float, float] | None = None  # latest flow by Taylor series, to avoid a second computation
 
-    def either(name: Literal["flow", "flow_with_error", "flow_states"]) -> Callable[..., Any]:
+    def either(name: str) -> Callable[..., Any]:
         taylor = getattr(flows, name)
 
         def flow(x: Array, t0: float, t1: float) -> Any:
@@ -246,18 +250,13 @@ def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
                 return True
         return False
 
-    return flows._replace(
-        flow=either("flow"),
-        flow_with_error=either("flow_with_error"),
-        flow_states=either("flow_states"),
-        flow_volume=lambda x, t0, t1: implicit().flow_volume(x, t0, t1),
-        is_stiff=is_stiff,
-    )
+    own = {name: either(name) for name in ("flow", "flow_with_error", "flow_states")}
+    return flows._replace(**own, flow_volume=lambda *args: implicit().flow_volume(*args), is_stiff=is_stiff)
 
 
 @functools.lru_cache
-def _unswitched(period: float) -> tuple[Array, Array]:
-    return read_only(np.array([0.0, period])), read_only(np.array([0.4142 * period]))
+def _unswitched(period: float) -> Array:
+    return read_only(np.array([0.0, period]))
 
 
 def _edges(switch_times: Sequence[float], period: float) -> Array:

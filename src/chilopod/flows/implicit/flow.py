@@ -104,6 +104,8 @@ class ImplicitFlow(ReadOnlyArrays):
         longest: float = np.inf,
     ) -> tuple[Array, Array, float]:
         """State and derivative at t1, and the logarithm of the growth of volume."""
+        from chilopod.flows.implicit import collocation as kernels  # numba takes half a second to import
+
         n, stop = self.tape.dimension, deadline.stop() if stop is None else stop
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
@@ -116,7 +118,7 @@ class ImplicitFlow(ReadOnlyArrays):
         x = x / units
         size = n if derived else 0
         derivative, report = np.eye(size), np.zeros(3)
-        kernels, method = _compiled(), _method(stages)
+        method = _method(stages)
         result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), report)
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
@@ -171,6 +173,8 @@ def _method(stages: int) -> Any:
     """Radau IIA with an odd number of stages."""
     from scipy.special import roots_jacobi  # slow to import
 
+    from chilopod.flows.implicit.collocation import Method
+
     nodes = np.append(0.5 * (1.0 + roots_jacobi(stages - 1, 1.0, 0.0)[0]), 1.0)
     # In Legendre polynomials, whose integrals are known: Lagrange polynomial j is the sum over k of inverse[k, j] P_k.
     inverse = np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, stages - 1))
@@ -179,12 +183,4 @@ def _method(stages: int) -> Any:
     values = np.linalg.eigvals(np.linalg.inv(matrix))
     real = values[np.abs(values.imag).argmin()].real
     start = legendre.legvander(np.array([-1.0]), stages - 1)[0] @ inverse
-    return _compiled().Method(nodes, matrix, start, float(1.0 / real))
-
-
-@functools.cache
-def _compiled() -> Any:
-    # numba takes half a second to import, and only integration needs it.
-    from chilopod.flows.implicit import collocation
-
-    return collocation
+    return Method(nodes, matrix, start, float(1.0 / real))

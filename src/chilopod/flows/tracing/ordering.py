@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -71,6 +72,12 @@ def _operands(graph: Graph, node: int, flat: Terms) -> list[int]:
     return [i for term in flat[node] for i in term] if node in flat else graph.operands(node)
 
 
+def _needed(graph: Graph, node: int, flat: Terms) -> list[int]:
+    """Operands of a node, and the w of a function."""
+    weight = [graph.weights[node]] if node in graph.weights and graph.depends[node] != ops.CONSTANT else []
+    return _operands(graph, node, flat) + weight
+
+
 def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
     """All nodes that some nodes need, in order of creation: each after its operands."""
     seen: set[int] = set()
@@ -80,23 +87,16 @@ def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
         if node in seen:
             continue
         seen.add(node)
-        ahead += _operands(graph, node, flat)
-        if node in graph.weights and graph.depends[node] != ops.CONSTANT:
-            ahead.append(graph.weights[node])
+        ahead += _needed(graph, node, flat)
     return sorted(seen)
 
 
 def _flattened(graph: Graph, roots: Sequence[int]) -> Terms:
     """The terms of the sums; a sum that only one other sum uses is merged into it."""
     reached = _reached(graph, roots, {})
-    uses = dict.fromkeys(reached, 0)
-    for node in roots:
-        uses[node] += 1
+    uses = Counter(roots)
     for node in reached:
-        for operand in _operands(graph, node, {}):
-            uses[operand] += 1
-        if node in graph.weights and graph.depends[node] != ops.CONSTANT:
-            uses[graph.weights[node]] += 1
+        uses.update(_needed(graph, node, {}))
     flat: Terms = {}
     for node in reached:
         if graph.nodes[node][0] != ops.LINEAR:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import types
 import weakref
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,7 +88,13 @@ def _traced(functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], f
     graph = Graph(dimension, floats)
     source = iter([Traced(graph, node) for node in graph.parameters]) if floats else None
     try:
-        return _record(graph, functions, dimension, args, source)
+        seen: dict[int, Any] = {}
+        rhs, *event_functions = rebuild(functions, source, seen)
+        results = functools.partial(_results, graph, rebuild(args, source, seen))
+        slopes = results(rhs, dimension)
+        guards = [results(guard, None)[0] for guard in event_functions[::2]]
+        resets = [graph.states if reset is None else results(reset, dimension) for reset in event_functions[1::2]]
+        return ordered(graph, slopes, guards, resets)
     except Untraceable:
         raise
     except RecursionError:
@@ -96,30 +103,17 @@ def _traced(functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], f
         raise Untraceable(f"{type(error).__name__}: {error}") from None
 
 
-def _record(
-    graph: Graph, functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], source: Iterator[Any] | None
-) -> Tape:
-    seen: dict[int, Any] = {}
-    rhs, *event_functions = rebuild(functions, source, seen)
-    args = rebuild(args, source, seen)
-    time = Traced(graph, graph.time)
-
-    def results(function: Any, count: int | None) -> list[int]:
-        with np.errstate(all="ignore"):
-            result = function(time, states(graph, dimension), *args)
-        array = as_traced(result)
-        if count is not None and array.shape != (count,):
-            raise Untraceable(f"returns the shape {array.shape}")
-        if count is None and array.size != 1:
-            raise Untraceable("a guard must return one number")
-        if len(graph.nodes) > _MOST_NODES:
-            raise Untraceable("it takes too many operations")
-        return [node_of(graph, value) for value in array.ravel()]
-
-    slopes = results(rhs, dimension)
-    guards = [results(guard, None)[0] for guard in event_functions[::2]]
-    resets = [graph.states if reset is None else results(reset, dimension) for reset in event_functions[1::2]]
-    return ordered(graph, slopes, guards, resets)
+def _results(graph: Graph, args: tuple[Any, ...], function: Any, count: int | None) -> list[int]:
+    """Nodes of the results of a rebuilt function; a ``count`` of None means one number."""
+    with np.errstate(all="ignore"):
+        array = as_traced(function(Traced(graph, graph.time), states(graph), *args))
+    if count is not None and array.shape != (count,):
+        raise Untraceable(f"returns the shape {array.shape}")
+    if count is None and array.size != 1:
+        raise Untraceable("a guard must return one number")
+    if len(graph.nodes) > _MOST_NODES:
+        raise Untraceable("it takes too many operations")
+    return [node_of(graph, value) for value in array.ravel()]
 
 
 def _verify(

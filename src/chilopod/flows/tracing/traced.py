@@ -107,6 +107,10 @@ REPLACED: dict[Any, Callable[..., Any]] = {}
 """Functions of numpy with a separate version for traced arrays (see :mod:`.standins`)."""
 
 
+def _replaced(name: str) -> Any:
+    return lambda self, *args, **options: REPLACED[getattr(np, name)](self, *args, **options)
+
+
 class TracedArray(_Recording, np.ndarray[Any, np.dtype[Any]]):
     """An array of traced and plain numbers."""
 
@@ -116,17 +120,10 @@ class TracedArray(_Recording, np.ndarray[Any, np.dtype[Any]]):
     def astype(self, *_: Any, **__: Any) -> Any:
         return self.copy()
 
-    def max(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        return np.maximum.reduce(self, axis=axis)
-
-    def min(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        return np.minimum.reduce(self, axis=axis)
-
-    def mean(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        return REPLACED[np.mean](self, axis)
-
-    def clip(self, low: Any = None, high: Any = None, **_: Any) -> Any:  # type: ignore[override]
-        return REPLACED[np.clip](self, low, high)
+    max = _replaced("max")
+    min = _replaced("min")
+    mean = _replaced("mean")
+    clip = _replaced("clip")
 
 
 def as_traced(value: Any) -> Any:
@@ -197,6 +194,6 @@ def _call(function: Any, args: tuple[Any, ...], options: dict[str, Any]) -> Any:
     return type(result)(wrapped(part) for part in result) if isinstance(result, tuple | list) else wrapped(result)
 
 
-def states(graph: Graph, dimension: int) -> NDArray[Any]:
+def states(graph: Graph) -> NDArray[Any]:
     """The states of a graph as an array."""
-    return as_traced([Traced(graph, i) for i in range(dimension)])
+    return as_traced([Traced(graph, node) for node in graph.states])

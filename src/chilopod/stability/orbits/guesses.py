@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from typing import Any
 
@@ -75,26 +76,22 @@ def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
             yield nodes, False
 
 
-def _magnified(system: SystemLike, x: Array) -> list[Nodes]:
+def _magnified(system: SystemLike, x: Array) -> Iterator[Nodes]:
     """Several nodes on the motion from a state, where a return magnifies deviations too much for one."""
     duration = return_duration(system)
-    try:
+    with contextlib.suppress(AnalysisError, np.linalg.LinAlgError):
         count = node_count(checked_flow(system, x, 0.0, duration)[1], sizes(system, x, duration))
-        return [nodes_along(system, x, duration, count)] if count >= _FEWEST_NODES else []
-    except (AnalysisError, np.linalg.LinAlgError):
-        return []
+        if count >= _FEWEST_NODES:
+            yield nodes_along(system, x, duration, count)
 
 
-def _onward(system: SystemLike, x: Array) -> list[Nodes]:
+def _onward(system: SystemLike, x: Array) -> Iterator[Nodes]:
     """A state further along the motion, if every state may be time 0: the guess may lie at an event, such as an impact,
     and round-off decides whether a motion that ends there is before or after it."""
-    if not is_autonomous(system):
-        return []
-    duration = return_duration(system)
-    try:
-        return [Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration)]
-    except AnalysisError:
-        return []
+    if is_autonomous(system):
+        duration = return_duration(system)
+        with contextlib.suppress(AnalysisError):
+            yield Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration)
 
 
 def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:

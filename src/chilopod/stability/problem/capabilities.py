@@ -10,7 +10,7 @@ derivative has the derivative of state i with respect to state j at the start in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, TypeGuard
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from chilopod.flows.arguments import UserCode, numbers, shape_of
 from chilopod.frozen import Array
 
 
+@runtime_checkable
 class SystemLike(Protocol):
     """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow, which every analysis needs.
 
@@ -47,6 +48,7 @@ Family = Callable[[float], SystemLike]
 """The system at a value of a parameter."""
 
 
+@runtime_checkable
 class Autonomous(SystemLike, Protocol):
     """Systems that do not depend on time: the period of an orbit is an unknown, and every instant may be time 0."""
 

@@ -184,21 +184,24 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     n = system.dimension
     if x.shape != (n,):
         raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
-    count = returns_per_period(system)
     if is_autonomous(system):
-        return _return_to_section(system, x, with_error, section or section_at(system, x))
-    duration = return_duration(system)
+        section = section or section_at(system, x)
+        assert section is not None
+        start, rest, (before, first) = crossing(system, x, section, functools.partial(checked_flow, system))
+        duration = start + rest
+    else:
+        section, duration = None, return_duration(system)
     error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, duration)
-    else:
+    elif section is None:
         state, jacobian = checked_flow(system, x, 0.0, duration)
+    else:
+        state, second = checked_flow(system, before, 0.0, rest)
+        jacobian = second @ first
     if system.symmetry is not None:
         state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
-        if isinstance(error, np.ndarray):
-            error = np.abs(system.symmetry) @ error
-    _check_finite(state, jacobian)
-    return ReturnMap(state, jacobian, error, count, count * duration)
+    return on_section(system, section, state, jacobian, duration, error)
 
 
 def _check_finite(state: Array, jacobian: Array) -> None:
@@ -214,20 +217,6 @@ def _period(system: SystemLike) -> float:
     return system.period
 
 
-def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: Section | None) -> ReturnMap:
-    assert section is not None
-    start, rest, first = crossing(system, x, section, functools.partial(checked_flow, system))
-    error: float | Array = np.nan
-    if with_error:
-        state, jacobian, error = flow_with_error(system, x, 0.0, start + rest)
-    else:
-        state, second = checked_flow(system, first[0], 0.0, rest)
-        jacobian = second @ first[1]
-    if system.symmetry is not None:
-        state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
-    return on_section(system, section, state, jacobian, start + rest, error)
-
-
 def on_section(
     system: SystemLike,
     section: Section | None,
@@ -241,12 +230,16 @@ def on_section(
     _check_finite(state, jacobian)
     count = returns_per_period(system)
     image = ReturnMap(state, jacobian, error, count, count * duration)
-    if section is None or not is_autonomous(system):
+    turned_across = None if system.symmetry is None else np.abs(system.symmetry)
+    if section is not None and is_autonomous(system):
+        image = replace(image, velocity=_velocity(system, state), normal=section.normal)
+        across = np.abs(image.across)
+        turned_across = across if turned_across is None else across @ turned_across
+        image = replace(image, jacobian=image.across @ jacobian)
+    if turned_across is None:
         return image
-    image = replace(image, velocity=_velocity(system, state), normal=section.normal)
-    turned_across = np.abs(image.across) if system.symmetry is None else np.abs(image.across) @ np.abs(system.symmetry)
     error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())
-    return replace(image, jacobian=image.across @ jacobian, error=error)
+    return replace(image, error=error)
 
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:

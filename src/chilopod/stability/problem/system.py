@@ -96,7 +96,7 @@ class PeriodicSystem(ReadOnlyArrays):
         if self.symmetry is not None:
             symmetry = self._of_finite_order("symmetry", self.symmetry)[0]
             self._set("symmetry", symmetry)
-            self._set("symmetry_order", max(2, _order(symmetry)))
+            self._set("symmetry_order", max(2, _order(symmetry.tobytes(), len(symmetry))))
         if self.spatial_symmetry is not None:
             self._set("spatial_symmetry", self._of_finite_order("spatial_symmetry", self.spatial_symmetry))
         if self.orbit is not None:
@@ -112,32 +112,23 @@ class PeriodicSystem(ReadOnlyArrays):
         object.__setattr__(self, name, value)
 
     def _of_finite_order(self, name: str, given: ArrayLike) -> Array:
-        try:
-            matrices = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise ParameterError("must be a matrix of numbers", field=name, value=given) from None
+        matrices = finite_array(given, None, name)
         n = self.dimension
         single = matrices.ndim == 2
         if matrices.shape[-2:] != (n, n) or matrices.ndim > 3 or (name == "symmetry" and not single):
             raise ParameterError("has the wrong shape", field=name, value=matrices.shape, allowed=f"({n}, {n})")
         matrices = matrices.reshape(-1, n, n)
         for matrix in matrices:
-            if _order(matrix) == 0:
+            if _order(matrix.tobytes(), n) == 0:
                 said = "must have a finite order: a power that is the identity"
                 raise ParameterError(said, field=name, allowed=f"an order up to {_HIGHEST_ORDER}")
         return matrices
 
 
-def _order(matrix: Array) -> int:
-    return _order_of(matrix.tobytes(), len(matrix))  # families use the same matrix at every value
-
-
-@functools.lru_cache(maxsize=256)
-def _order_of(entries: bytes, n: int) -> int:
+@functools.lru_cache(maxsize=256)  # families use the same matrix at every value
+def _order(entries: bytes, n: int) -> int:
     """The smallest k > 0 with matrix^k = 1; 0 for infinite order."""
     matrix = np.frombuffer(entries).reshape(n, n)
-    if not np.isfinite(matrix).all():
-        return 0
     one = np.eye(len(matrix))
     # Entries between states of different units are large and small in pairs, so the bound is entry by entry; those
     # that are round-off of the others (the cosine of a right angle) count as zero.
