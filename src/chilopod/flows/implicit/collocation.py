@@ -34,21 +34,16 @@ _CLOSE = 1e-7  # Newton correction after which the next one is round-off
 _NOISE = 2.0**-51  # round-off relative to the terms whose difference is the error estimate
 
 
-class Interval(NamedTuple):
-    """An interval of time on which the right-hand side is smooth."""
+class Control(NamedTuple):
+    """Step control of an integration over an interval of time on which the right-hand side is smooth."""
 
     # start and end
     t0: float
     t1: float
     longest: float  # longest step
     branches: Any  # branches of the switches, shape (switches,)
-
-
-class Control(NamedTuple):
-    """Step control of an integration."""
-
     tolerance: float  # estimated error of a step over the size of every state and entry of the derivative
-    most_steps: int  # budget of steps in an interval
+    most_steps: int  # budget of steps
     units: Any  # units of the states, shape (n,), positive
     near: Any  # entries of the derivative under step control, shape (n, n)
     stop: Any  # shape (1,); not zero once there is no more time
@@ -283,9 +278,8 @@ def _predict(nodes: Any, ratio: float, last: Any, moved: Any) -> None:
     """Guess the stages by extrapolating the polynomial of the previous step: Lagrange polynomials on 0 and its nodes.
     ``ratio`` is the step over the previous one; 0 for the first step."""
     s, n = moved.shape
+    moved.fill(0.0)
     for i in range(s):
-        for k in range(n):
-            moved[i, k] = 0.0
         z = 1.0 + nodes[i] * ratio
         if ratio > 0.0 and z <= 3.0:
             for j in range(s):
@@ -297,18 +291,6 @@ def _predict(nodes: Any, ratio: float, last: Any, moved: Any) -> None:
                     moved[i, k] += f * last[j, k]
             for k in range(n):
                 moved[i, k] -= last[s - 1, k]
-
-
-@fused_njit(error_model="numpy")
-def _largest_row(matrix: Any) -> float:
-    """Largest sum of moduli of a row: numba takes seconds to compile ``sum(axis=1)``."""
-    largest = 0.0
-    for i in range(matrix.shape[0]):
-        total = 0.0
-        for j in range(matrix.shape[1]):
-            total += abs(matrix[i, j])
-        largest = max(largest, total)
-    return largest
 
 
 @fused_njit(error_model="numpy")
@@ -329,15 +311,6 @@ def _take(x: Any, step: Any, last: Any, result: Any) -> None:
 
 
 @fused_njit(error_model="numpy")
-def _prepared(tape: Any, units: Any, params: Any, branches: Any, largest: Any) -> Any:
-    """A right-hand side with its parameters loaded and room for its values."""
-    series = loaded(tape, params, 1, units.size, branches)
-    for i in range(units.size):
-        series.tangents[i, 0, i] = 1.0
-    return Problem(tape, units, series, largest)
-
-
-@fused_njit(error_model="numpy")
 def _room(n: int, s: int) -> Any:
     """An empty step of s stages of n states."""
     return Step(
@@ -353,13 +326,16 @@ def _room(n: int, s: int) -> Any:
 
 
 @fused_njit(error_model="numpy", nogil=True)
-def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control: Any, result: Any) -> int:
+def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: Any) -> int:
     """Carry a state x, shape (n,), in units, over an interval in place; return the status."""
-    n, s, t1 = x.size, method.nodes.size, interval.t1
-    problem = _prepared(tape, control.units, params, interval.branches, result.largest)
+    n, s, t1 = x.size, method.nodes.size, control.t1
+    series = loaded(tape, params, 1, n, control.branches)
+    for i in range(n):
+        series.tangents[i, 0, i] = 1.0
+    problem = Problem(tape, control.units, series, result.largest)
     step = _room(n, s)
     last = np.zeros((s, n))
-    t, h, h_last = interval.t0, 0.0, 0.0
+    t, h, h_last = control.t0, 0.0, 0.0
     steps = 0
     status = DONE
     fresh = True
@@ -368,21 +344,22 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
             if not slope_at(tape, problem.series, problem.units, t, x, step.slope, step.jacobian):
                 status = NOT_FINITE
                 break
+            rate = 0.0
             for i in range(n):
                 result.largest[i] = max(result.largest[i], abs(x[i]))
+                rate = max(rate, np.abs(step.jacobian[i]).sum())
             if h == 0.0:  # the fastest rate limits the first step
-                rate = _largest_row(step.jacobian)
                 h = min(t1 - t, 1.0 / rate) if rate > 0.0 else t1 - t
             fresh = False
         steps += 1
-        far = steps * (t1 - interval.t0) > _HOPELESS * control.most_steps * (t - interval.t0)
+        far = steps * (t1 - control.t0) > _HOPELESS * control.most_steps * (t - control.t0)
         if steps > control.most_steps or (steps > _PATIENCE and far):
             status = BUDGET
             break
         if control.stop[0] != 0.0:
             status = TIME_OVER
             break
-        h = min(h, interval.longest)
+        h = min(h, control.longest)
         ends = h >= (1.0 - 1e-10) * (t1 - t)
         if ends:
             h = t1 - t

@@ -124,9 +124,8 @@ class ImplicitFlow(ReadOnlyArrays):
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
             branches = _branches(self.tape, params, np.array([0.5 * (a + b)]))[:, 0].copy()
             limit = min(longest, longest_step(self.fast, float(self.edges[-1]), a, b))
-            interval = kernels.Interval(a, b, limit, branches)
-            control = kernels.Control(tolerance, budget, units, near, stop)
-            status = kernels.advance(self.tape, method, params, x, interval, control, result)
+            control = kernels.Control(a, b, limit, branches, tolerance, budget, units, near, stop)
+            status = kernels.advance(self.tape, method, params, x, control, result)
             if status:
                 raise failure(status, report[1])
             budget -= int(report[0])

@@ -97,12 +97,7 @@ def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> A
     if isinstance(value, np.ndarray):
         if value.dtype.kind != "f" or source is None:
             return value
-        array = np.empty(value.size, dtype=object)
-        for i in range(value.size):
-            array[i] = next(source)
-        if all(isinstance(part, float) for part in array):
-            return value
-        return as_traced(array).reshape(value.shape)
+        return as_traced([next(source) for _ in range(value.size)]).reshape(value.shape)
     if isinstance(value, tuple | list):
         return type(value)([rebuild(part, source, seen) for part in value])
     if isinstance(value, dict):

@@ -255,11 +255,6 @@ class Graph:
             return self._new(ops.SELECT, (operands[1], below, above))
         return self._new(ops.SELECT, (sign, above, below))
 
-    def operands(self, node: int) -> list[int]:
-        """The operands of a node, weights included."""
-        code, operands = self.nodes[node]
-        return [] if code in LEAVES else list(operands)
-
 
 BUILDS: dict[str, Callable[..., int]] = {}
 """``BUILDS[name](graph, *operands) -> node``."""

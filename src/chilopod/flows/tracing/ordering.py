@@ -69,7 +69,10 @@ def ordered(graph: Graph, slopes: Sequence[int], guards: Sequence[int], resets: 
 
 
 def _operands(graph: Graph, node: int, flat: Terms) -> list[int]:
-    return [i for term in flat[node] for i in term] if node in flat else graph.operands(node)
+    if node in flat:
+        return [i for term in flat[node] for i in term]
+    code, operands = graph.nodes[node]
+    return [] if code in LEAVES else list(operands)
 
 
 def _needed(graph: Graph, node: int, flat: Terms) -> list[int]:

@@ -107,7 +107,7 @@ def known_state(system: SystemLike) -> Array:
     if orbit is None:
         said = "this system has no known periodic orbit"
         raise AnalysisError(said, field="orbit", allowed="a first guess of the orbit")
-    return np.asarray(orbit, dtype=np.float64)
+    return finite_array(orbit, (system.dimension,), "orbit")
 
 
 def find_orbit(

@@ -17,7 +17,6 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
@@ -31,7 +30,7 @@ from chilopod.stability.problem.capabilities import (
     offers,
     returns_per_period,
 )
-from chilopod.stability.problem.scales import sizes
+from chilopod.stability.problem.scales import check_finite, sizes
 
 _APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from which the crossing is corrected
 _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
@@ -160,7 +159,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
         state, derivative, error = checked_flow(system, x, t0, t1, with_error=True)
         return state, derivative, error
     state, derivative = checked_flow(system, x, t0, t1)
-    _check_finite(state, derivative)
+    check_finite(state, derivative)
     times = [t0 + part * (t1 - t0) for part in CUTS] + [t1]
     passing, product = x, np.eye(x.size)
     for a, b in zip(times, times[1:], strict=False):
@@ -174,16 +173,12 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     return state, derivative, (REPEATED * off + 1e-15 * largest) * units
 
 
-def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, section: Section | None = None) -> ReturnMap:
+def return_map(system: SystemLike, x: Array, with_error: bool = True, section: Section | None = None) -> ReturnMap:
     """The return map H and its derivative at a state, shape (n,), with an optional bound on the error, which may cost a
     second computation.
 
     If the system does not depend on time, a return ends on the section: by default across the motion at ``x``.
     """
-    x = np.array(x, dtype=np.float64)  # a system may write into its argument
-    n = system.dimension
-    if x.shape != (n,):
-        raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
     if is_autonomous(system):
         section = section or section_at(system, x)
         assert section is not None
@@ -204,11 +199,6 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     return on_section(system, section, state, jacobian, duration, error)
 
 
-def _check_finite(state: Array, jacobian: Array) -> None:
-    if not (np.isfinite(state).all() and np.isfinite(jacobian).all()):
-        raise AnalysisError("the flow is not finite over one return", field="flow")
-
-
 def _period(system: SystemLike) -> float:
     if system.period is None:
         raise ParameterError(
@@ -227,7 +217,7 @@ def on_section(
 ) -> ReturnMap:
     """The return map from a return within its duration, to a section if there is one, and from the derivative over this
     duration; ``error`` bounds that of the flow without the symmetry."""
-    _check_finite(state, jacobian)
+    check_finite(state, jacobian)
     count = returns_per_period(system)
     image = ReturnMap(state, jacobian, error, count, count * duration)
     turned_across = None if system.symmetry is None else np.abs(system.symmetry)
@@ -256,7 +246,7 @@ def crossing(
     for approach in _APPROACHES:
         start = (1.0 - approach) * section.duration
         before, derivative = flow(x, 0.0, start)
-        _check_finite(before, derivative)
+        check_finite(before, derivative)
         arrival = _arrival(system, before, section, approach * section.duration)
         if arrival is not None:
             return start, arrival[0], (before, derivative)

@@ -13,6 +13,12 @@ _PART = 1.0 / 16.0  # part of a return
 _SWEEPS = 3
 
 
+def check_finite(*results: Array) -> None:
+    """Refuse results of a flow that are not finite."""
+    if not all(np.isfinite(each).all() for each in results):
+        raise AnalysisError("the flow is not finite over one return", field="flow")
+
+
 def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     """Large size of every state, shape (n,): from the system, or from a state on the orbit and the flow over
     a part of the return.
@@ -26,14 +32,12 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     if given is not None:
         return given
     later, derivative = checked_flow(system, x, 0.0, _PART * duration)
-    if not (np.isfinite(later).all() and np.isfinite(derivative).all()):
-        raise AnalysisError("the flow is not finite over one return", field="flow")
+    check_finite(later, derivative)
     size = np.maximum(np.abs(x), np.abs(later))
     if not size.any():
         if not (derivative - np.diag(np.diag(derivative))).any():  # a map has no parts
             derivative = checked_flow(system, x, 0.0, duration)[1]
-            if not np.isfinite(derivative).all():
-                raise AnalysisError("the flow is not finite over one return", field="flow")
+            check_finite(derivative)
         return numerical_balance(derivative)
     coupling = np.abs(derivative)
     np.fill_diagonal(coupling, 0.0)
