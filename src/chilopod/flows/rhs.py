@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,34 +40,18 @@ _PATIENCE = 256  # taylor steps after which the implicit method takes over a mot
 Method = Literal["automatic", "taylor", "implicit"]
 
 
-class Flows(NamedTuple):
-    """Flows of a right-hand side; arguments and results are those of :mod:`chilopod.stability.problem.capabilities`.
+Members = dict[str, Any]
+"""Members of a system, as in :class:`chilopod.stability.Capabilities`, without hidden state."""
 
-    Every result depends on the arguments of its call alone.
-    """
-
-    slopes: Slopes  # `slopes(times, states)` -> dx/dt at many times and states
-    # flow with derivative; with the bound of its error; of many states
-    flow: Callable[[Array, float, float], tuple[Array, Array]]
-    flow_with_error: Callable[[Array, float, float], tuple[Array, Array, float | Array]]
-    flow_states: Callable[[Array, float, float], Array]
-    # flow of some directions; None if only the whole derivative is available
-    flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = None
-    # growth of volume, and a test for an implicit flow from a state; None if no flow is implicit
-    flow_volume: Callable[[Array, float, float], tuple[float, float]] | None = None
-    is_stiff: Callable[[Array, float, float], bool] | None = None
-    # Taylor coefficients of f along curves; None where f cannot be traced, or depends on time
-    velocity_series: Callable[[Array], Array] | None = None
-    concurrent: bool = False  # True if flows may run in several threads
+_FLOWS = "flow", "flow_with_error", "flow_states"
 
 
 @dataclass
 class RightHandSide:
     """A right-hand side f(t, x, *args), checked, with the arguments of :func:`chilopod.stability.from_rhs`.
 
-    The ``duration`` is the period of the explicit dependence on time, or about that of a motion. Of the results,
-    ``start`` is the state on the orbit, if known, and ``base`` a state to test f at; ``edges`` are the times from 0 to
-    the period at which f switches, and ``times`` one inside each interval.
+    The ``duration`` is the period of the explicit dependence on time, or about that of a motion; ``base`` is a state to
+    test f at, ``edges`` are the times from 0 to the period at which f switches, ``times`` one inside each interval.
     """
 
     rhs: Callable[..., ArrayLike]
@@ -107,8 +91,8 @@ class RightHandSide:
         self.base = np.zeros(self.dimension) if self.start is None else self.start
         check_events(self.events, self.args, self.times, self.start, self.dimension)
 
-    def flows(self) -> Flows:
-        """Flows of the right-hand side: traced if possible, else from calls."""
+    def flows(self) -> tuple[Slopes, Members]:
+        """The right-hand side at many times and states, and its flows: traced if possible, else from calls."""
         pairs = [(event.guard, event.reset) for event in self.events]
         try:
             traced = trace(
@@ -116,14 +100,14 @@ class RightHandSide:
             )
         except Untraceable as reason:
             self._refuse_calls(reason)
-            flows = self._called(str(reason))
+            slopes, members = self._called(str(reason))
         else:
             if self.jacobian is not None:
                 self._check_jacobian(self.jacobian, traced)
-            flows = self._traced(traced)
+            slopes, members = self._traced(traced)
         if self.autonomous:
-            check_timeless(flows.slopes, self.base, self.duration)
-        return flows
+            check_timeless(slopes, self.base, self.duration)
+        return slopes, members
 
     def _refuse_calls(self, reason: Untraceable) -> None:
         """Refuse a function of the wrong shape, and options that need a traced function."""
@@ -140,14 +124,14 @@ class RightHandSide:
             said = f"needs a function that can be traced: {reason}"
             raise ParameterError(said, field="method", value=self.method, allowed="automatic") from None
 
-    def _called(self, reason: str) -> Flows:
+    def _called(self, reason: str) -> tuple[Slopes, Members]:
         slopes = sampled(self.rhs, self.args, self.dimension)
         warn_of_jumps(slopes, self.dimension, self.edges, self.start)
         fast = fast_parts(slopes, self.base, self.edges)
         called = CalledFlow(self.rhs, self.args, self.jacobian, self.edges, fast, self.times, reason, self.tolerance)
-        return Flows(slopes, called.flow, called.flow_with_error, called.flow_states)
+        return slopes, {name: getattr(called, name) for name in _FLOWS}
 
-    def _traced(self, traced: Trace) -> Flows:
+    def _traced(self, traced: Trace) -> tuple[Slopes, Members]:
         tape, params = traced.tape, traced.params
 
         def slopes(t: Array, x: Array) -> Array:
@@ -158,32 +142,23 @@ class RightHandSide:
             fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
             return ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance)
 
+        members: Members = {"concurrent": True}
         if self.method == "implicit":
-            stiff = implicit()
-            flows = Flows(
-                slopes,
-                stiff.flow,
-                stiff.flow_with_error,
-                stiff.flow_states,
-                flow_volume=stiff.flow_volume,
-                is_stiff=lambda x, t0, t1: True,
-                concurrent=True,
-            )
+            members |= {name: getattr(implicit(), name) for name in (*_FLOWS, "flow_volume")}
+            members["is_stiff"] = lambda x, t0, t1: True
         else:
             taylor = self._taylor(traced)
-            flows = Flows(
-                slopes,
-                lambda x, t0, t1: taylor.advance(x, t0, t1, params)[:2],
-                lambda x, t0, t1: taylor.advance(x, t0, t1, params, bounded=True)[:3],
-                lambda states, t0, t1: taylor.states(states, t0, t1, params),
-                flow_tangents=lambda x, directions, t0, t1: taylor.tangents(x, directions, t0, t1, params),
-                concurrent=True,
-            )
+            members |= {
+                "flow": lambda x, t0, t1: taylor.advance(x, t0, t1, params)[:2],
+                "flow_with_error": lambda x, t0, t1: taylor.advance(x, t0, t1, params, bounded=True)[:3],
+                "flow_states": lambda states, t0, t1: taylor.states(states, t0, t1, params),
+                "flow_tangents": lambda x, along, t0, t1: taylor.tangents(x, along, t0, t1, params),
+            }
             if taylor.patience:
-                flows = _either(flows, implicit)
+                members = members | _either(members, implicit)
         if self.autonomous:
-            flows = flows._replace(velocity_series=lambda curves: evaluate_series(tape, curves, params))
-        return flows
+            members["velocity_series"] = lambda curves: evaluate_series(tape, curves, params)
+        return slopes, members
 
     def _taylor(self, traced: Trace) -> TaylorFlow:
         """The flow by Taylor series, one for all values of the parameters."""
@@ -221,20 +196,16 @@ class RightHandSide:
                 )
 
 
-def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
-    """Flows by Taylor series, and by the implicit method from every state where the series take too many steps.
-
-    Every call decides anew, so that no result depends on earlier calls.
-    """
+def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
+    """Flows by Taylor series, and by the implicit method from every state where the series take too many steps. Every
+    call decides anew."""
     latest: tuple[bytes, float, float] | None = None  # latest flow by Taylor series, to avoid a second computation
 
     def either(name: str) -> Callable[..., Any]:
-        taylor = getattr(flows, name)
-
         def flow(x: Array, t0: float, t1: float) -> Any:
             nonlocal latest
             try:
-                found = taylor(x, t0, t1)
+                found = taylor[name](x, t0, t1)
             except TooManySteps:
                 return getattr(implicit(), name)(x, t0, t1)
             latest = x.tobytes(), t0, t1
@@ -245,13 +216,13 @@ def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
     def is_stiff(x: Array, t0: float, t1: float) -> bool:
         if latest != (x.tobytes(), t0, t1):
             try:
-                flows.flow(x, t0, t1)
+                taylor["flow"](x, t0, t1)
             except TooManySteps:
                 return True
         return False
 
-    own = {name: either(name) for name in ("flow", "flow_with_error", "flow_states")}
-    return flows._replace(**own, flow_volume=lambda *args: implicit().flow_volume(*args), is_stiff=is_stiff)
+    own: Members = {name: either(name) for name in _FLOWS}
+    return own | {"flow_volume": lambda *args: implicit().flow_volume(*args), "is_stiff": is_stiff}
 
 
 @functools.lru_cache

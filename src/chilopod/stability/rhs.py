@@ -87,17 +87,15 @@ def from_rhs(
     given = RightHandSide(
         rhs, dimension, length, autonomous, args, events, switch_times, jacobian, orbit, method, tolerance
     )
-    flows = given.flows()
-    slopes = flows.slopes
-    rest: dict[str, Any] = {"scale": scale, "symmetry": symmetry, "spatial_symmetry": spatial_symmetry}
-    rest |= {name: part for name, part in flows._asdict().items() if name != "slopes"}
+    slopes, members = given.flows()
+    members |= {"scale": scale, "symmetry": symmetry, "spatial_symmetry": spatial_symmetry}
     system = PeriodicSystem(
         dimension=given.dimension,
         period=None if autonomous else length,
         velocity=(lambda x: slopes(np.zeros(1), x[:, None])[:, 0]) if autonomous else None,
         guess_period=length if autonomous else None,
         orbit=given.start,
-        **rest,
+        **members,
     )
     if not autonomous:
         check_symmetry("period", np.eye(given.dimension), length, slopes, _TIMES * length, given.base, np.inf)

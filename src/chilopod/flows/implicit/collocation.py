@@ -146,11 +146,8 @@ def _newton_matrix(weights: Any, h: float, jacobians: Any, matrix: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
-    """Solve for the stages from the guess in ``moved``.
-
-    At the end ``columns`` has the derivative of the stages with respect to x, and ``slopes`` and ``jacobians`` belong
-    to the stages. False without convergence.
-    """
+    """Solve for the stages from the guess in ``moved``, with their ``columns``, ``slopes`` and ``jacobians``; False
+    without convergence."""
     nodes, weights, largest = method.nodes, method.weights, problem.largest
     moved, slopes = step.moved, step.slopes
     s, n = moved.shape
@@ -239,11 +236,8 @@ def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple
 def _estimated(
     problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any
 ) -> float:
-    """The error of a step relative to the size of every state and entry of the derivative.
-
-    The size of a state is its largest value so far, or the effect of the others on it within the step; likewise for the
-    entries of the derivative, ``extent``.
-    """
+    """The error of a step relative to the size of every state, its largest value so far or the effect of the others on
+    it within the step, and of the entries of the derivative, likewise."""
     largest, reached = problem.largest, step.reached
     s, n = step.moved.shape
     off, noise = _defects(x, h, method, step, derivative)

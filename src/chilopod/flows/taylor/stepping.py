@@ -104,10 +104,8 @@ def _assign(matrix: Any, values: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def _absorb(block: Any, count: int, total: Any, bound: Any) -> None:
-    """Multiply the derivative by the factors of a block of steps, and carry the bound of its error.
-
-    A step with error e_s contributes |P_s| e_s |D_s|, with D_s the product before it and P_s the product after it.
-    """
+    """Multiply the derivative by the factors of a block of steps, and carry the bound of its error, to which a step
+    with error e_s adds |P_s| e_s |D_s|, with D_s the product before it and P_s the product after it."""
     n = total.shape[0]
     before = np.empty((count + 1, n, n))
     _assign(before[0], np.eye(n))
@@ -249,11 +247,9 @@ def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: Any, control: Any, outcome: Any) -> int:
-    """Carry a state x, shape (n,), from the start to the end of a span in place; return the status.
-
-    The ``directions`` of the events are None for a tape without switches, whose code is then not compiled; a ``clock``
-    has functions of time on a grid over the period, each with its largest modulus last, and the period.
-    """
+    """Carry a state x, shape (n,), from the start to the end of a span in place; return the status. The ``directions``
+    of the events are None for a tape without switches, whose code is then not compiled; a ``clock`` has functions of
+    time on a grid over the period, each with its largest modulus last, and the period."""
     t0, t1 = span
     n, order, switches = tape.layout[0], control.order, tape.switches.shape[1]
     columns = outcome.derivative.shape[1]

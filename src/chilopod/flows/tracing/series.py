@@ -66,10 +66,7 @@ def values_at(
     program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, branches: Any
 ) -> None:
     """Coefficients 0 to ``order`` of the operations in a span (first and past-last), and of the states from ``slopes``.
-
-    Its arguments are single arrays, and one call handles all orders: counting references to arrays takes as long as
-    the arithmetic of a small system.
-    """
+    One call with single arrays does all orders, as counting references to arrays takes long."""
     for k in range(order + 1):
         for i in range(span[0], span[1]):
             code, a, b = program[0, i], program[1, i], program[2, i]
@@ -265,10 +262,7 @@ def compose(tape: Any, params: Any, t: float, curve: Any, branches: Any, found: 
 @fused_njit(error_model="numpy", inline="always")
 def expand_values(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
     """Coefficients 0 to ``order`` of the states and of all operations up to ``stop``, in powers of the time since the
-    start over ``unit``.
-
-    ``values[state, 0]`` and ``values[time, 0]`` must be set.
-    """
+    start over ``unit``, from those of order 0 of the states and the time."""
     values, first = series.values, tape.layout[3]
     values[tape.layout[0], 1] = unit
     values_at(tape.program, tape.terms, tape.slopes, (first, stop), order, unit, values, series.branches)

@@ -20,13 +20,12 @@ def check_finite(*results: Array) -> None:
 
 
 def sizes(system: SystemLike, x: Array, duration: float) -> Array:
-    """Large size of every state, shape (n,): from the system, or from a state on the orbit and the flow over
-    a part of the return.
+    """Large size of every state, shape (n,): the system's own, or the larger of its value and its change within a part
+    of the return when the others are disturbed by their own sizes.
 
-    The size of a state is the larger of its value and its change within a part of the return when the others are
-    disturbed by their own sizes, so the coupling gives the size of a state that passes through zero or rests there. (At
-    the end of the return strongly damped states would not depend on the others.) So states in other units have sizes in
-    these units. For an orbit that is zero throughout, only the ratios have a meaning.
+    So the coupling gives the size of a state that passes through zero or rests there. (At the end of the return
+    strongly damped states would not depend on the others.) For an orbit that is zero throughout, only the ratios have a
+    meaning.
     """
     given = given_scale(system)
     if given is not None:
