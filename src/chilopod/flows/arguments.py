@@ -97,16 +97,12 @@ def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
         array = None
     wanted = f"an array of shape {shape}" if shape else "one number"
     if array is None:
-        what = "an array of numbers" if shape else "a number"
-        raise ParameterError(f"must return {what}, not {_kind_of(result)}", field=field, allowed=wanted)
+        what, text = "an array of numbers" if shape else "a number", repr(result)
+        given = text if len(text) <= _LONGEST_SHOWN else f"a {type(result).__name__}"
+        raise ParameterError(f"must return {what}, not {given}", field=field, allowed=wanted)
     if array.shape != shape:
         raise ParameterError(f"returns an array of shape {array.shape}", field=field, allowed=wanted)
     return array
-
-
-def _kind_of(result: object) -> str:
-    text = repr(result)
-    return text if len(text) <= _LONGEST_SHOWN else f"a {type(result).__name__}"
 
 
 def check_shape(

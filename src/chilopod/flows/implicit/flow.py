@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,6 @@ class ImplicitFlow(ReadOnlyArrays):
     fast: Array
     # estimated error of a step relative to the size of each state and entry of the derivative; the error is far smaller
     tolerance: float
-    _cuts: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not can_be_implicit(self.tape):
@@ -53,10 +52,12 @@ class ImplicitFlow(ReadOnlyArrays):
                 value="implicit",
                 allowed="'taylor', or a right-hand side that is smooth in the state",
             )
-        period = float(self.edges[-1])
-        switches = _switch_instants(self.tape, self.params, period)
-        object.__setattr__(self, "_cuts", np.unique(np.concatenate([self.edges, self.fast.ravel(), switches])))
         super().__post_init__()
+
+    @functools.cached_property
+    def _cuts(self) -> Array:
+        switches = _switch_instants(self.tape, self.params, float(self.edges[-1]))
+        return np.unique(np.concatenate([self.edges, self.fast.ravel(), switches]))
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""

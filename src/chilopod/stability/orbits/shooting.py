@@ -59,7 +59,7 @@ NODES = Rule(1e-13, 1e-9)
 
 class Nodes(NamedTuple):
     """States at instants that divide a return evenly, shape (m, n), the first at time 0, the time of the return,
-    and the value of the parameter."""
+    and the value of the parameter; or their changes in a correction."""
 
     states: Array
     duration: float
@@ -128,7 +128,7 @@ def shot(
         _Problem(system_at, free, shared, budget, careful), start, _Frame(sizes, sizes, section, careful)
     )
     rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
-    correction: _Correction | None = None
+    correction: Nodes | None = None
     whole = True
     cutoff = _CUTOFF if free is not None else _SINGULAR if len(start.states) == 1 else _FAMILY
     for _ in range(_EVALUATIONS if free is None else FEW_ROUNDS):
@@ -177,14 +177,6 @@ class _Problem:
             return self.system_at(value + step), step
         except AnalysisError:  # the family ends here
             return self.system_at(value - step), -step
-
-
-class _Correction(NamedTuple):
-    """Changes of the nodes, shape (m, n), of the time of a return and of the parameter."""
-
-    states: Array
-    duration: float
-    value: float
 
 
 class _Frame(NamedTuple):
@@ -288,7 +280,7 @@ class _Equations:
         total, n = self._totals(self._off)[-1], self._off.shape[1]
         return Closed(self.nodes, self.frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
 
-    def correction(self, other: _Equations, cutoff: float) -> _Correction:
+    def correction(self, other: _Equations, cutoff: float) -> Nodes:
         """Correction by these linear equations for the residual here or at other nodes."""
         section, free, sizes = self.frame.section, self._problem.free, self.frame.sizes
         n, totals = sizes.size, self._totals(other._off)
@@ -315,9 +307,9 @@ class _Equations:
         if time is not None and not self._returned:  # else the next node determines it
             every[n] = time @ every
         states = np.array([every[:n], *(total @ every for total in totals[:-1])])
-        return _Correction(states, float(every[n]), float(every[n + 1]))
+        return Nodes(states, float(every[n]), float(every[n + 1]))
 
-    def after(self, correction: _Correction, part: float) -> _Equations | None:
+    def after(self, correction: Nodes, part: float) -> _Equations | None:
         """The equations after that part of a correction, or less if states or the time would change much; None if the
         motion ends before, for a given parameter."""
         here = self.nodes
@@ -342,7 +334,7 @@ class _Equations:
                 raise
             return None
 
-    def is_nearer(self, there: _Equations, correction: _Correction, part: float, cutoff: float, best: float) -> bool:
+    def is_nearer(self, there: _Equations, correction: Nodes, part: float, cutoff: float, best: float) -> bool:
         """True if other equations, after part of a correction, have half the residual, or a smaller correction by the
         linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3); without a return, where
         steps are short, if their residual is not much larger than the best."""
@@ -353,7 +345,7 @@ class _Equations:
         before, left = self._length(correction), self._length(self.correction(there, cutoff))
         return left <= max((1.0 - 0.25 * part) * before, NODES.settled)
 
-    def _length(self, correction: _Correction) -> float:
+    def _length(self, correction: Nodes) -> float:
         states = float(np.abs(correction.states / self.frame.sizes).max())
         return max(states, abs(correction.duration) / self.nodes.duration)
 

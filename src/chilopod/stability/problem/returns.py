@@ -139,7 +139,10 @@ def section_at(
 
 def return_duration(system: SystemLike) -> float:
     """Duration of a return; approximate if the period belongs to the orbit."""
-    whole = system.guess_period if is_autonomous(system) else _period(system)
+    whole = system.guess_period if is_autonomous(system) else system.period
+    if whole is None:
+        allowed = "a duration, or a velocity and a guess of the period"
+        raise ParameterError("must be given", field="period", value=None, allowed=allowed)
     return whole / returns_per_period(system)
 
 
@@ -197,14 +200,6 @@ def return_map(system: SystemLike, x: Array, with_error: bool = True, section: S
     if system.symmetry is not None:
         state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
     return on_section(system, section, state, jacobian, duration, error)
-
-
-def _period(system: SystemLike) -> float:
-    if system.period is None:
-        raise ParameterError(
-            "must be given", field="period", value=None, allowed="a duration, or a velocity and a guess of the period"
-        )
-    return system.period
 
 
 def on_section(
@@ -343,11 +338,11 @@ def return_maps(systems: Sequence[SystemLike], orbits: Sequence[Array]) -> list[
     if len(systems) > 1 and offers(first, "flow_many"):
         alike = [system for system in systems if isinstance(system, type(first)) and first.can_flow_with(system)]
         if len(alike) == len(systems):
-            count, period = returns_per_period(first), _period(first)
-            jacobians, errors = first.flow_many(alike, 0.0, period / count)
+            count, duration = returns_per_period(first), return_duration(first)
+            jacobians, errors = first.flow_many(alike, 0.0, duration)
             turn = np.eye(first.dimension) if first.symmetry is None else first.symmetry
             return [
-                ReturnMap(orbit, turn @ jacobian, float(error), count, period)
+                ReturnMap(orbit, turn @ jacobian, float(error), count, count * duration)
                 for orbit, jacobian, error in zip(orbits, jacobians, errors, strict=True)
             ]
     return [return_map(system, orbit) for system, orbit in zip(systems, orbits, strict=True)]
