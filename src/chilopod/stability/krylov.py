@@ -22,7 +22,7 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, shape_of
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.orbits.shooting import RETURN
+from chilopod.stability.convergence import RETURN
 from chilopod.stability.problem.budget import Budget
 from chilopod.stability.problem.capabilities import Capabilities, given_scale, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import (

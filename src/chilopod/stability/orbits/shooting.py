@@ -19,6 +19,7 @@ from scipy.linalg.lapack import dgesv
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.stability.convergence import NODES, RETURN
 from chilopod.stability.problem.budget import Budget, SpentError
 from chilopod.stability.problem.capabilities import Autonomous, SystemLike, checked_flow, is_autonomous
 from chilopod.stability.problem.returns import Section, carried, crossing, section_at
@@ -36,25 +37,7 @@ _CUTOFF, _SINGULAR, _FAMILY = 1e-15, 1e-13, 1e-8  # singular values, relative to
 _MAGNIFIED = 1e9  # correction over residual beyond which the equations may be singular
 _NOTHING = 1e-13  # state, relative to its size, that may be zero
 _GROWTH = 4.0  # approximate growth of a deviation from one node to the next
-_FALLING = 0.5  # least fall of the residual that is progress
 _MOST = 32
-
-
-class Rule(NamedTuple):
-    """Stopping rule: the residual is round-off, or small and no longer halves, which is the equations' accuracy."""
-
-    round_off: float  # residual, relative to the sizes of the unknowns, that is round-off
-    settled: float  # residual below which it may stop falling
-
-    def met(self, off: float, best: float) -> bool:
-        """True if a residual ends the corrections, given the best earlier one."""
-        return off <= self.round_off or (off <= self.settled and off >= _FALLING * best)
-
-
-RETURN = Rule(8e-16, 1e-10)
-"""Residual of a return: a few units in the last place; a flow may err by a thousand times its tolerance."""
-NODES = Rule(1e-13, 1e-9)
-"""Residual at any node of an orbit: with many nodes and long flows it is larger."""
 
 
 class Nodes(NamedTuple):
