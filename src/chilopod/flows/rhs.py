@@ -80,11 +80,11 @@ class RightHandSide:
             raise ParameterError("is out of range", field="tolerance", value=self.tolerance, allowed=allowed)
         self.tolerance = float(self.tolerance)
         self.events = checked_events(self.events)
-        given = self.switch_times
-        self.edges = (
-            _unswitched(self.duration) if isinstance(given, tuple) and not given else _edges(given, self.duration)
-        )
-        self.times = self.edges[:-1] + 0.4142 * np.diff(self.edges)
+        if isinstance(self.switch_times, tuple) and not self.switch_times:
+            self.edges, self.times = _unswitched(self.duration)
+        else:
+            self.edges = _edges(self.switch_times, self.duration)
+            self.times = self.edges[:-1] + 0.4142 * np.diff(self.edges)
         if self.autonomous and self.edges.size > 2:
             raise ParameterError("need a period", field="switch_times", value=self.switch_times, allowed="none")
         self.start = None if self.orbit is None else finite_array(self.orbit, (self.dimension,), "orbit")
@@ -226,8 +226,8 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
 
 
 @functools.lru_cache
-def _unswitched(period: float) -> Array:
-    return read_only(np.array([0.0, period]))
+def _unswitched(period: float) -> tuple[Array, Array]:
+    return read_only(np.array([0.0, period])), read_only(np.array([0.4142 * period]))
 
 
 def _edges(switch_times: Sequence[float], period: float) -> Array:
