@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,8 @@ from chilopod.frozen import Array
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
-from chilopod.stability.branches.curve import PRECISION, Curve
+from chilopod.stability.branches.curve import Curve
+from chilopod.stability.branches.family_returns import PRECISION
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
@@ -56,10 +57,6 @@ _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]
-
-
-def _silent(count: int, point: BranchPoint) -> None:
-    """A :data:`Progress` that shows nothing."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +190,7 @@ def follow(
     symmetric: bool = False,
     budget: int = BUDGET,
     seconds: float = math.inf,
-    progress: Progress = _silent,
+    progress: Progress = lambda count, point: None,
 ) -> Branch:
     """Follow a branch from a point along its tangent.
 
@@ -277,7 +274,7 @@ def proceed(
     precision: float = PRECISION,
     budget: int = BUDGET,
     seconds: float = math.inf,
-    progress: Progress = _silent,
+    progress: Progress = lambda count, point: None,
 ) -> Branch:
     """Continue a branch from its end. The points equal those of a single run; for a system without a period of its own
     they are other points of the same curve, as the last section is rebuilt.
@@ -304,21 +301,19 @@ def proceed(
     check_arguments(family=family, closely=closely, precision=precision, budget=budget, progress=progress)
     if not isinstance(branch, Branch):
         raise ParameterError("must be a branch", field="branch", value=branch, allowed="a Branch from `follow`")
-    end = branch.points[-1]
+    end, first = branch.points[-1], branch.points[0]
     if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
         said = "must extend beyond the branch's last point"
         raise ParameterError(said, field="between", value=between, allowed=f"an interval around {end.value!r}")
-    orbits: dict[str, Any] = {"periods": branch.periods, "symmetric": branch.symmetric, "precision": precision}
-    allowed = Budget(budget, seconds)
-    curve = Curve(family, branch.scale, branch.sizes, between=between, budget=allowed, **orbits)
-    first = branch.points[0]
+    curve = Curve(family, branch.scale, branch.sizes, between=between, budget=Budget(budget, seconds))
+    curve.periods, curve.symmetric, curve.precision = branch.periods, branch.symmetric, precision
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None
     # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = branch.step if leaving else 0.0
     if longest < LONGEST:  # steps along straight parts are longer than the longest
         branch = replace(branch, step=min(branch.step, longest))
-    with allowed:
+    with curve.budget:
         anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
         return followed(curve, branch, anchor, longest, points, closely, progress)
 
@@ -338,37 +333,36 @@ def followed(
     longest: float,
     points: int | None,
     closely: bool,
-    progress: Progress = _silent,
+    progress: Progress = lambda count, point: None,
     until: Kind | None = None,
 ) -> Branch:
     """A branch with the points that follow an anchor; it also ends past a special point of the kind ``until``."""
     curve.first, curve.long_steps = branch.points[0], longest >= LONGEST
-    found, remarks = list(branch.points), list(branch.remarks)
+    found, remarks, done = list(branch.points), list(branch.remarks), 0
 
     def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:
         within = inspect(curve, step, closely)
         reached = until is not None and any(point.special is until for point in within.points)
         return (within, step.end.last), Ending.ENOUGH_POINTS if reached else ending
 
-    def keep(looked: tuple[Found, BranchPoint], count: int) -> None:
+    def keep(looked: tuple[Found, BranchPoint], _: int) -> None:
+        nonlocal done
         within, end = looked
         found.extend([*within.points, end])
         remarks.extend(within.remarks)
-        progress(count, end)
+        done += 1
+        progress(done, end)
 
-    ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
-    if ending is Ending.LOST and _at_event(curve, found[-1]):
-        reason = _EVENT_AT_ZERO
-        steps = sum(point.special is None for point in found[len(branch.points) :])
-        moved = _elsewhere(curve, found[-1]) if steps else None
+    moved: Anchor | None = anchor
+    while moved is not None:
+        before, left = done, points and points - done
+        ending, reason, size = trace(curve, moved, (branch.step, longest), left, look, keep)
+        moved = None
+        if ending is Ending.LOST and _at_event(curve, found[-1]):
+            reason = _EVENT_AT_ZERO
+            moved = _elsewhere(curve, found[-1]) if done > before else None
         if moved is not None:
             remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
-            branch, left = replace(branch, points=tuple(found), remarks=tuple(remarks)), points and points - steps
-
-            def counted(count: int, point: BranchPoint) -> None:
-                progress(steps + count, point)
-
-            return followed(curve, branch, moved, longest, left, closely, counted, until)
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
 

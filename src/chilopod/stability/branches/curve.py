@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -20,15 +19,12 @@ from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 from chilopod.stability.problem.budget import SpentError
-from chilopod.stability.problem.capabilities import Family, checked_flow, given_scale, is_autonomous
+from chilopod.stability.problem.capabilities import checked_flow, given_scale, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
-
-PRECISION = 1e-12
-"""Default precision of orbits, relative to the sizes of the states; the accuracy of the flow limits it."""
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
@@ -45,14 +41,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     first: BranchPoint  # first point of the curve
     long_steps = False  # True if no step shorter than the default one is wanted
-
-    def __init__(
-        self, family: Family, scale: float, sizes: Array | None = None, *, precision: float = PRECISION, **returns: Any
-    ) -> None:
-        super().__init__(family, scale, sizes, **returns)
-        self.precision = precision
-        self.box = np.array([self.between])
-        self._motion = 0.0  # largest motion within a period so far
+    _motion = 0.0  # largest motion within a period so far
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
