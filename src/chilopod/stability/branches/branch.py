@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proceed", "switch"]
+__all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "switch"]
 
 
 LONGEST = 0.15
@@ -179,7 +179,7 @@ class Branch(Result):
 
 def follow(
     family: Family,
-    start: Start | BranchPoint | Orbit | ArrayLike,
+    start: Start | Branch | BranchPoint | Orbit | ArrayLike,
     between: tuple[float, float],
     *,
     points: int | None = None,
@@ -192,20 +192,23 @@ def follow(
     seconds: float = math.inf,
     progress: Progress = lambda count, point: None,
 ) -> Branch:
-    """Follow a branch from a point along its tangent.
+    """Follow a branch from a point along its tangent, or from the end of a branch that was followed before.
+
+    The points of a continued branch equal those of a single run; for a system without a period of its own they are
+    other points of the same curve, as the last section is rebuilt.
 
     Parameters
     ----------
     family
         ``family(value)`` is the system.
     start
-        Start from :func:`begin` or :func:`switch`, a point of another branch, or an orbit (or a guess) at the lower end
-        of the interval.
+        Start from :func:`begin` or :func:`switch`, a point of another branch, an orbit (or a guess) at the lower end of
+        the interval, or a branch, which is continued in its own units, with its own ``symmetric``.
     between
         Interval of the parameter; the branch ends at an end of it, and the family is called for values inside only.
-        Its width becomes the branch's scale.
+        Its width becomes the scale of a new branch.
     points
-        Number of ordinary points after which the branch ends; by default it continues to an end of the interval, or
+        Number of new ordinary points after which the branch ends; by default it continues to an end of the interval, or
         until it is closed, lost, or out of budget.
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
@@ -225,23 +228,28 @@ def follow(
     Raises
     ------
     ParameterError
-        If the interval, ``points`` or a step is invalid, or ``start`` is a bifurcation point, which needs
-        :func:`switch`.
+        If the interval, ``points`` or a step is invalid, ``start`` is a bifurcation point, which needs :func:`switch`,
+        or a branch that leaves the interval.
     AnalysisError
         If no orbit is found at the start.
     """
-    low, high = _checked(between, points, longest)
-    options: dict[str, object] = {"closely": closely, "precision": precision, "budget": budget, "progress": progress}
-    check_arguments(family=family, step=step, symmetric=symmetric, **options)
+    low, high = checked_interval(between)
+    if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
+        raise ParameterError("is too narrow for double precision", field="between", value=between)
+    check_arguments(family=family, points=points, step=step, longest=longest, closely=closely, precision=precision)
+    check_arguments(symmetric=symmetric, budget=budget, progress=progress)
     if isinstance(start, BifurcationPoint):
         said = "is a bifurcation point"
         raise ParameterError(said, field="start", value=start.kind.label, allowed="a start from `switch`")
     allowed = Budget(budget, seconds)
     curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=allowed)
     with allowed:
-        if not isinstance(start, Start | BranchPoint):
-            start = begin(family, low, start, symmetric=symmetric)
-        branch, anchor = opened(curve, start, min(step, longest))
+        if isinstance(start, Branch):
+            branch, anchor = _reopened(curve, start, longest)
+        else:
+            if not isinstance(start, Start | BranchPoint):
+                start = begin(family, low, start, symmetric=symmetric)
+            branch, anchor = opened(curve, start, min(step, longest))
         return followed(curve, branch, anchor, longest, points, closely, progress)
 
 
@@ -263,67 +271,20 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
     return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor
 
 
-def proceed(
-    family: Family,
-    branch: Branch,
-    between: tuple[float, float],
-    *,
-    points: int | None = None,
-    longest: float = LONGEST,
-    closely: bool = True,
-    precision: float = PRECISION,
-    budget: int = BUDGET,
-    seconds: float = math.inf,
-    progress: Progress = lambda count, point: None,
-) -> Branch:
-    """Continue a branch from its end. The points equal those of a single run; for a system without a period of its own
-    they are other points of the same curve, as the last section is rebuilt.
-
-    Parameters
-    ----------
-    family, points, longest, closely, precision, budget, seconds, progress
-        Arguments of :func:`follow`; ``points`` counts the added ones.
-    branch
-        Branch from :func:`follow` or :func:`proceed`.
-    between
-        Interval of the parameter, which may differ from the first; the branch keeps its units.
-
-    Returns
-    -------
-    The branch with the new points at its end.
-
-    Raises
-    ------
-    ParameterError
-        As :func:`follow`, and if the branch ends at an end of the interval.
-    """
-    low, high = _checked(between, points, longest)
-    check_arguments(family=family, closely=closely, precision=precision, budget=budget, progress=progress)
-    if not isinstance(branch, Branch):
-        raise ParameterError("must be a branch", field="branch", value=branch, allowed="a Branch from `follow`")
-    end, first = branch.points[-1], branch.points[0]
-    if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
+def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anchor]:
+    """A branch to be continued with a longest step, and the anchor at its end; the curve gets its units."""
+    end, first, (low, high) = branch.points[-1], branch.points[0], curve.between
+    if not low <= end.value <= high or outward(curve.box, np.array([end.value]), end.tangent[-1:]):
         said = "must extend beyond the branch's last point"
-        raise ParameterError(said, field="between", value=between, allowed=f"an interval around {end.value!r}")
-    curve = Curve(family, branch.scale, branch.sizes, between=between, budget=Budget(budget, seconds))
-    curve.periods, curve.symmetric, curve.precision = branch.periods, branch.symmetric, precision
+        raise ParameterError(said, field="between", value=curve.between, allowed=f"an interval around {end.value!r}")
+    curve.scale, curve.sizes = branch.scale, branch.sizes
+    curve.periods, curve.symmetric = branch.periods, branch.symmetric
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None
     # At a branch point the matrix is singular, so it is computed a step ahead.
-    ahead = branch.step if leaving else 0.0
-    if longest < LONGEST:  # steps along straight parts are longer than the longest
-        branch = replace(branch, step=min(branch.step, longest))
-    with curve.budget:
-        anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
-        return followed(curve, branch, anchor, longest, points, closely, progress)
-
-
-def _checked(between: tuple[float, float], points: int | None, longest: float) -> tuple[float, float]:
-    low, high = checked_interval(between)
-    if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
-        raise ParameterError("is too narrow for double precision", field="between", value=between)
-    check_arguments(points=points, longest=longest)
-    return low, high
+    anchor = curve.anchor(last, earlier[0] if earlier else None, branch.step if leaving else 0.0, leaving)
+    # Steps along straight parts are longer than the longest.
+    return (replace(branch, step=min(branch.step, longest)) if longest < LONGEST else branch), anchor
 
 
 def followed(

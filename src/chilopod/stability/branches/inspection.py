@@ -29,7 +29,7 @@ from chilopod.stability.orbit_blocks import crossings_in
 from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import flows_with_error
 from chilopod.stability.problem.returns import ReturnMap
-from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
+from chilopod.stability.spectrum.eigenvalues import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step, predicted
 from chilopod.stability.unit_circle.critical import Crossing
@@ -253,6 +253,11 @@ def _crossed_between_ends(within: Within, turned: bool) -> bool:
     start, end = (np.linalg.eigvals(within.jacobian(place)) for place in (0.0, within.step.size))
     if within.step.start.leaving:
         start, end = (np.delete(nu, int(np.abs(nu - 1.0).argmin())) for nu in (start, end))
-    before, after = counts_outside(start.astype(np.complex128)), counts_outside(end.astype(np.complex128))
-    changed = {event for event, a, b in zip(_EVENTS, before, after, strict=True) if a != b}
+    # Number of multipliers beyond -1, beyond +1, and of pairs outside the circle.
+    counts = []
+    for nu in (start, end):
+        real, outside = np.abs(nu.imag) < 1e-9 * np.maximum(1e-3, np.abs(nu)), np.abs(nu) > 1.0
+        beyond = (real & (nu.real < -1.0), real & (nu.real > 1.0), ~real & outside & (nu.imag > 0.0))
+        counts.append([int(each.sum()) for each in beyond])
+    changed = {event for event, a, b in zip(_EVENTS, *counts, strict=True) if a != b}
     return bool(changed - {Event.PLUS} if turned else changed)
