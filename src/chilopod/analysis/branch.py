@@ -290,7 +290,7 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
     units = np.append(sizes, float(data.attrs["scale"]))
     points = tuple(
-        BranchPoint(float(value), orbit, row, tangent, kinds.get(str(special)), units)
+        BranchPoint(float(value), orbit, row, tangent, units, kinds.get(str(special)))
         for value, orbit, row, tangent, special in zip(
             data.parameter_si.values,
             data.orbit.values,

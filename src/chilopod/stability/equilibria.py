@@ -56,9 +56,9 @@ class Equilibrium(ReadOnlyArrays):
     Attributes
     ----------
     state
-    State, shape (n,).
+        State, shape (n,).
     error
-    Bound on the error of the state, shape (n,); infinite where the derivative is singular.
+        Bound on the error of the state, shape (n,); infinite where the derivative is singular.
     jacobian
         Derivative of the right-hand side there, shape (n, n).
     eigenvalues
@@ -88,8 +88,7 @@ class HopfForm:
     x + 2 Re(z mode + z^2 second) + mean |z|^2 (Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7).
     """
 
-    eigenvalue: complex  # lambda, with a positive imaginary part
-    mode: ComplexArray  # unit eigenvector, shape (n,)
+    mode: ComplexArray  # unit eigenvector to lambda, shape (n,)
     second: ComplexArray  # coefficients of the manifold, shape (n,)
     mean: Array
     cubic: complex  # coefficient, and a bound on the error of its real part
@@ -184,10 +183,9 @@ def _damped(system: Autonomous, x: Array, step: Array, matrix: Array, units: Arr
 
 
 def _solved(matrix: Array, right: Array, units: Array) -> Array:
-    scaled, right = matrix * units / units[:, None], right / units
-    if not np.linalg.cond(scaled) > 1.0 / _SINGULAR:
-        return np.asarray(units * np.linalg.solve(scaled, right))
-    return np.asarray(units * np.linalg.lstsq(scaled, right, rcond=_SINGULAR)[0])
+    """The least solution in some units."""
+    scaled = matrix * units / units[:, None]
+    return np.asarray(units * np.linalg.lstsq(scaled, right / units, rcond=_SINGULAR)[0])
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:
@@ -292,8 +290,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     if draws and wrong.any():
         others = [bent(each)[2] for each in disturbed(quadratic[:, 2], wrong[:, 2], draws)]
         error += SAFETY * float(np.abs(np.array(others) - cubic).max())
-    eigenvalue = complex(values[index])
-    return HopfForm(eigenvalue, mode, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3)
+    return HopfForm(mode, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3)
 
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
@@ -308,23 +305,22 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
     units = numerical_balance(linear_part(here, point.orbit)[1])
     for share in _FIRST:
         try:
-            return _cycle(family, point, form, units, share)
+            return _cycle(family, point, rate, form, units, share)
         except AnalysisError as error:
             reason = error.problem
     raise AnalysisError(f"no cycle was found beside the Hopf point: {reason}", field="point", value=point.value)
 
 
 def _cycle(
-    family: Family, point: BifurcationPoint, form: HopfForm, units: Array, share: float
+    family: Family, point: BifurcationPoint, rate: complex, form: HopfForm, units: Array, share: float
 ) -> tuple[float, Orbit, Array]:
     """The cycle whose cubic term is a given fraction of the frequency, or a smaller one where the manifold is bent."""
-    assert point.rate is not None
     mode, *bends = (float(np.linalg.norm(each / units)) for each in (form.mode, form.second, form.mean))
     square = point.frequency / abs(form.cubic)
     square = share * (min(square, (mode / max(bends)) ** 2) if max(bends) > 0.0 else square)
-    shift = -form.cubic.real / point.rate.real * square
+    shift = -form.cubic.real / rate.real * square
     value = point.value + shift
-    duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + point.rate.imag * shift)
+    duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + rate.imag * shift)
     system, at_rest = equilibrium_at(family, value, point.orbit)
     rest = at_rest.state
     with UserCode("family", value):

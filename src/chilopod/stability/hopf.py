@@ -79,7 +79,7 @@ def locate_hopf(
     equilibrium
         Guess of the equilibrium at ``low``, shape (n,), which is then followed through the interval. A fold ends the
         search, with a remark.
-        budget, seconds
+    budget, seconds
         Limits as for :func:`chilopod.stability.locate`, with equilibria for orbits.
 
     Returns
@@ -154,12 +154,11 @@ def _piece(
             return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]
         return _described(family, (low, high), _of_map(samples, crossing, matrices, duration), duration)
 
-    return located(samples, crossings, described, _fold_remark, _POINTS), samples.path[-1]
+    def ended(fold: Fold) -> str:
+        where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
+        return f"the equilibrium ends in a fold at {where}: it meets another one there"
 
-
-def _fold_remark(fold: Fold) -> str:
-    where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
-    return f"the equilibrium ends in a fold at {where}: it meets another one there"
+    return located(samples, crossings, described, ended, _POINTS), samples.path[-1]
 
 
 def _of_map(

@@ -92,8 +92,7 @@ class Branch(Result):
     @property
     def units(self) -> Array:
         """Sizes of the states and scale of the parameter along the curve, shape (n+1,)."""
-        units = self.points[0].units
-        return np.ones(self.points[0].tangent.size) if units is None else units
+        return self.points[0].units
 
     @property
     def sizes(self) -> Array:
@@ -257,14 +256,13 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
     """The branch at its first point, and the anchor there; the curve gets the sizes of its states."""
     if not curve.between[0] <= start.value <= curve.between[1]:
         raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
-    if isinstance(start, Start):
-        curve.periods = start.periods
+    curve.periods = start.periods
     curve.sizes = branch_sizes(curve, start)
     if isinstance(start, Start):
         anchor = anchored(curve, start, step)
     else:
         units = curve.units(start.orbit.size)
-        tangent = start.tangent * (1.0 if start.units is None else start.units) / units
+        tangent = start.tangent * start.units / units
         anchor = curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()

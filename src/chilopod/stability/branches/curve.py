@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -267,9 +268,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             # H - x on the new section: it maps the direction of the motion to zero.
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
-        point = BranchPoint(
-            value, x, values, tangent, None, self.units(x.size), image.period, bound, None, self.periods
-        )
+        about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": self.periods}
+        point = BranchPoint(value, x, values, tangent, self.units(x.size), **about)
         before = None if anchor.leaving or anchor.last.special is not None else anchor.last
         return replace(step, end=self.anchored(point, matrix, section, before, anchor.matrix))
 

@@ -235,12 +235,10 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _onto(self, spot: Spot, direction: Array) -> Array:
         """A direction with its state projected along the motion onto the section of a spot, if it has one."""
-        image, frame = spot.image, spot.frame
-        if image.velocity is None or image.normal is None or not frame.basis.size:
+        frame, m = spot.frame, spot.frame.basis.shape[1]
+        if frame.section is None:
             return direction
-        m = frame.basis.shape[1]
-        state = frame.size * (frame.basis @ direction[:m])
-        state -= image.velocity * float(image.normal @ state) / float(image.normal @ image.velocity)
+        state = spot.image.across @ (frame.size * (frame.basis @ direction[:m]))
         return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
 
     def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
