@@ -42,7 +42,7 @@ LARGE = 100  # number of states from which a few directions are cheaper than the
 _LANES = 4  # columns that the compiled code carries together
 _ROUND_OFF = 1e-14  # part outside a subspace that is round-off, relative to the largest image
 _GROWTH = 1.125  # growth from one tested subspace to the next
-_SINGULAR = 1e-13  # singular value of H' - 1, relative to the largest, that counts as zero
+_SINGULAR = 1e-13  # singular value of H' - 1 that counts as zero, relative to H' or the unit matrix
 
 _PARTS = 16  # parts of a return at which the sizes of the states are computed
 _SWEEPS, _MOST_SWEEPS = 3, 30  # sweeps through the couplings of the states; more if the orbit gives no sizes
@@ -74,7 +74,9 @@ class KrylovSubspace(ReadOnlyArrays):
         block of V: block GMRES (Saad, *Iterative Methods for Sparse Linear Systems*, 2003, section 6.12)."""
         whole = np.concatenate([self.matrix - np.eye(len(self.matrix)), self.coupling])
         inside = np.concatenate([self.basis.T @ right, np.zeros(len(self.coupling))])
-        found = np.linalg.lstsq(whole, inside, rcond=_SINGULAR)[0]
+        left, values, rows = np.linalg.svd(whole, full_matrices=False)
+        kept = values > _SINGULAR * max(1.0, float(np.linalg.norm(self.matrix)))
+        found = rows[kept].T @ (left[:, kept].T @ inside / values[kept])
         return self.basis @ found, float(np.linalg.norm(whole @ found - inside) / np.linalg.norm(inside))
 
 

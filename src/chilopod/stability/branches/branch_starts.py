@@ -211,9 +211,9 @@ def switch(
             whole = whole_period(system, periods)
             period = find_orbit(whole, point.orbit, with_error=False, shortest=periods == 1).period
     axial = point.symmetry is not None and bool(point.symmetry.branches)
-    # Two that meet have one eigenvector.
-    alone = point.modes is None or (kind is Kind.COLLISION and not axial)
-    modes = point.mode.real[None] if alone else point.modes.real.T
+    modes = point.mode.real[None]
+    if point.modes is not None and (axial or kind is not Kind.COLLISION):  # two that meet have one eigenvector
+        modes = point.modes.real.T
     if kind is Kind.COLLISION and point.multiplier.real < 0.0:
         kind = Kind.PERIOD_DOUBLING if returns_per_period(system) % 2 else Kind.PITCHFORK
     if kind is Kind.PERIOD_DOUBLING:

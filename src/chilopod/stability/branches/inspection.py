@@ -13,7 +13,8 @@ shorter steps confirm them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -48,10 +49,8 @@ _TELLING = 1e-3  # step, in units, that is short enough to tell a branch from an
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 
-@dataclass(frozen=True)
-class Found:
-    """Events within a step: the special points in order, with an ordinary one between any two, and a sentence for each
-    undecided event."""
+class Found(NamedTuple):
+    """Special points within a step in order, an ordinary one between any two, and a sentence for each undecided one."""
 
     points: tuple[BranchPoint, ...] = ()
     remarks: tuple[str, ...] = ()

@@ -34,9 +34,7 @@ _SHORTENINGS = 100
 _LEFT, _APART = 1e-12, 1e-4  # stretches over a short time above round-off, and that separate directions
 
 
-def split_product(
-    factors: Sequence[Array], errors: Sequence[Array] | None = None
-) -> tuple[ComplexArray, ComplexArray, Array]:
+def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tuple[ComplexArray, ComplexArray, Array]:
     """Logarithms ln|eigenvalue| + i angle of the eigenvalues of ``factors[-1] @ ... @ factors[0]`` by falling modulus,
     shape (n,), its unit eigenvectors as columns, and bounds on the change of the logarithms when the entries of the
     factors change by their errors, to first order between groups.
@@ -44,7 +42,6 @@ def split_product(
     Each factor must be invertible and of moderate condition; AnalysisError if one has no finite inverse.
     """
     n = factors[0].shape[0]
-    errors = np.zeros((len(factors), n, n)) if errors is None else errors
     slow, stretches, slow_motion = _iterate(factors, n)
     inverses = np.full(1, np.inf)
     if stretches.all():
@@ -71,7 +68,11 @@ def split_product(
         vectors.append(bases[0] @ columns)
     log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
     order = np.argsort(-log_all.real, kind="stable")
-    return log_all[order], vec_all[:, order], _moved(factors, errors, groups, logarithms)[order]
+    return (
+        log_all[order],
+        vec_all[:, order],
+        _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, logarithms)[order],
+    )
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
@@ -122,9 +123,7 @@ def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
     return np.log(np.abs(values)) + scale + 1j * np.angle(values), columns
 
 
-def _moved(
-    factors: Sequence[Array], errors: Sequence[Array], groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]
-) -> Array:
+def _moved(factors: Array, errors: Array, groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]) -> Array:
     """Largest change of the logarithms when factors change by their errors with random signs, with a safety factor."""
     nodes = np.array([np.hstack(bases) for bases in zip(*groups, strict=True)])
     sizes = np.cumsum([0, *(len(values) for values in known)])
@@ -133,9 +132,9 @@ def _moved(
         ends = np.roll(np.linalg.inv(nodes), -1, axis=0)
     except np.linalg.LinAlgError:
         return np.full(moved.size, np.inf)
-    whole, wrong, random = np.array(factors), np.array(errors), np.random.default_rng(0)
+    random = np.random.default_rng(0)
     for _ in range(DRAWS):
-        others = ends @ (whole + wrong * random.choice([-1.0, 1.0], whole.shape)) @ nodes
+        others = ends @ (factors + errors * random.choice([-1.0, 1.0], factors.shape)) @ nodes
         for values, (a, b) in zip(known, itertools.pairwise(sizes), strict=True):
             apart = values[:, None] - _eigen([other[a:b, a:b] for other in others])[0]
             apart = np.abs(apart.real + 1j * np.angle(np.exp(1j * apart.imag)))
