@@ -155,10 +155,11 @@ def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
             if (np.abs(velocity) <= ROUNDING * (np.abs(matrix) @ np.abs(each))).all():
                 return each, velocity, matrix
         units = numerical_balance(matrix)
-        step = -_solved(matrix, velocity, units)
+        inverse = np.linalg.pinv(matrix * units / units[:, None], rcond=_SINGULAR) * units[:, None] / units
+        step = -inverse @ velocity
         coupled = units * float((largest / units).max()) if largest.any() else units
         size = np.where(largest > 0.0, largest, coupled)
-        share = _damped(system, x, step, matrix, units, size)
+        share = _damped(system, x, step, inverse, size)
         if share is None:
             if (np.abs(step) <= _SETTLED * size).all():
                 return x, velocity, matrix
@@ -168,24 +169,16 @@ def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
     raise AnalysisError("no equilibrium found near the guess", field="guess", allowed="a guess closer to it")
 
 
-def _damped(system: Autonomous, x: Array, step: Array, matrix: Array, units: Array, size: Array) -> float | None:
+def _damped(system: Autonomous, x: Array, step: Array, inverse: Array, size: Array) -> float | None:
     """The largest power of one half of a step that approaches the equilibrium; None if none does."""
     length = float(np.linalg.norm(step / size))
-    share = 1.0
-    for _ in range(_HALVINGS):
+    for share in 0.5 ** np.arange(_HALVINGS):
         velocity = _velocity(system, x + share * step)
         if np.isfinite(velocity).all():
-            following = float(np.linalg.norm(_solved(matrix, velocity, units) / size))
+            following = float(np.linalg.norm(inverse @ velocity / size))
             if following <= (1.0 - 0.25 * share) * length:
-                return share
-        share *= 0.5
+                return float(share)
     return None
-
-
-def _solved(matrix: Array, right: Array, units: Array) -> Array:
-    """The least solution in some units."""
-    scaled = matrix * units / units[:, None]
-    return np.asarray(units * np.linalg.lstsq(scaled, right / units, rcond=_SINGULAR)[0])
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:

@@ -152,7 +152,14 @@ def _piece(
             return [f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one"]
         if crossing.collision:
             return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]
-        return _described(family, (low, high), _of_map(samples, crossing, matrices, duration), duration)
+        point = _of_map(samples, crossing, matrices, duration)
+        reason = f"{point.multiplicity // 2} pairs are critical at once"
+        if point.multiplicity <= 2:
+            try:
+                return [_hopf_point(family, between, point, duration)]
+            except AnalysisError as error:
+                reason = error.problem
+        return [f"no coefficient at {point.value:.9g}: {reason}", replace(point, multiplier=1j * point.frequency)]
 
     def ended(fold: Fold) -> str:
         where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
@@ -178,18 +185,6 @@ def _of_map(
     mode = vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128)
     at = BifurcationPoint(Kind.HOPF, crossing.value, error, sample.orbit, mode, crossing.multiplier, frequency)
     return replace(at, period=2.0 * np.pi / frequency, multiplicity=crossing.multiplicity)
-
-
-def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
-    """A Hopf point with its results from f, or from the map alone with a remark on the reason."""
-    reason = f"{point.multiplicity // 2} pairs are critical at once"
-    if point.multiplicity <= 2:
-        try:
-            return [_hopf_point(family, between, point, duration)]
-        except AnalysisError as error:
-            reason = error.problem
-    remark = f"no coefficient at {point.value:.9g}: {reason}"
-    return [remark, replace(point, multiplier=1j * point.frequency)]
 
 
 def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
@@ -291,8 +286,8 @@ def _hopf_point(
     verdict = decided if abs(coefficient) > error else Criticality.UNDECIDED
     about: dict[str, Any] = {"criticality": verdict, "coefficient": coefficient, "coefficient_error": error}
     about |= {"mode": form.mode, "multiplier": 1j * frequency, "frequency": frequency, "rate": rate}
-    period = 2.0 * np.pi / frequency
-    return replace(point, value=value, error_bound=bound, orbit=here.state, period=period, **about)
+    about |= {"value": value, "error_bound": bound, "orbit": here.state, "period": 2.0 * np.pi / frequency}
+    return replace(point, **about)
 
 
 def _rate(
