@@ -235,8 +235,7 @@ def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
 
 
 def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> HopfForm:
-    """The normal form at a Hopf point, of a pair near a frequency, with its error due to those of the equilibrium,
-    shape (n,), and of the derivative."""
+    """The normal form of a pair near a frequency, with its error due to those of the equilibrium and derivative."""
     matrix = linear_part(system, x)[1]
     off = matrix_error(system, x, matrix, error)
     random = np.random.default_rng(1)

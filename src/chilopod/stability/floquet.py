@@ -135,9 +135,8 @@ class Exponents(Shown, ReadOnlyArrays):
 
 
 def _multipliers(orbit: Orbit) -> Multipliers:
-    image = orbit.image
-    spec = spectrum(image)
-    return full_period(spec.values, spec.error, image.returns, orbit.state, image.period)
+    spec = spectrum(orbit.image)
+    return full_period(spec.values, spec.error, orbit.image.returns, orbit.state, orbit.period)
 
 
 def full_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
@@ -220,11 +219,8 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
         if any(is_autonomous(system) for system in systems):
             return [multipliers(system) for system in systems]
         states = [known_state(system) for system in systems]
-        images = return_maps(systems, states)
-        return [
-            _multipliers(from_known(system, state, image=image))
-            for system, state, image in zip(systems, states, images, strict=True)
-        ]
+        known = zip(systems, states, return_maps(systems, states), strict=True)
+        return [_multipliers(from_known(system, state, image=image)) for system, state, image in known]
 
 
 def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: float = math.inf) -> Exponents:

@@ -206,8 +206,7 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
-    """The step h of the map: a radian of the fastest oscillation or growth, which preserves all multipliers, or about
-    the time of the decays."""
+    """The step h of the map: a radian of the fastest oscillation or growth, or about the time of the decays."""
     values = start.eigenvalues
     fastest = float(np.maximum(np.abs(values.imag), values.real).max())
     if fastest > 0.0:

@@ -131,8 +131,7 @@ class TangentMap(ReadOnlyArrays):
         return self._in_parts(directions, (0.0,))[1]
 
     def images_with_error(self, directions: Array) -> tuple[Array, Array, Array]:
-        """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,), relative to
-        their norms: a multiple of the difference from a second computation with the interval in parts."""
+        """The same with bounds on the errors of the images and of ``state``, from a second computation in parts."""
         state, images = self._in_parts(directions, (0.0,))
         other, parts = self._in_parts(directions, CUTS)
         return images, REPEATED * np.abs(parts - images), REPEATED * np.abs(self._across(other - state))
@@ -210,11 +209,8 @@ def closed_orbit(
     farthest: float = np.inf,
     budget: Budget | None = None,
 ) -> tuple[TangentMap, Array]:
-    """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
-
-    The first return may displace the guess by ``farthest``, relative to the sizes; each round takes a return map from
-    the budget. Raises AnalysisError if Newton's method does not converge.
-    """
+    """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,); an
+    AnalysisError without one. The first return may displace the guess by ``farthest``, relative to the sizes."""
     size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
     best = np.inf

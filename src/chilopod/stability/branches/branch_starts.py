@@ -292,13 +292,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
 
 
 def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
-    """Anchor of the first step of a branch; its matrix is computed ``ahead`` by a distance where branches meet.
-
-    Raises
-    ------
-    AnalysisError
-        If the direction of the branch is not unique there.
-    """
+    """Anchor of the first step of a branch; its matrix is computed ``ahead`` by a distance where branches meet."""
     section = curve.section_at(start.orbit, start.value, start.period)
     units = curve.units(start.orbit.size)
     image, matrix = curve.matrix_at(start.orbit, start.value, section, np.zeros(units.size), True)

@@ -185,8 +185,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _solved(
         self, anchor: Anchor, timed: Anchor, guess: Guess, plane: Plane, count: int
     ) -> tuple[Anchor, Corrected[Returned]]:
-        """The orbit near a guess, or where that fails near the result of multiple shooting; and the anchor with the
-        duration of a return there."""
+        """The orbit near a guess, or else near the result of multiple shooting, and the anchor with its duration."""
         matrix = within_space(anchor.space, guess.matrix)
         try:
             return timed, self.corrected(timed, Guess(guess.moved, matrix), plane)
@@ -203,8 +202,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _shot(
         self, anchor: Anchor, timed: Anchor, plane: Plane, count: int
     ) -> tuple[Array, Array, float, ReturnMap, Array]:
-        """Displacement in units, state, parameter, return map and :meth:`matrix`, by multiple shooting from an
-        anchor."""
+        """Displacement in units, state, parameter, return map and :meth:`matrix`, by multiple shooting."""
         last, section = anchor.last, timed.section
         system, units = self.system(last.value), self.units(last.orbit.size)
         duration = return_duration(system) if anchor.section is None else anchor.section.duration
@@ -229,8 +227,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _wrong(
         self, anchor: Anchor, x: Array, image: ReturnMap, moved: Array, matrix: Array, off: float, weakest: float
     ) -> float:
-        """Error of the derivative due to that of the orbit: ``off`` from the remaining residual, and ``weakest`` times
-        the error of the flow."""
+        """Error of the derivative due to that of the orbit: ``off``, and ``weakest`` times the error of the flow."""
         n = x.size
         # Units may be much larger than the orbit.
         reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
@@ -243,13 +240,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return bend * (off + weakest * flow * max(1.0, self._relative_size(x)))
 
     def arrived(self, step: Step[Anchor, OnCurve]) -> Step[Anchor, OnCurve]:
-        """A step with the anchor at its end, on the section there.
-
-        Raises
-        ------
-        AnalysisError
-            If the orbit has shrunk into an equilibrium.
-        """
+        """A step with the anchor at its end, on the section there."""
         anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
         tangent, matrix, section = step.tangent, step.matrix, None
@@ -300,8 +291,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return np.array(states)
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and the coordinates that identify it: for a system that does
-        not depend on time, any state of its orbit counts."""
+        """Displacement of the first point, its tangent, and the coordinates that identify it at any time 0."""
         moved = self.moved(anchor.last, self.first.orbit, self.first.value)
         seen = slice(None) if anchor.section is None else slice(moved.size - 1, None)
         return moved, self.first.tangent, seen

@@ -27,7 +27,6 @@ PRECISION = 1e-12
 
 _PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
 _STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink
-_RETRIES, _STEEPER = 1, 100.0  # number of retries without a return, and factor on the step of each
 _KEPT = 8  # cached systems: making one may cost more than a flow
 
 
@@ -107,14 +106,14 @@ class FamilyReturns:
         """
         units, steepness = self.units(x.size)[:-1], self.steepness
         mapped = self.mapped(x, value, section) if mapped is None else mapped
-        for last in (*[False] * _RETRIES, True):
+        for last in (False, True):
             step = self._parameter_step(value, steepness)
             try:
                 beside = self.mapped(x, value + step, section)
             except AnalysisError:
                 if last:
                     raise
-                steepness *= _STEEPER
+                steepness *= 100.0
                 continue
             difference: Array = (beside - mapped) / (step / self.scale)
             found = float(np.abs(difference / units).max())

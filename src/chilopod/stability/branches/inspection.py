@@ -57,13 +57,8 @@ class Found(NamedTuple):
 
 
 def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
-    """Find the events within a step; with ``closely`` also between ends that show none.
-
-    Raises
-    ------
-    AnalysisError, ArithmeticError
-        If the step landed on another curve, or the corrector fails in between.
-    """
+    """Find the events within a step; with ``closely`` also between ends that show none. An AnalysisError or an
+    ArithmeticError if the step landed on another curve, or the corrector fails in between."""
     within = Within(curve, step)
     leaving = step.start.leaving
     rising = float(step.start.tangent[-1])
@@ -130,8 +125,7 @@ def _confirmed(within: Within, place: Place) -> bool:
 
 
 def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
-    """Side of the circle of the critical multiplier and, for a real one, the sign of the product of all distances from
-    it; 0 for either that the errors of multipliers and orbit leave undecided."""
+    """Side of the critical multiplier and, if it is real, sign of the product of all distances; 0 if undecided."""
     curve, step, crossing = within.curve, within.at(at), place.crossing
     (here, value_here, returned, _), section = step.found, within.step.start.section
     units = curve.units(here.size)

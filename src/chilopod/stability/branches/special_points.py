@@ -98,8 +98,7 @@ def _orbit(within: Within, point: BranchPoint, place: Place) -> Orbit:
 
 
 def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -> float:
-    """Bound on the error of the parameter: that of the place times the parameter's rate of change; at a fold, where
-    that rate vanishes, from the orbit's equation."""
+    """Bound on the error of the parameter: that of the place times its rate, or at a fold from the orbit's equation."""
     curve, low, high, at = within.curve, within.low, within.step.size, within.at
     beside = _BESIDE * (high - low)
     middle = min(max(place.crossing.value, low + beside), high - beside)
@@ -113,8 +112,7 @@ def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -
 
 
 def _turn(within: Within, at: float) -> tuple[float, float]:
-    """The parameter where a curve turns at a branch point, by polynomials through places round it, as the equations are
-    singular there, and a bound on its error."""
+    """The parameter where a curve turns at a branch point, by polynomials through places round it, and its error."""
     parts = [within.at(at + each * within.step.size) for each in _AROUND]
     values = np.array([part.moved[-1] for part in parts])
     turned = []

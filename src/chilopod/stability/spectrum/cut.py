@@ -49,8 +49,7 @@ class _Part:
 
 def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int = 0) -> Cut:
     """A return from a state on the orbit in parts of moderate condition, apart from the ``unresolved`` fastest
-    directions: those that contract too strongly are halved. The return of a map, which has no parts, stays whole.
-    Raises AnalysisError if no parts are of moderate condition."""
+    directions; AnalysisError if there are none. The return of a map, which has no parts, stays whole."""
     # The derivative on a section may be only round-off; an orbit that moves gives the sizes.
     autonomous, duration = is_autonomous(system), image.period / image.returns
     units = sizes(system, x, duration) if autonomous else numerical_balance(image.jacobian)

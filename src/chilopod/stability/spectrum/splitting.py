@@ -143,8 +143,7 @@ def _moved(factors: Array, errors: Array, groups: Sequence[Sequence[Array]], kno
 
 
 def split_stiff(system: FlowsVolumes, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
-    """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and the errors of the
-    logarithms; AnalysisError if more than one direction decays too fast to be resolved."""
+    """As :func:`split_product` for a return; AnalysisError if more than one direction decays too fast."""
     cut = moderate_cut(system, x, image, unresolved=1)
     slow = cut.section.shape[1] - 1
     values, modes, errors = np.empty(0, np.complex128), np.empty((slow + 1, 0), np.complex128), np.zeros(slow)
@@ -161,8 +160,7 @@ def split_stiff(system: FlowsVolumes, x: Array, image: ReturnMap) -> tuple[Compl
 
 
 def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
-    """The direction on the section at time 0 that the flow contracts most, over a time so short that it is still above
-    round-off, shape (directions, 1)."""
+    """The direction on the section that the flow contracts most, over a time that leaves it above round-off."""
     slow = cut.section.shape[1] - 1
     if slow == 0:
         return np.eye(1)

@@ -67,8 +67,8 @@ class Group(ReadOnlyArrays):
 
 
 def finite_group(generators: ArrayLike) -> Group:
-    """The group of all products of some real matrices, shape (n, n) each, such as the cyclic shift and the reversal of
-    a ring, in any units; a ParameterError if the products are too many, or the matrices are invalid."""
+    """The group of all products of real matrices, shape (n, n) each, in any units; a ParameterError if there are too
+    many, or the matrices are invalid."""
     try:
         given = np.atleast_1d(np.array(generators, dtype=np.float64))
     except (TypeError, ValueError):  # also for matrices of several shapes
@@ -231,8 +231,7 @@ class Images:
 
 
 def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Array] | None:
-    """Generators that suffice for a group, one at least, and all products, the identity first, shape (order, n, n);
-    None for more than ``largest``."""
+    """Generators that suffice for a group, one at least, and its elements, the identity first; None if too many."""
     n, needed = len(scales), generators[:0]
     images, elements = Images(n), [np.eye(n)]
     images.new(images.probes)

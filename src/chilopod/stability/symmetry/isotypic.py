@@ -79,14 +79,13 @@ class Block(ReadOnlyArrays):
         return np.asarray(np.einsum("...iaja->...ij", full.reshape(*full.shape[:-2], m, d, m, d)) / d)
 
     def mode(self, eigenvector: ComplexArray, direction: Array) -> ComplexArray:
-        """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix of real
-        type, shape (m,), and any vector, shape (d,)."""
+        """The eigenvector of the full matrix to one of its reduced matrix of real type, and any vector, shape (d,)."""
         return np.asarray(self.basis @ np.kron(eigenvector, direction), dtype=np.complex128)
 
 
 def isotypic(group: Group) -> tuple[Block, ...]:
-    """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel; AnalysisError
-    if its matrices are not exact enough, or a representation is of quaternionic type."""
+    """The blocks of a finite group, the trivial one first; AnalysisError if its matrices are not exact enough, or a
+    representation is of quaternionic type."""
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
         blocks = _blocks(group, random)
