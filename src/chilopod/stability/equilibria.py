@@ -32,6 +32,7 @@ from chilopod.stability.problem.capabilities import (
     is_autonomous,
 )
 from chilopod.stability.problem.returns import section_at
+from chilopod.stability.spectrum.eigenvalues import phased
 from chilopod.stability.spectrum.errors import SAFETY, disturbed, eigenvalue_errors
 
 _EPSILON = float(np.finfo(float).eps)
@@ -253,8 +254,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     units = numerical_balance(matrix)
     values, lefts, rights = scipy.linalg.eig(matrix * units / units[:, None], left=True)
     index = int(np.abs(values - 1j * frequency).argmin())
-    mode, left = rights[:, index] * units, lefts[:, index] / units
-    mode = mode * np.abs(mode).max() / mode[np.abs(mode).argmax()]
+    mode, left = phased(rights[:, index] * units), lefts[:, index] / units
     mode = mode / np.linalg.norm(mode)
     left = left / np.conj(left.conj() @ mode)
     turns = np.exp(2j * np.pi * np.arange(_ANGLES) / _ANGLES)[:, None]

@@ -251,8 +251,7 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
             break
     if left > _UNSOLVED:
         raise AnalysisError("no correction closes the motion: a return moves all states near the guess alike")
-    values, vectors = np.linalg.eig(subspace.matrix)
-    largest = vectors[:, np.argsort(-np.abs(values))[: _LANES - 1]]
+    largest = eigensystem(subspace.matrix)[1][:, : _LANES - 1]
     return move, subspace.basis @ np.where(largest.imag.any(axis=0), largest.imag + largest.real, largest.real)
 
 

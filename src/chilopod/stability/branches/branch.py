@@ -95,11 +95,6 @@ class Branch(Result):
         return self.points[0].units
 
     @property
-    def sizes(self) -> Array:
-        """Sizes of the states along the curve, shape (n,), the units of tangents."""
-        return self.units[:-1]
-
-    @property
     def scale(self) -> float:
         """Scale of the parameter along the curve, the unit of tangents."""
         return float(self.units[-1])
@@ -140,7 +135,7 @@ class Branch(Result):
 
     def _picture(self) -> str:
         # The state that changes most, relative to its size, distinguishes the branch from others.
-        moved = np.ptp([point.orbit for point in self.points], axis=0) / self.sizes
+        moved = np.ptp([point.orbit for point in self.points], axis=0) / self.units[:-1]
         return picture(lambda axes: self.plot(axes, int(moved.argmax())), "branch of periodic orbits")
 
     def plot(self, axes: Axes | None = None, state: int = 0) -> Axes:
@@ -275,7 +270,7 @@ def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anc
     if not low <= end.value <= high or outward(curve.box, np.array([end.value]), end.tangent[-1:]):
         said = "must extend beyond the branch's last point"
         raise ParameterError(said, field="between", value=curve.between, allowed=f"an interval around {end.value!r}")
-    curve.scale, curve.sizes = branch.scale, branch.sizes
+    curve.scale, curve.sizes = branch.scale, branch.units[:-1]
     curve.periods, curve.symmetric = branch.periods, branch.symmetric
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None

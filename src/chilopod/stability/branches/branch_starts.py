@@ -361,22 +361,19 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
     found = [s * basis[0] + t * basis[1] for s, t in ((-q, a), (c, -q))]
     found = [each / np.linalg.norm(each) for each in found]
     old = _old_tangent(curve, start, units)
-    if old is not None:
-        other = min(found, key=lambda each: abs(float(each @ old)))
-    else:  # the tangent with the smaller part along the parameter
-        other = min(found, key=lambda each: abs(float(each[-1])))
+    other = min(found, key=lambda each: abs(float(each @ old)))
     assert start.mode is not None
     along = float(other[:-1] @ (start.mode / units[:-1]))
     return other if along >= 0.0 else -other
 
 
-def _old_tangent(curve: Curve, start: Start, units: Array) -> Array | None:
-    """Unit tangent of the old branch, in units; None if unknown."""
+def _old_tangent(curve: Curve, start: Start, units: Array) -> Array:
+    """Unit tangent of the old branch, in units; along the parameter if unknown."""
     if start.old is not None:
         old = start.old / units
         return np.asarray(old / np.linalg.norm(old))
     if known_orbit(curve.system(start.value)) is None:
-        return None
+        return np.eye(units.size)[-1]
     beside = np.clip(start.value + _BESIDE * curve.scale * np.array([-1.0, 1.0]), *curve.between).tolist()
     low, high = (np.append(known_state(curve.system(value)), value) / units for value in beside)
     return np.asarray((high - low) / np.linalg.norm(high - low))

@@ -29,27 +29,11 @@ class SymmetricKind(Labelled):
     """Kind of a bifurcation in a block; each member's ``sentence`` describes it in words."""
 
     SYMMETRY_KEPT = "symmetry kept", "no spatial symmetry is broken: the kind of the point says what happens"
-    PITCHFORK = (
-        "pitchfork",
-        "the orbit loses half of its symmetries and a pair of orbits that they exchange branches off",
-    )
-    EQUIVARIANT_PITCHFORK = (
-        "equivariant pitchfork",
-        "several multipliers cross at once; branches of orbits with less symmetry grow, each on one side of the point",
-    )
-    EQUIVARIANT_TRANSCRITICAL = (
-        "equivariant transcritical",
-        "several multipliers cross at once; branches of orbits with less symmetry, those whose halves differ on both "
-        "sides of the point, leave unstable as a rule",
-    )
-    SYMMETRIC_PERIOD_DOUBLING = (
-        "symmetric period doubling",
-        "orbits of twice the period and with less symmetry at an instant branch off",
-    )
-    SYMMETRIC_NEIMARK_SACKER = (
-        "symmetric Neimark-Sacker",
-        "oscillations at a second frequency branch off that are waves: rotating, standing, or both kinds",
-    )
+    PITCHFORK = "pitchfork", "half of the symmetries are lost, and a pair of orbits that they exchange branches off"
+    EQUIVARIANT_PITCHFORK = "equivariant pitchfork", "branches with less symmetry grow, each on one side of the point"
+    EQUIVARIANT_TRANSCRITICAL = "equivariant transcritical", "branches with less symmetry leave, unstable as a rule"
+    SYMMETRIC_PERIOD_DOUBLING = "symmetric period doubling", "orbits of twice the period and less symmetry branch off"
+    SYMMETRIC_NEIMARK_SACKER = "symmetric Neimark-Sacker", "oscillations at a second frequency branch off as waves"
 
 
 @dataclass(frozen=True)
