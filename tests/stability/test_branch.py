@@ -7,7 +7,7 @@ import pytest
 
 from chilopod.errors import ParameterError
 from chilopod.stability import Kind, PeriodicSystem, from_map, from_rhs, locate
-from chilopod.stability.branches.branch import Ending, begin, follow, proceed, switch
+from chilopod.stability.branches.branch import Ending, begin, follow, switch
 from helpers.systems import henon, of_map
 
 PERIOD = 2.0
@@ -56,7 +56,7 @@ def test_in_pieces_as_in_one():
     whole = follow(abrupt, start, (-0.3, 0.2), points=12, step=0.05, closely=False)
     piece = follow(abrupt, start, (-0.3, 0.2), points=5, step=0.05, closely=False)
     assert piece.ending is Ending.ENOUGH_POINTS
-    pieces = proceed(abrupt, piece, (-0.3, 0.2), points=7, closely=False)
+    pieces = follow(abrupt, piece, (-0.3, 0.2), points=7, closely=False)
     assert (pieces.ending, pieces.scale, pieces.step) == (whole.ending, whole.scale, whole.step)
     assert [point.value for point in pieces.points] == [point.value for point in whole.points]
     assert [point.orbit.tolist() for point in pieces.points] == [point.orbit.tolist() for point in whole.points]
@@ -68,8 +68,8 @@ def test_a_branch_that_left_goes_on_in_a_wider_interval():
     branch = follow(gentle, switch(gentle, fork)[0], (-0.1, 0.1), step=0.05)
     assert branch.ending is Ending.LEFT_INTERVAL
     with pytest.raises(ParameterError, match="last point"):
-        proceed(gentle, branch, (-0.1, 0.1))
-    wider = proceed(gentle, branch, (-0.1, 0.4))
+        follow(gentle, branch, (-0.1, 0.1))
+    wider = follow(gentle, branch, (-0.1, 0.4))
     assert wider.points[: len(branch.points)] == branch.points
     assert wider.points[-1].value == 0.4
     for point in wider.points[1:]:

@@ -14,7 +14,6 @@ from chilopod.stability import (
     follow,
     from_map,
     from_rhs,
-    proceed,
 )
 
 
@@ -122,7 +121,7 @@ def test_a_budget_ends_a_branch_and_keeps_what_was_found():
     branch = follow(circle, begin(circle, 0.0, [0.5]), (-1.0, 1.0), budget=150)
     assert branch.ending is Ending.BUDGET
     assert len(branch.points) > 2
-    on = proceed(circle, branch, (-1.0, 1.0))
+    on = follow(circle, branch, (-1.0, 1.0))
     assert on.ending is Ending.CLOSED
     assert max(point.error_bound for point in on.points) < 1e-8  # the last one's, too
 
@@ -130,7 +129,7 @@ def test_a_budget_ends_a_branch_and_keeps_what_was_found():
 def test_bounds_are_the_same_in_pieces():
     whole = follow(circle, begin(circle, 0.0, [0.5]), (-1.0, 1.0), points=6)
     start = follow(circle, begin(circle, 0.0, [0.5]), (-1.0, 1.0), points=3)
-    pieces = proceed(circle, start, (-1.0, 1.0), points=3)
+    pieces = follow(circle, start, (-1.0, 1.0), points=3)
     assert [point.error_bound for point in pieces.points] == [point.error_bound for point in whole.points]
 
 

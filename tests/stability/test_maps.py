@@ -14,7 +14,6 @@ from chilopod.stability import (
     from_rhs,
     locate,
     multipliers,
-    proceed,
     sweep,
     switch,
     switch2,
@@ -56,7 +55,6 @@ def test_the_derivative_is_within_its_bound():
         (lambda: multipliers(from_map(lambda x: x, 1), [0.5]), r"image = 'ndarray': must return a pair"),
         (lambda: multipliers(from_map(lambda x: (x, x), 1), [0.5]), r"image: returns an array of shape \(1,\)"),
         (lambda: switch(logistic, 3), r"point = 3: must be a located point"),
-        (lambda: proceed(logistic, None, (1.0, 2.0)), r"branch: must be a branch"),
         (lambda: find_orbit(None, [1.0]), r"system: must be a system"),
         (lambda: switch2(None, 3, ((0.0, 1.0), (0.0, 1.0))), r"point = 3: must be a point of codimension two"),
         *(

@@ -28,7 +28,6 @@ from chilopod.stability import (
     from_rhs,
     locate,
     multipliers,
-    proceed,
 )
 from chilopod.stability.branches import inspection
 from chilopod.stability.unit_circle.crossings import find_crossings
@@ -301,7 +300,7 @@ def test_a_branch_covers_its_interval():
     assert whole.ending is Ending.LEFT_INTERVAL
     part = follow(folding, begin(folding, -1.0, [-1.3]), between, longest=0.02, points=20)
     assert (part.ending, len(part.points)) == (Ending.ENOUGH_POINTS, 21)
-    assert proceed(folding, part, between, longest=0.02).points[-1].value == 1.0
+    assert follow(folding, part, between, longest=0.02).points[-1].value == 1.0
 
 
 @pytest.mark.parametrize("points", [0, -1, 2.5, "all", True])

@@ -24,7 +24,7 @@ from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.stretch import MOST_BENT
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, proceed, switch
+from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, switch
 from chilopod.stability.branches.branch import LONGEST
 from chilopod.stability.spectrum.errors import VERDICTS
 
@@ -181,7 +181,7 @@ def resumed(
             value=interval_text(robot, parameter, (low, high)),
             allowed=f"an interval that contains {units.format(end, unit, digits=6)}",
         )
-    branch = proceed(
+    branch = follow(
         _followed(saved, parameter),
         _branch_of(data, _followed(saved, parameter)(value).scale),
         between,
@@ -290,7 +290,7 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
     units = np.append(sizes, float(data.attrs["scale"]))
     points = tuple(
-        BranchPoint(float(value), orbit, row, tangent, kinds.get(str(special)), units)
+        BranchPoint(float(value), orbit, row, tangent, units, kinds.get(str(special)))
         for value, orbit, row, tangent, special in zip(
             data.parameter_si.values,
             data.orbit.values,

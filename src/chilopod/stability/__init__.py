@@ -10,7 +10,7 @@ False
 from chilopod.flows.called import NotAnalytic
 from chilopod.flows.events import Event
 from chilopod.flows.jumps import UndeclaredSwitch
-from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, proceed, switch
+from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, switch
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.switching import switch2
 from chilopod.stability.codimension_two.two_parameters import follow2
@@ -79,7 +79,6 @@ __all__ = [
     "locate",
     "locate_hopf",
     "multipliers",
-    "proceed",
     "sweep",
     "switch",
     "switch2",

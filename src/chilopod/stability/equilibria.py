@@ -32,6 +32,7 @@ from chilopod.stability.problem.capabilities import (
     offers,
 )
 from chilopod.stability.problem.returns import section_at
+from chilopod.stability.spectrum.eigenvalues import phased
 from chilopod.stability.spectrum.errors import SAFETY, disturbed, eigenvalue_errors
 
 _EPSILON = float(np.finfo(float).eps)
@@ -56,9 +57,9 @@ class Equilibrium(ReadOnlyArrays):
     Attributes
     ----------
     state
-    State, shape (n,).
+        State, shape (n,).
     error
-    Bound on the error of the state, shape (n,); infinite where the derivative is singular.
+        Bound on the error of the state, shape (n,); infinite where the derivative is singular.
     jacobian
         Derivative of the right-hand side there, shape (n, n).
     eigenvalues
@@ -88,8 +89,7 @@ class HopfForm:
     x + 2 Re(z mode + z^2 second) + mean |z|^2 (Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7).
     """
 
-    eigenvalue: complex  # lambda, with a positive imaginary part
-    mode: ComplexArray  # unit eigenvector, shape (n,)
+    mode: ComplexArray  # unit eigenvector to lambda, shape (n,)
     second: ComplexArray  # coefficients of the manifold, shape (n,)
     mean: Array
     cubic: complex  # coefficient, and a bound on the error of its real part
@@ -156,10 +156,11 @@ def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
             if (np.abs(velocity) <= ROUNDING * (np.abs(matrix) @ np.abs(each))).all():
                 return each, velocity, matrix
         units = numerical_balance(matrix)
-        step = -_solved(matrix, velocity, units)
+        inverse = np.linalg.pinv(matrix * units / units[:, None], rcond=_SINGULAR) * units[:, None] / units
+        step = -inverse @ velocity
         coupled = units * float((largest / units).max()) if largest.any() else units
         size = np.where(largest > 0.0, largest, coupled)
-        share = _damped(system, x, step, matrix, units, size)
+        share = _damped(system, x, step, inverse, size)
         if share is None:
             if (np.abs(step) <= _SETTLED * size).all():
                 return x, velocity, matrix
@@ -169,25 +170,16 @@ def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
     raise AnalysisError("no equilibrium found near the guess", field="guess", allowed="a guess closer to it")
 
 
-def _damped(system: Autonomous, x: Array, step: Array, matrix: Array, units: Array, size: Array) -> float | None:
+def _damped(system: Autonomous, x: Array, step: Array, inverse: Array, size: Array) -> float | None:
     """The largest power of one half of a step that approaches the equilibrium; None if none does."""
     length = float(np.linalg.norm(step / size))
-    share = 1.0
-    for _ in range(_HALVINGS):
+    for share in 0.5 ** np.arange(_HALVINGS):
         velocity = _velocity(system, x + share * step)
         if np.isfinite(velocity).all():
-            following = float(np.linalg.norm(_solved(matrix, velocity, units) / size))
+            following = float(np.linalg.norm(inverse @ velocity / size))
             if following <= (1.0 - 0.25 * share) * length:
-                return share
-        share *= 0.5
+                return float(share)
     return None
-
-
-def _solved(matrix: Array, right: Array, units: Array) -> Array:
-    scaled, right = matrix * units / units[:, None], right / units
-    if not np.linalg.cond(scaled) > 1.0 / _SINGULAR:
-        return np.asarray(units * np.linalg.solve(scaled, right))
-    return np.asarray(units * np.linalg.lstsq(scaled, right, rcond=_SINGULAR)[0])
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:
@@ -244,8 +236,7 @@ def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
 
 
 def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> HopfForm:
-    """The normal form at a Hopf point, of a pair near a frequency, with its error due to those of the equilibrium,
-    shape (n,), and of the derivative."""
+    """The normal form of a pair near a frequency, with its error due to those of the equilibrium and derivative."""
     matrix = linear_part(system, x)[1]
     off = matrix_error(system, x, matrix, error)
     random = np.random.default_rng(1)
@@ -263,8 +254,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     units = numerical_balance(matrix)
     values, lefts, rights = scipy.linalg.eig(matrix * units / units[:, None], left=True)
     index = int(np.abs(values - 1j * frequency).argmin())
-    mode, left = rights[:, index] * units, lefts[:, index] / units
-    mode = mode * np.abs(mode).max() / mode[np.abs(mode).argmax()]
+    mode, left = phased(rights[:, index] * units), lefts[:, index] / units
     mode = mode / np.linalg.norm(mode)
     left = left / np.conj(left.conj() @ mode)
     turns = np.exp(2j * np.pi * np.arange(_ANGLES) / _ANGLES)[:, None]
@@ -292,8 +282,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     if draws and wrong.any():
         others = [bent(each)[2] for each in disturbed(quadratic[:, 2], wrong[:, 2], draws)]
         error += SAFETY * float(np.abs(np.array(others) - cubic).max())
-    eigenvalue = complex(values[index])
-    return HopfForm(eigenvalue, mode, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3)
+    return HopfForm(mode, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3)
 
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
@@ -308,23 +297,22 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
     units = numerical_balance(linear_part(here, point.orbit)[1])
     for share in _FIRST:
         try:
-            return _cycle(family, point, form, units, share)
+            return _cycle(family, point, rate, form, units, share)
         except AnalysisError as error:
             reason = error.problem
     raise AnalysisError(f"no cycle was found beside the Hopf point: {reason}", field="point", value=point.value)
 
 
 def _cycle(
-    family: Family, point: BifurcationPoint, form: HopfForm, units: Array, share: float
+    family: Family, point: BifurcationPoint, rate: complex, form: HopfForm, units: Array, share: float
 ) -> tuple[float, Orbit, Array]:
     """The cycle whose cubic term is a given fraction of the frequency, or a smaller one where the manifold is bent."""
-    assert point.rate is not None
     mode, *bends = (float(np.linalg.norm(each / units)) for each in (form.mode, form.second, form.mean))
     square = point.frequency / abs(form.cubic)
     square = share * (min(square, (mode / max(bends)) ** 2) if max(bends) > 0.0 else square)
-    shift = -form.cubic.real / point.rate.real * square
+    shift = -form.cubic.real / rate.real * square
     value = point.value + shift
-    duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + point.rate.imag * shift)
+    duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + rate.imag * shift)
     system, at_rest = equilibrium_at(family, value, point.orbit)
     rest = at_rest.state
     with UserCode("family", value):

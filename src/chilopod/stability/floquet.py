@@ -135,9 +135,8 @@ class Exponents(Shown, ReadOnlyArrays):
 
 
 def _multipliers(orbit: Orbit) -> Multipliers:
-    image = orbit.image
-    spec = spectrum(image)
-    return full_period(spec.values, spec.error, image.returns, orbit.state, image.period)
+    spec = spectrum(orbit.image)
+    return full_period(spec.values, spec.error, orbit.image.returns, orbit.state, orbit.period)
 
 
 def full_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
@@ -183,27 +182,24 @@ def multipliers(
         count = checked_count("leading", leading, system.dimension - (system.period is None))
         if offers(system, "flow_tangents") and system.dimension >= LARGE:
             image, size = find_large_orbit(system, orbit)
-            found = leading_multipliers(image, size, count)
-            result = full_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
-            of_period = found.following**image.returns
+            found, error, following = leading_multipliers(image, size, count)
+            result = full_period(found, error, image.returns, image.point, image.returns * image.duration)
+            next_one = following**image.returns
         else:
-            result, of_period = _leading_of(_multipliers(find_orbit(system, orbit)), count)
+            result = _multipliers(find_orbit(system, orbit))
+            half, moduli = result.half_period, np.abs(result.values)
+            count = whole_pairs(result.values if half is None else half, count)
+            next_one = float(moduli[count]) if count < moduli.size else 0.0
+            half = None if half is None else half[:count]
+            bounds = result.error_bounds[:count]
+            result = replace(result, values=result.values[:count], half_period=half, error_bounds=bounds)
     if result.values.size == system.dimension - (system.period is None):
         return result
     remark = (
         f"only the {result.values.size} multipliers of largest modulus were computed; they decide whether the orbit "
-        f"is stable; the next one has a modulus of about {of_period:.3g}"
+        f"is stable; the next one has a modulus of about {next_one:.3g}"
     )
     return replace(result, remarks=(remark,))
-
-
-def _leading_of(every: Multipliers, count: int) -> tuple[Multipliers, float]:
-    """The largest of all multipliers, and the modulus of the next one."""
-    count = whole_pairs(every.values if every.half_period is None else every.half_period, count)
-    half = None if every.half_period is None else every.half_period[:count]
-    following = float(np.abs(every.values[count])) if count < every.values.size else 0.0
-    chosen = replace(every, values=every.values[:count], half_period=half, error_bounds=every.error_bounds[:count])
-    return chosen, following
 
 
 def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[Multipliers]:
@@ -223,11 +219,8 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
         if any(is_autonomous(system) for system in systems):
             return [multipliers(system) for system in systems]
         states = [known_state(system) for system in systems]
-        images = return_maps(systems, states)
-        return [
-            _multipliers(from_known(system, state, image=image))
-            for system, state, image in zip(systems, states, images, strict=True)
-        ]
+        known = zip(systems, states, return_maps(systems, states), strict=True)
+        return [_multipliers(from_known(system, state, image=image)) for system, state, image in known]
 
 
 def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: float = math.inf) -> Exponents:
@@ -236,17 +229,15 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: fl
     The state space is split along the factors of the period, so a multiplier of 1e-60 has the same relative accuracy as
     one of 0.5.
     """
-    if seconds != math.inf:
-        with Deadline(seconds):
-            return exponents(system, orbit)
-    found = find_orbit(system, orbit)
-    image = found.image
-    if is_stiff(system, found.state, image.period / image.returns):
-        log_nu, modes, moved = split_stiff(system, found.state, image)
-    else:
-        cut = moderate_cut(system, found.state, image)
-        log_nu, modes, moved = split_product(cut.factors, cut.errors)
-        modes = cut.basis @ modes
+    with Deadline(seconds):
+        found = find_orbit(system, orbit)
+        image = found.image
+        if is_stiff(system, found.state, image.period / image.returns):
+            log_nu, modes, moved = split_stiff(system, found.state, image)
+        else:
+            cut = moderate_cut(system, found.state, image)
+            log_nu, modes, moved = split_product(cut.factors, cut.errors)
+            modes = cut.basis @ modes
     bound = image.returns * (moved + 4.0 * _EPSILON * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k, with the imaginary part in (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))

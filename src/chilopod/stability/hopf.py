@@ -79,7 +79,7 @@ def locate_hopf(
     equilibrium
         Guess of the equilibrium at ``low``, shape (n,), which is then followed through the interval. A fold ends the
         search, with a remark.
-        budget, seconds
+    budget, seconds
         Limits as for :func:`chilopod.stability.locate`, with equilibria for orbits.
 
     Returns
@@ -152,14 +152,20 @@ def _piece(
             return [f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one"]
         if crossing.collision:
             return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]
-        return _described(family, (low, high), _of_map(samples, crossing, matrices, duration), duration)
+        point = _of_map(samples, crossing, matrices, duration)
+        reason = f"{point.multiplicity // 2} pairs are critical at once"
+        if point.multiplicity <= 2:
+            try:
+                return [_hopf_point(family, between, point, duration)]
+            except AnalysisError as error:
+                reason = error.problem
+        return [f"no coefficient at {point.value:.9g}: {reason}", replace(point, multiplier=1j * point.frequency)]
 
-    return located(samples, crossings, described, _fold_remark, _POINTS), samples.path[-1]
+    def ended(fold: Fold) -> str:
+        where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
+        return f"the equilibrium ends in a fold at {where}: it meets another one there"
 
-
-def _fold_remark(fold: Fold) -> str:
-    where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
-    return f"the equilibrium ends in a fold at {where}: it meets another one there"
+    return located(samples, crossings, described, ended, _POINTS), samples.path[-1]
 
 
 def _of_map(
@@ -181,18 +187,6 @@ def _of_map(
     return replace(at, period=2.0 * np.pi / frequency, multiplicity=crossing.multiplicity)
 
 
-def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
-    """A Hopf point with its results from f, or from the map alone with a remark on the reason."""
-    reason = f"{point.multiplicity // 2} pairs are critical at once"
-    if point.multiplicity <= 2:
-        try:
-            return [_hopf_point(family, between, point, duration)]
-        except AnalysisError as error:
-            reason = error.problem
-    remark = f"no coefficient at {point.value:.9g}: {reason}"
-    return [remark, replace(point, multiplier=1j * point.frequency)]
-
-
 def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
     """Relative error of the derivative of the map, in units that balance the states: error of the exponential (by the
     norm of the exponent, as Higham, *Functions of Matrices*, chapter 10), and of the rounding of the state, magnified
@@ -212,8 +206,7 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
-    """The step h of the map: a radian of the fastest oscillation or growth, which preserves all multipliers, or about
-    the time of the decays."""
+    """The step h of the map: a radian of the fastest oscillation or growth, or about the time of the decays."""
     values = start.eigenvalues
     fastest = float(np.maximum(np.abs(values.imag), values.real).max())
     if fastest > 0.0:
@@ -292,8 +285,8 @@ def _hopf_point(
     verdict = decided if abs(coefficient) > error else Criticality.UNDECIDED
     about: dict[str, Any] = {"criticality": verdict, "coefficient": coefficient, "coefficient_error": error}
     about |= {"mode": form.mode, "multiplier": 1j * frequency, "frequency": frequency, "rate": rate}
-    period = 2.0 * np.pi / frequency
-    return replace(point, value=value, error_bound=bound, orbit=here.state, period=period, **about)
+    about |= {"value": value, "error_bound": bound, "orbit": here.state, "period": 2.0 * np.pi / frequency}
+    return replace(point, **about)
 
 
 def _rate(

@@ -15,7 +15,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -71,23 +70,20 @@ class KrylovSubspace(ReadOnlyArrays):
     coupling: Array  # R, shape (q, m), zero but for the columns of the last block; q = 0 where V is invariant
 
     def solve_shifted(self, right: Array) -> tuple[Array, float]:
-        """The v in V with the least |(A - 1) v - right|, and that residual relative to |right|, for a ``right`` in the
-        first block of V: block GMRES (Saad, *Iterative Methods for Sparse Linear Systems*, 2003, section
-        6.12)."""
-        m = self.matrix.shape[0]
-        whole = np.concatenate([self.matrix - np.eye(m), self.coupling])
+        """The v in V with the least |(A - 1) v - right|, and that relative to |right|, for a ``right`` in the first
+        block of V: block GMRES (Saad, *Iterative Methods for Sparse Linear Systems*, 2003, section 6.12)."""
+        whole = np.concatenate([self.matrix - np.eye(len(self.matrix)), self.coupling])
         inside = np.concatenate([self.basis.T @ right, np.zeros(len(self.coupling))])
-        left, values, right_vectors = np.linalg.svd(whole, full_matrices=False)
+        left, values, rows = np.linalg.svd(whole, full_matrices=False)
         kept = values > _SINGULAR * max(1.0, float(np.linalg.norm(self.matrix)))
-        found = right_vectors[kept].T @ (left[:, kept].T @ inside / values[kept])
+        found = rows[kept].T @ (left[:, kept].T @ inside / values[kept])
         return self.basis @ found, float(np.linalg.norm(whole @ found - inside) / np.linalg.norm(inside))
 
 
 def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[KrylovSubspace]:
     """Subspaces of a matrix, given by its products with directions, shape (n, any), from a first block, shape (n,
     columns). Each is larger by an eighth or more; the last one is invariant."""
-    n = len(start)
-    block = _orthonormal(start, _ROUND_OFF * float(np.linalg.norm(start)), n)[0]
+    block = _orthonormal(start, _ROUND_OFF * float(np.linalg.norm(start)), len(start))[0]
     first = block.shape[1]
     basis, matrix, coupling = block, np.zeros((0, 0)), np.zeros((first, 0))
     largest, look = 0.0, 0.0
@@ -100,7 +96,7 @@ def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[
         again = basis.T @ outside  # once more, for an orthogonal basis (Giraud et al., Numer. Math. 101, 2005)
         inside += again
         outside -= basis @ again
-        block, tail = _orthonormal(outside, _ROUND_OFF * largest, n - m)
+        block, tail = _orthonormal(outside, _ROUND_OFF * largest, len(start) - m)
         matrix = np.hstack([np.concatenate([matrix, coupling]), inside])
         coupling = np.concatenate([np.zeros((tail.shape[0], old)), tail], axis=1)
         if m >= look or not tail.size:
@@ -127,29 +123,22 @@ class TangentMap(ReadOnlyArrays):
     state: Array  # H(point)
     duration: float  # duration of a return
     returns: int  # number of returns in the full period
-    velocity: Array | None  # dx/dt at ``state``, if the system does not depend on time
-    normal: Array | None  # normal of the section, likewise
-
-    @property
-    def section(self) -> Section | None:
-        """Section of returns, through ``point``."""
-        return None if self.normal is None else Section(self.point, self.normal, self.duration)
+    section: Section | None  # section of returns, through ``point``, if the system does not depend on time
+    velocity: Array | None  # dx/dt at ``state``, likewise
 
     def images(self, directions: Array) -> Array:
         """H' times directions, shape (n, m) both."""
         return self._in_parts(directions, (0.0,))[1]
 
     def images_with_error(self, directions: Array) -> tuple[Array, Array, Array]:
-        """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,), relative to
-        their norms: a multiple of the difference from a second computation with the interval in parts."""
+        """The same with bounds on the errors of the images and of ``state``, from a second computation in parts."""
         state, images = self._in_parts(directions, (0.0,))
         other, parts = self._in_parts(directions, CUTS)
         return images, REPEATED * np.abs(parts - images), REPEATED * np.abs(self._across(other - state))
 
     def _in_parts(self, directions: Array, cuts: tuple[float, ...]) -> tuple[Array, Array]:
-        times = [cut * self.duration for cut in cuts] + [self.duration]
         state, images = self.point, directions
-        for a, b in zip(times, times[1:], strict=False):
+        for a, b in itertools.pairwise([*(cut * self.duration for cut in cuts), self.duration]):
             with UserCode("flow_tangents"):
                 state, images = self.system.flow_tangents(np.array(state), np.array(images), a, b)
             shapes, allowed = (shape_of(state), shape_of(images)), (self.point.shape, directions.shape)
@@ -164,24 +153,23 @@ class TangentMap(ReadOnlyArrays):
 
     def _across(self, directions: Array) -> Array:
         """Directions at the end of a return, projected along the motion into the section."""
-        if self.velocity is None or self.normal is None:
+        if self.velocity is None or self.section is None:
             return directions
-        rate = float(self.normal @ self.velocity)
-        along: Array = np.multiply.outer(self.velocity, self.normal @ directions) / rate
+        normal = self.section.normal
+        along: Array = np.multiply.outer(self.velocity, normal @ directions) / float(normal @ self.velocity)
         return directions - along
 
 
 def tangent_map(system: Capabilities, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
-    velocity, normal = None, None
+    velocity, across = None, None
     duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
     state = turned(system, carried(system, x[None], 0.0, duration))[0]
     if not np.isfinite(state).all():
         raise AnalysisError("the flow is not finite over one return", field="flow")
-    if is_autonomous(system):
-        assert section is not None
-        velocity, normal = np.asarray(system.velocity(np.array(state)), dtype=np.float64), section.normal
-    return TangentMap(system, x, state, duration, returns_per_period(system), velocity, normal)
+    if is_autonomous(system) and section is not None:
+        velocity, across = np.asarray(system.velocity(np.array(state))), Section(x, section.normal, duration)
+    return TangentMap(system, x, state, duration, returns_per_period(system), across, velocity)
 
 
 def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
@@ -204,10 +192,8 @@ def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
         size = np.ones(x.size)
     for _ in range(_SWEEPS if moves else _MOST_SWEEPS):
         signs = random.choice([-1.0, 1.0], (x.size, _LANES))
-        driven = np.sqrt(
-            np.square(system.flow_tangents(np.array(x), size[:, None] * signs, 0.0, times[1])[1]).mean(axis=1)
-        )
-        larger = np.maximum(size, driven)
+        driven = system.flow_tangents(np.array(x), size[:, None] * signs, 0.0, times[1])[1]
+        larger = np.maximum(size, np.sqrt(np.square(driven).mean(axis=1)))
         if not moves:
             larger /= larger.max()
             if float((larger / size).max()) <= _STEADY * float((larger / size).min()):
@@ -223,11 +209,8 @@ def closed_orbit(
     farthest: float = np.inf,
     budget: Budget | None = None,
 ) -> tuple[TangentMap, Array]:
-    """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
-
-    The first return may displace the guess by ``farthest``, relative to the sizes; each round takes a return map from
-    the budget. Raises AnalysisError if Newton's method does not converge.
-    """
+    """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,); an
+    AnalysisError without one. The first return may displace the guess by ``farthest``, relative to the sizes."""
     size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
     best = np.inf
@@ -254,11 +237,8 @@ def closed_orbit(
             break
         if section is not None:
             section = replace(section, duration=image.duration)
-    raise AnalysisError(
-        f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)",
-        field="orbit",
-        allowed="a guess closer to the orbit",
-    )
+    said = f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)"
+    raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
 
 
 def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accuracy: float) -> tuple[Array, Array]:
@@ -271,22 +251,13 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
             break
     if left > _UNSOLVED:
         raise AnalysisError("no correction closes the motion: a return moves all states near the guess alike")
-    values, vectors = np.linalg.eig(subspace.matrix)
-    largest = vectors[:, np.argsort(-np.abs(values))[: _LANES - 1]]
+    largest = eigensystem(subspace.matrix)[1][:, : _LANES - 1]
     return move, subspace.basis @ np.where(largest.imag.any(axis=0), largest.imag + largest.real, largest.real)
 
 
-class LeadingMultipliers(NamedTuple):
-    """The largest eigenvalues of the derivative of a return map by falling modulus."""
-
-    values: ComplexArray  # shape (count,), or one more to complete a pair
-    error: Array  # bound on the error of each
-    following: float  # approximate modulus of the next one
-
-
-def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMultipliers:
-    """The ``count`` multipliers of largest modulus of the return map at a state on the orbit, for given sizes of the
-    states, shape (n,).
+def leading_multipliers(image: TangentMap, size: Array, count: int) -> tuple[ComplexArray, Array, float]:
+    """The ``count`` multipliers of largest modulus of a return map, or one more to complete a pair, for given sizes of
+    the states, shape (n,); bounds on their errors; and the approximate modulus of the next one.
 
     A value theta with the vector y, |y| = 1, has the exact error w^T (H' y - theta y) / w^T y, with w the left
     eigenvector of the multiplier. H' y is computed again, with its error; the components of w in the random directions
@@ -299,16 +270,20 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMu
     for subspace in krylov_subspaces(lambda directions: image.images(units * directions) / units, start):
         every, vectors, left = eigensystem(subspace.matrix)
         chosen = whole_pairs(every, count)
-        off = np.linalg.norm(subspace.coupling @ vectors, axis=0)  # distances from eigenvalues of the matrix
-        if _settled(every, off, chosen, float(np.linalg.norm(subspace.matrix, 2))):
+        # Distances from eigenvalues of the matrix: the chosen ones are known to round-off, no other may become larger.
+        off = np.linalg.norm(subspace.coupling @ vectors, axis=0)
+        known = off <= _CONVERGED * float(np.linalg.norm(subspace.matrix, 2))
+        rising = ~known & (np.abs(every) + off > np.abs(every[chosen - 1]))
+        if every.size > chosen and known[:chosen].all() and not rising.any():
             break
     values, vectors = every[:chosen], subspace.basis @ vectors[:, :chosen]
-    both, errors, state_error = image.images_with_error(units * np.hstack([vectors.real, vectors.imag]))
+    directions = units * np.hstack([vectors.real, vectors.imag])
+    both, errors, state_error = image.images_with_error(directions)
     images = (both[:, :chosen] + 1j * both[:, chosen:]) / units
     residual = np.linalg.norm(images - values * vectors, axis=0)
     residual += np.linalg.norm((errors[:, :chosen] + errors[:, chosen:]) / units, axis=0)
     residual += 4.0 * np.finfo(float).eps * np.linalg.norm(images, axis=0)
-    residual += _bend(image, size, subspace, state_error, units * np.hstack([vectors.real, vectors.imag]), both)
+    residual += _bend(image, size, subspace, state_error, directions, both)
     condition = np.linalg.norm(left[:, :chosen], axis=0)
     if subspace.coupling.size:
         seen = np.linalg.norm(left[: subspace.first, :chosen], axis=0)
@@ -318,7 +293,7 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMu
         wrong = np.full(subspace.matrix.shape, float(residual.max()))
         error = np.minimum(error, eigenvalue_errors(every, subspace.matrix, wrong)[:chosen])
     following = float(np.abs(every[chosen])) if chosen < every.size else 0.0
-    return LeadingMultipliers(values, error, following)
+    return values, error, following
 
 
 def whole_pairs(values: ComplexArray, count: int) -> int:
@@ -327,13 +302,6 @@ def whole_pairs(values: ComplexArray, count: int) -> int:
     if count < values.size and values[count - 1].imag > 0.0 and values[count].imag < 0.0:
         count += 1
     return count
-
-
-def _settled(values: ComplexArray, off: Array, chosen: int, largest: float) -> bool:
-    """True if the chosen ones have converged to round-off, and no other one may become larger."""
-    known = off <= _CONVERGED * largest
-    rising = ~known & (np.abs(values) + off > np.abs(values[chosen - 1]))
-    return bool(values.size > chosen and known[:chosen].all() and not rising.any())
 
 
 def _bend(

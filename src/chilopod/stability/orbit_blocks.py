@@ -50,10 +50,3 @@ def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matr
         replace(each, multiplicity=times * each.multiplicity, change=times * each.change) for each in found.crossings
     )
     return replace(found, crossings=crossings)
-
-
-def block_of(blocks: Blocks, matrix: Array, multiplier: complex) -> Block | None:
-    """The block of a simple multiplier of a return map, shape (n, n)."""
-    reduced = [matrix if block is None else block.reduced(matrix) for block in blocks]
-    away = [float(np.abs(np.linalg.eigvals(each) - multiplier).min()) for each in reduced]
-    return blocks[int(np.argmin(away))]

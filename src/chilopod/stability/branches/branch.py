@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,8 @@ from chilopod.frozen import Array
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
-from chilopod.stability.branches.curve import PRECISION, Curve
+from chilopod.stability.branches.curve import Curve
+from chilopod.stability.branches.family_returns import PRECISION
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proceed", "switch"]
+__all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "switch"]
 
 
 LONGEST = 0.15
@@ -56,10 +57,6 @@ _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]
-
-
-def _silent(count: int, point: BranchPoint) -> None:
-    """A :data:`Progress` that shows nothing."""
 
 
 @dataclass(frozen=True)
@@ -95,13 +92,7 @@ class Branch(Result):
     @property
     def units(self) -> Array:
         """Sizes of the states and scale of the parameter along the curve, shape (n+1,)."""
-        units = self.points[0].units
-        return np.ones(self.points[0].tangent.size) if units is None else units
-
-    @property
-    def sizes(self) -> Array:
-        """Sizes of the states along the curve, shape (n,), the units of tangents."""
-        return self.units[:-1]
+        return self.points[0].units
 
     @property
     def scale(self) -> float:
@@ -144,7 +135,7 @@ class Branch(Result):
 
     def _picture(self) -> str:
         # The state that changes most, relative to its size, distinguishes the branch from others.
-        moved = np.ptp([point.orbit for point in self.points], axis=0) / self.sizes
+        moved = np.ptp([point.orbit for point in self.points], axis=0) / self.units[:-1]
         return picture(lambda axes: self.plot(axes, int(moved.argmax())), "branch of periodic orbits")
 
     def plot(self, axes: Axes | None = None, state: int = 0) -> Axes:
@@ -182,7 +173,7 @@ class Branch(Result):
 
 def follow(
     family: Family,
-    start: Start | BranchPoint | Orbit | ArrayLike,
+    start: Start | Branch | BranchPoint | Orbit | ArrayLike,
     between: tuple[float, float],
     *,
     points: int | None = None,
@@ -193,22 +184,25 @@ def follow(
     symmetric: bool = False,
     budget: int = BUDGET,
     seconds: float = math.inf,
-    progress: Progress = _silent,
+    progress: Progress = lambda count, point: None,
 ) -> Branch:
-    """Follow a branch from a point along its tangent.
+    """Follow a branch from a point along its tangent, or from the end of a branch that was followed before.
+
+    The points of a continued branch equal those of a single run; for a system without a period of its own they are
+    other points of the same curve, as the last section is rebuilt.
 
     Parameters
     ----------
     family
         ``family(value)`` is the system.
     start
-        Start from :func:`begin` or :func:`switch`, a point of another branch, or an orbit (or a guess) at the lower end
-        of the interval.
+        Start from :func:`begin` or :func:`switch`, a point of another branch, an orbit (or a guess) at the lower end of
+        the interval, or a branch, which is continued in its own units, with its own ``symmetric``.
     between
         Interval of the parameter; the branch ends at an end of it, and the family is called for values inside only.
-        Its width becomes the branch's scale.
+        Its width becomes the scale of a new branch.
     points
-        Number of ordinary points after which the branch ends; by default it continues to an end of the interval, or
+        Number of new ordinary points after which the branch ends; by default it continues to an end of the interval, or
         until it is closed, lost, or out of budget.
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
@@ -228,23 +222,28 @@ def follow(
     Raises
     ------
     ParameterError
-        If the interval, ``points`` or a step is invalid, or ``start`` is a bifurcation point, which needs
-        :func:`switch`.
+        If the interval, ``points`` or a step is invalid, ``start`` is a bifurcation point, which needs :func:`switch`,
+        or a branch that leaves the interval.
     AnalysisError
         If no orbit is found at the start.
     """
-    low, high = _checked(between, points, longest)
-    options: dict[str, object] = {"closely": closely, "precision": precision, "budget": budget, "progress": progress}
-    check_arguments(family=family, step=step, symmetric=symmetric, **options)
+    low, high = checked_interval(between)
+    if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
+        raise ParameterError("is too narrow for double precision", field="between", value=between)
+    check_arguments(family=family, points=points, step=step, longest=longest, closely=closely, precision=precision)
+    check_arguments(symmetric=symmetric, budget=budget, progress=progress)
     if isinstance(start, BifurcationPoint):
         said = "is a bifurcation point"
         raise ParameterError(said, field="start", value=start.kind.label, allowed="a start from `switch`")
     allowed = Budget(budget, seconds)
     curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=allowed)
     with allowed:
-        if not isinstance(start, Start | BranchPoint):
-            start = begin(family, low, start, symmetric=symmetric)
-        branch, anchor = opened(curve, start, min(step, longest))
+        if isinstance(start, Branch):
+            branch, anchor = _reopened(curve, start, longest)
+        else:
+            if not isinstance(start, Start | BranchPoint):
+                start = begin(family, low, start, symmetric=symmetric)
+            branch, anchor = opened(curve, start, min(step, longest))
         return followed(curve, branch, anchor, longest, points, closely, progress)
 
 
@@ -252,83 +251,33 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
     """The branch at its first point, and the anchor there; the curve gets the sizes of its states."""
     if not curve.between[0] <= start.value <= curve.between[1]:
         raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
-    if isinstance(start, Start):
-        curve.periods = start.periods
+    curve.periods = start.periods
     curve.sizes = branch_sizes(curve, start)
     if isinstance(start, Start):
         anchor = anchored(curve, start, step)
     else:
         units = curve.units(start.orbit.size)
-        tangent = start.tangent * (1.0 if start.units is None else start.units) / units
+        tangent = start.tangent * start.units / units
         anchor = curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()
     return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor
 
 
-def proceed(
-    family: Family,
-    branch: Branch,
-    between: tuple[float, float],
-    *,
-    points: int | None = None,
-    longest: float = LONGEST,
-    closely: bool = True,
-    precision: float = PRECISION,
-    budget: int = BUDGET,
-    seconds: float = math.inf,
-    progress: Progress = _silent,
-) -> Branch:
-    """Continue a branch from its end. The points equal those of a single run; for a system without a period of its own
-    they are other points of the same curve, as the last section is rebuilt.
-
-    Parameters
-    ----------
-    family, points, longest, closely, precision, budget, seconds, progress
-        Arguments of :func:`follow`; ``points`` counts the added ones.
-    branch
-        Branch from :func:`follow` or :func:`proceed`.
-    between
-        Interval of the parameter, which may differ from the first; the branch keeps its units.
-
-    Returns
-    -------
-    The branch with the new points at its end.
-
-    Raises
-    ------
-    ParameterError
-        As :func:`follow`, and if the branch ends at an end of the interval.
-    """
-    low, high = _checked(between, points, longest)
-    check_arguments(family=family, closely=closely, precision=precision, budget=budget, progress=progress)
-    if not isinstance(branch, Branch):
-        raise ParameterError("must be a branch", field="branch", value=branch, allowed="a Branch from `follow`")
-    end = branch.points[-1]
-    if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
+def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anchor]:
+    """A branch to be continued with a longest step, and the anchor at its end; the curve gets its units."""
+    end, first, (low, high) = branch.points[-1], branch.points[0], curve.between
+    if not low <= end.value <= high or outward(curve.box, np.array([end.value]), end.tangent[-1:]):
         said = "must extend beyond the branch's last point"
-        raise ParameterError(said, field="between", value=between, allowed=f"an interval around {end.value!r}")
-    orbits: dict[str, Any] = {"periods": branch.periods, "symmetric": branch.symmetric, "precision": precision}
-    allowed = Budget(budget, seconds)
-    curve = Curve(family, branch.scale, branch.sizes, between=between, budget=allowed, **orbits)
-    first = branch.points[0]
+        raise ParameterError(said, field="between", value=curve.between, allowed=f"an interval around {end.value!r}")
+    curve.scale, curve.sizes = branch.scale, branch.units[:-1]
+    curve.periods, curve.symmetric = branch.periods, branch.symmetric
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None
     # At a branch point the matrix is singular, so it is computed a step ahead.
-    ahead = branch.step if leaving else 0.0
-    if longest < LONGEST:  # steps along straight parts are longer than the longest
-        branch = replace(branch, step=min(branch.step, longest))
-    with allowed:
-        anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
-        return followed(curve, branch, anchor, longest, points, closely, progress)
-
-
-def _checked(between: tuple[float, float], points: int | None, longest: float) -> tuple[float, float]:
-    low, high = checked_interval(between)
-    if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
-        raise ParameterError("is too narrow for double precision", field="between", value=between)
-    check_arguments(points=points, longest=longest)
-    return low, high
+    anchor = curve.anchor(last, earlier[0] if earlier else None, branch.step if leaving else 0.0, leaving)
+    # Steps along straight parts are longer than the longest.
+    return (replace(branch, step=min(branch.step, longest)) if longest < LONGEST else branch), anchor
 
 
 def followed(
@@ -338,37 +287,36 @@ def followed(
     longest: float,
     points: int | None,
     closely: bool,
-    progress: Progress = _silent,
+    progress: Progress = lambda count, point: None,
     until: Kind | None = None,
 ) -> Branch:
     """A branch with the points that follow an anchor; it also ends past a special point of the kind ``until``."""
     curve.first, curve.long_steps = branch.points[0], longest >= LONGEST
-    found, remarks = list(branch.points), list(branch.remarks)
+    found, remarks, done = list(branch.points), list(branch.remarks), 0
 
     def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:
         within = inspect(curve, step, closely)
         reached = until is not None and any(point.special is until for point in within.points)
         return (within, step.end.last), Ending.ENOUGH_POINTS if reached else ending
 
-    def keep(looked: tuple[Found, BranchPoint], count: int) -> None:
+    def keep(looked: tuple[Found, BranchPoint], _: int) -> None:
+        nonlocal done
         within, end = looked
         found.extend([*within.points, end])
         remarks.extend(within.remarks)
-        progress(count, end)
+        done += 1
+        progress(done, end)
 
-    ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
-    if ending is Ending.LOST and _at_event(curve, found[-1]):
-        reason = _EVENT_AT_ZERO
-        steps = sum(point.special is None for point in found[len(branch.points) :])
-        moved = _elsewhere(curve, found[-1]) if steps else None
+    moved: Anchor | None = anchor
+    while moved is not None:
+        before, left = done, points and points - done
+        ending, reason, size = trace(curve, moved, (branch.step, longest), left, look, keep)
+        moved = None
+        if ending is Ending.LOST and _at_event(curve, found[-1]):
+            reason = _EVENT_AT_ZERO
+            moved = _elsewhere(curve, found[-1]) if done > before else None
         if moved is not None:
             remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
-            branch, left = replace(branch, points=tuple(found), remarks=tuple(remarks)), points and points - steps
-
-            def counted(count: int, point: BranchPoint) -> None:
-                progress(steps + count, point)
-
-            return followed(curve, branch, moved, longest, left, closely, counted, until)
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
 

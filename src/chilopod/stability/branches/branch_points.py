@@ -29,10 +29,10 @@ class BranchPoint(ReadOnlyArrays):
         system does not depend on time.
     tangent
         Unit tangent of the curve, shape (n+1,): state, then parameter, in ``units``.
+    units
+        Sizes of the states and scale of the parameter, the units of the tangent, shape (n+1,).
     special
         Kind of the bifurcation here; None at ordinary points.
-    units
-        Sizes of the states and scale of the parameter, the units of the tangent, shape (n+1,); None: the states' own.
     period
         Full period of the orbit; None if not computed.
     error_bound
@@ -48,8 +48,8 @@ class BranchPoint(ReadOnlyArrays):
     orbit: Array
     multipliers: ComplexArray
     tangent: Array
+    units: Array
     special: Kind | None = None
-    units: Array | None = None
     period: float | None = None
     error_bound: float = 0.0
     bifurcation: BifurcationPoint | None = None

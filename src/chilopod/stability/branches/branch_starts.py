@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -184,12 +185,12 @@ def switch(
     ParameterError
         If no branch that can be followed leaves the point, or it is not a special point.
     """
-    check_arguments(family=family, **({} if periods is None else {"periods": periods}))
+    check_arguments(family=family, periods=1 if periods is None else periods)
     old, known = None, None
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
             raise ParameterError("must be a special point", field="point", value=point.value)
-        old, known = None if point.units is None else point.tangent * point.units, point.periods
+        old, known = point.tangent * point.units, point.periods
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
@@ -200,7 +201,6 @@ def switch(
         with Deadline(seconds):
             value, cycle, outward = hopf_cycle(family, point)
         return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
-    modes = point.mode.real[None] if point.modes is None else point.modes.real.T
     period = None
     with Deadline(seconds), UserCode("family", point.value):
         system = system_of(family, point.value)
@@ -211,16 +211,14 @@ def switch(
             whole = whole_period(system, periods)
             period = find_orbit(whole, point.orbit, with_error=False, shortest=periods == 1).period
     axial = point.symmetry is not None and bool(point.symmetry.branches)
-    if kind is Kind.COLLISION:
-        modes = modes if axial else point.mode.real[None]  # two that meet have one eigenvector
-        minus = point.multiplier.real < 0.0
-        kind = kind if not minus else Kind.PERIOD_DOUBLING if returns_per_period(system) % 2 else Kind.PITCHFORK
+    modes = point.mode.real[None]
+    if point.modes is not None and (axial or kind is not Kind.COLLISION):  # two that meet have one eigenvector
+        modes = point.modes.real.T
+    if kind is Kind.COLLISION and point.multiplier.real < 0.0:
+        kind = Kind.PERIOD_DOUBLING if returns_per_period(system) % 2 else Kind.PITCHFORK
     if kind is Kind.PERIOD_DOUBLING:
-        twice = None if period is None else 2.0 * period
-        return tuple(
-            Start(point.value, point.orbit, mode=mode, periods=2 * periods, period=twice, bifurcation=point)
-            for mode in modes
-        )
+        about: dict[str, Any] = {"periods": 2 * periods, "period": period and 2.0 * period, "bifurcation": point}
+        return tuple(Start(point.value, point.orbit, mode=mode, **about) for mode in modes)
     # With several modes each has its own branch, and the equation for a crossing of two curves holds only where a
     # symmetry separates them.
     crossing = kind is not Kind.PITCHFORK and (len(modes) == 1 or axial)
@@ -253,14 +251,13 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
     image = curve.image(x, value, section)
     base = sizes(system, x, image.period / image.returns)
     direction = np.cos(1.0 + 3.0 * np.arange(x.size))
-    direction = base * direction / np.abs(direction).max()
-    if image.velocity is not None and image.normal is not None:
-        direction -= image.velocity * float(image.normal @ direction) / float(image.normal @ image.velocity)
+    direction = image.across @ (base * direction / np.abs(direction).max())
     returned = image.state, image.jacobian @ direction
     flown = []
     for part in _PARTS:
-        state, derivative = system.flow(np.array(x), 0.0, part * image.period / image.returns)
-        flown.append((part, (state, derivative @ direction)))
+        time = part * image.period / image.returns
+        state, derivative = system.flow(np.array(x), 0.0, time)
+        flown.append((time, (state, derivative @ direction)))
 
     def departs(states: Array, linear: tuple[Array, Array], r: float) -> bool:
         reach = max(float(np.abs(linear[1] / base).max()), 1.0)
@@ -272,8 +269,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
             with np.errstate(all="ignore"):
                 there = x + r * direction
                 return departs(returned_states(system, there[None], section)[0], returned, r) or any(
-                    departs(system.flow(np.array(there), 0.0, part * image.period / image.returns)[0], linear, r)
-                    for part, linear in flown
+                    departs(system.flow(np.array(there), 0.0, time)[0], linear, r) for time, linear in flown
                 )
         except (AnalysisError, ArithmeticError, ValueError):
             return True
@@ -296,13 +292,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
 
 
 def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
-    """Anchor of the first step of a branch; its matrix is computed ``ahead`` by a distance where branches meet.
-
-    Raises
-    ------
-    AnalysisError
-        If the direction of the branch is not unique there.
-    """
+    """Anchor of the first step of a branch; its matrix is computed ``ahead`` by a distance where branches meet."""
     section = curve.section_at(start.orbit, start.value, start.period)
     units = curve.units(start.orbit.size)
     image, matrix = curve.matrix_at(start.orbit, start.value, section, np.zeros(units.size), True)
@@ -324,10 +314,10 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     leaving = start.mode is not None
     known = image if leaving else bounded(curve.system(start.value), start.orbit, image).image
     values, bound = curve.multipliers(known)
-    special = start.bifurcation.kind if start.bifurcation is not None else None
-    point = BranchPoint(
-        start.value, start.orbit, values, tangent, special, units, image.period, bound, start.bifurcation, curve.periods
-    )
+    about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": curve.periods}
+    if start.bifurcation is not None:
+        about |= {"special": start.bifurcation.kind, "bifurcation": start.bifurcation}
+    point = BranchPoint(start.value, start.orbit, values, tangent, units, **about)
     return curve.anchor(point, ahead=ahead if leaving else 0.0, leaving=leaving)
 
 
@@ -371,28 +361,19 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
     found = [s * basis[0] + t * basis[1] for s, t in ((-q, a), (c, -q))]
     found = [each / np.linalg.norm(each) for each in found]
     old = _old_tangent(curve, start, units)
-    if old is not None:
-        other = min(found, key=lambda each: abs(float(each @ old)))
-    else:  # the tangent with the smaller part along the parameter
-        other = min(found, key=lambda each: abs(float(each[-1])))
+    other = min(found, key=lambda each: abs(float(each @ old)))
     assert start.mode is not None
     along = float(other[:-1] @ (start.mode / units[:-1]))
     return other if along >= 0.0 else -other
 
 
-def _old_tangent(curve: Curve, start: Start, units: Array) -> Array | None:
-    """Unit tangent of the old branch, in units; None if unknown."""
+def _old_tangent(curve: Curve, start: Start, units: Array) -> Array:
+    """Unit tangent of the old branch, in units; along the parameter if unknown."""
     if start.old is not None:
         old = start.old / units
         return np.asarray(old / np.linalg.norm(old))
-    states = []
-    for sign in (1.0, -1.0):
-        value = start.value + sign * _BESIDE * curve.scale
-        if not curve.between[0] <= value <= curve.between[1]:
-            value = start.value
-        system = curve.system(value)
-        if known_orbit(system) is None:
-            return None
-        states.append(np.append(known_state(system), value) / units)
-    old = states[0] - states[1]
-    return np.asarray(old / np.linalg.norm(old))
+    if known_orbit(curve.system(start.value)) is None:
+        return np.eye(units.size)[-1]
+    beside = np.clip(start.value + _BESIDE * curve.scale * np.array([-1.0, 1.0]), *curve.between).tolist()
+    low, high = (np.append(known_state(curve.system(value)), value) / units for value in beside)
+    return np.asarray((high - low) / np.linalg.norm(high - low))

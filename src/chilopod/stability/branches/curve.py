@@ -20,15 +20,12 @@ from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 from chilopod.stability.problem.budget import SpentError
-from chilopod.stability.problem.capabilities import Family, checked_flow, given_scale, is_autonomous
+from chilopod.stability.problem.capabilities import checked_flow, given_scale, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
-
-PRECISION = 1e-12
-"""Default precision of orbits, relative to the sizes of the states; the accuracy of the flow limits it."""
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
@@ -45,14 +42,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     first: BranchPoint  # first point of the curve
     long_steps = False  # True if no step shorter than the default one is wanted
-
-    def __init__(
-        self, family: Family, scale: float, sizes: Array | None = None, *, precision: float = PRECISION, **returns: Any
-    ) -> None:
-        super().__init__(family, scale, sizes, **returns)
-        self.precision = precision
-        self.box = np.array([self.between])
-        self._motion = 0.0  # largest motion within a period so far
+    _motion = 0.0  # largest motion within a period so far
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
@@ -195,8 +185,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _solved(
         self, anchor: Anchor, timed: Anchor, guess: Guess, plane: Plane, count: int
     ) -> tuple[Anchor, Corrected[Returned]]:
-        """The orbit near a guess, or where that fails near the result of multiple shooting; and the anchor with the
-        duration of a return there."""
+        """The orbit near a guess, or else near the result of multiple shooting, and the anchor with its duration."""
         matrix = within_space(anchor.space, guess.matrix)
         try:
             return timed, self.corrected(timed, Guess(guess.moved, matrix), plane)
@@ -213,8 +202,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _shot(
         self, anchor: Anchor, timed: Anchor, plane: Plane, count: int
     ) -> tuple[Array, Array, float, ReturnMap, Array]:
-        """Displacement in units, state, parameter, return map and :meth:`matrix`, by multiple shooting from an
-        anchor."""
+        """Displacement in units, state, parameter, return map and :meth:`matrix`, by multiple shooting."""
         last, section = anchor.last, timed.section
         system, units = self.system(last.value), self.units(last.orbit.size)
         duration = return_duration(system) if anchor.section is None else anchor.section.duration
@@ -239,8 +227,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _wrong(
         self, anchor: Anchor, x: Array, image: ReturnMap, moved: Array, matrix: Array, off: float, weakest: float
     ) -> float:
-        """Error of the derivative due to that of the orbit: ``off`` from the remaining residual, and ``weakest`` times
-        the error of the flow."""
+        """Error of the derivative due to that of the orbit: ``off``, and ``weakest`` times the error of the flow."""
         n = x.size
         # Units may be much larger than the orbit.
         reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
@@ -253,13 +240,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return bend * (off + weakest * flow * max(1.0, self._relative_size(x)))
 
     def arrived(self, step: Step[Anchor, OnCurve]) -> Step[Anchor, OnCurve]:
-        """A step with the anchor at its end, on the section there.
-
-        Raises
-        ------
-        AnalysisError
-            If the orbit has shrunk into an equilibrium.
-        """
+        """A step with the anchor at its end, on the section there."""
         anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
         tangent, matrix, section = step.tangent, step.matrix, None
@@ -278,9 +259,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             # H - x on the new section: it maps the direction of the motion to zero.
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
-        point = BranchPoint(
-            value, x, values, tangent, None, self.units(x.size), image.period, bound, None, self.periods
-        )
+        about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": self.periods}
+        point = BranchPoint(value, x, values, tangent, self.units(x.size), **about)
         before = None if anchor.leaving or anchor.last.special is not None else anchor.last
         return replace(step, end=self.anchored(point, matrix, section, before, anchor.matrix))
 
@@ -311,8 +291,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return np.array(states)
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and the coordinates that identify it: for a system that does
-        not depend on time, any state of its orbit counts."""
+        """Displacement of the first point, its tangent, and the coordinates that identify it at any time 0."""
         moved = self.moved(anchor.last, self.first.orbit, self.first.value)
         seen = slice(None) if anchor.section is None else slice(moved.size - 1, None)
         return moved, self.first.tangent, seen

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
@@ -21,43 +22,38 @@ from chilopod.stability.problem.returns import (
     whole_period,
 )
 
+PRECISION = 1e-12
+"""Default precision of orbits, relative to the sizes of the states; the accuracy of the flow limits it."""
+
 _PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
 _STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink
-_RETRIES, _STEEPER = 1, 100.0  # number of retries without a return, and factor on the step of each
 _KEPT = 8  # cached systems: making one may cost more than a flow
 
 
+@dataclass(eq=False)
 class FamilyReturns:
-    """Return maps of the systems of a family, with the scale of the parameter and the sizes of the states along a curve
-    (None: their own units), for orbits over a number of periods, or with the systems' symmetry in time. The family is
-    called for values of the interval only."""
+    """Return maps of the systems of a family along a curve."""
 
-    def __init__(
-        self,
-        family: Family,
-        scale: float,
-        sizes: Array | None = None,
-        *,
-        between: tuple[float, float] = (-np.inf, np.inf),
-        periods: int = 1,
-        symmetric: bool = False,
-        budget: Budget | None = None,
-    ) -> None:
-        self._family = family
-        self.scale = scale
-        self.sizes = sizes
-        self.between = between
-        self.periods = periods
-        self.symmetric = symmetric
-        self.budget = Budget(math.inf) if budget is None else budget
-        self.steepness = 1.0  # steepness of the return map over the parameter, in units
-        self._known: dict[float, SystemLike] = {}
-        self._dimension = 0
+    family: Family
+    scale: float  # scale of the parameter
+    sizes: Array | None = None  # sizes of the states; None: their own units
+    _: KW_ONLY
+    between: tuple[float, float] = (-np.inf, np.inf)  # interval of the values at which the family is called
+    periods: int = 1  # number of the systems' periods in one period of the orbits
+    symmetric: bool = False  # True for orbits with the systems' symmetry in time
+    precision: float = PRECISION  # precision of orbits, relative to the sizes of the states
+    budget: Budget = field(default_factory=lambda: Budget(math.inf))
+    steepness: float = field(default=1.0, init=False)  # of the return map over the parameter, in units
+    _known: dict[float, SystemLike] = field(default_factory=dict, init=False)
+    _dimension: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        self.box = np.array([self.between])
 
     def system(self, value: float) -> SystemLike:
         """System under study, over the periods of the orbits."""
         if value not in self._known:
-            own = system_of(self._family, value)
+            own = system_of(self.family, value)
             self._dimension = self._dimension or own.dimension
             if own.dimension != self._dimension:
                 allowed = f"{self._dimension} states"
@@ -110,14 +106,14 @@ class FamilyReturns:
         """
         units, steepness = self.units(x.size)[:-1], self.steepness
         mapped = self.mapped(x, value, section) if mapped is None else mapped
-        for last in (*[False] * _RETRIES, True):
+        for last in (False, True):
             step = self._parameter_step(value, steepness)
             try:
                 beside = self.mapped(x, value + step, section)
             except AnalysisError:
                 if last:
                     raise
-                steepness *= _STEEPER
+                steepness *= 100.0
                 continue
             difference: Array = (beside - mapped) / (step / self.scale)
             found = float(np.abs(difference / units).max())

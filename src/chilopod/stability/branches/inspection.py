@@ -13,29 +13,30 @@ shorter steps confirm them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import Array, ComplexArray
+from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, special_point
 from chilopod.stability.branches.within import Within
 from chilopod.stability.crossing_points.description import ContinuumError
-from chilopod.stability.orbit_blocks import block_of, crossings_in
+from chilopod.stability.orbit_blocks import crossings_in
 from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import offers
 from chilopod.stability.problem.returns import ReturnMap
-from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
+from chilopod.stability.spectrum.eigenvalues import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step, predicted
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.interpolation import DEGREE, PLACES, interpolated
-from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, distances, factors
+from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, factors
 
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
 _BUDGET = 400  # corrected orbits within one step
@@ -44,28 +45,20 @@ _CLOSE = 1e-9  # precision of a located point along the curve, relative to the s
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a branch point
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
 _SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
-_COMPLEX = 1e-5  # least imaginary part of a multiplier on the circle that belongs to a pair
 _TELLING = 1e-3  # step, in units, that is short enough to tell a branch from another one near by
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 
-@dataclass(frozen=True)
-class Found:
-    """Events within a step: the special points in order, with an ordinary one between any two, and a sentence for each
-    undecided event."""
+class Found(NamedTuple):
+    """Special points within a step in order, an ordinary one between any two, and a sentence for each undecided one."""
 
     points: tuple[BranchPoint, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
 def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
-    """Find the events within a step; with ``closely`` also between ends that show none.
-
-    Raises
-    ------
-    AnalysisError, ArithmeticError
-        If the step landed on another curve, or the corrector fails in between.
-    """
+    """Find the events within a step; with ``closely`` also between ends that show none. An AnalysisError or an
+    ArithmeticError if the step landed on another curve, or the corrector fails in between."""
     within = Within(curve, step)
     leaving = step.start.leaving
     rising = float(step.start.tangent[-1])
@@ -75,10 +68,10 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     foreseen = leaving or _sign(predicted(step.start, step.size).matrix) == _sign(step.matrix)
     if not foreseen and not flipped and step.size > _TELLING:
         raise AnalysisError("the step may have landed on another curve", field="step")
-    crossed, single = (_crossed_within(within), None) if closely else _crossed_between_ends(within, turned)
+    crossed = _crossed_within(within) if closely else _crossed_between_ends(within, turned)
     if not (crossed or turned or flipped):
         return Found()
-    places, remarks = _places(within, crossed, single, turned)
+    places, remarks = _places(within, crossed, turned)
     branching = any(place.branching for place in places)
     touches = any(each.crossing.event is Event.PLUS and each.crossing.change == 0 for each in places)
     if (flipped and not branching) or (touches and not flipped and step.size > _TELLING):
@@ -132,8 +125,7 @@ def _confirmed(within: Within, place: Place) -> bool:
 
 
 def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
-    """Side of the circle of the critical multiplier and, for a real one, the sign of the product of all distances from
-    it; 0 for either that the errors of multipliers and orbit leave undecided."""
+    """Side of the critical multiplier and, if it is real, sign of the product of all distances; 0 if undecided."""
     curve, step, crossing = within.curve, within.at(at), place.crossing
     (here, value_here, returned, _), section = step.found, within.step.start.section
     units = curve.units(here.size)
@@ -163,16 +155,12 @@ def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
     return tuple(np.where(np.abs(away) > uncertain, np.sign(away), 0.0).tolist())
 
 
-def _places(within: Within, crossed: bool, single: Event | None, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
+def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
     """Places of events within a step, in order: multipliers cross the circle, or the curve turns."""
     step = within.step
     remarks: tuple[str, ...] = ()
     places = []
-    root = None if single is None else _root(within, single)
-    if root is not None and root.value > _CLOSE * step.size:
-        block = block_of(within.blocks, within.jacobian(root.value), root.multiplier)
-        places.append(_placed(within, root, block))
-    for block, found in _searched(within) if crossed and root is None else ():
+    for block, found in _searched(within) if crossed else ():
         if found.status in (SearchStatus.BUDGET, SearchStatus.INCOMPLETE):
             remarks += tuple(f"near {step.found.value:.6g}: {remark}" for remark in found.remarks)
         places += [_placed(within, each, block) for each in found.crossings if each.value > _CLOSE * step.size]
@@ -238,19 +226,14 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
     return [(block, crossings_in(block, matrices, search)) for block in within.blocks]
 
 
-def _tests(nu: ComplexArray) -> Array:
-    """Test functions, which change sign at the events, shape (places, 3), from multipliers, shape (places, n)."""
-    with np.errstate(all="ignore"):
-        return np.stack([factors(nu, event).prod(axis=1).real for event in _EVENTS], axis=1)
-
-
 def _crossed_within(within: Within) -> bool:
     """True unless polynomials through the test functions at the places stay clear of zero."""
     low, size = within.low, within.step.size
     places = low + 0.5 * (1.0 + PLACES) * (size - low)
     places[DEGREE] = size
     nu = np.linalg.eigvals(np.array([within.near_jacobian(each) for each in places.tolist()])).astype(np.complex128)
-    tests = _tests(nu)
+    with np.errstate(all="ignore"):  # test functions, which change sign at the events
+        tests = np.stack([factors(nu, event).prod(axis=1).real for event in _EVENTS], axis=1)
     outside = (np.abs(nu) > 1.0).sum(axis=1)
     if not np.isfinite(tests).all() or (outside != outside[0]).any():
         return True
@@ -258,37 +241,16 @@ def _crossed_within(within: Within) -> bool:
     return bool((np.abs(fine) <= _CLEAR * uncertain).any() or (fine[1:] * fine[:-1] <= 0.0).any())
 
 
-def _crossed_between_ends(within: Within, turned: bool) -> tuple[bool, Event | None]:
-    """True if the multipliers at both ends of a step show a crossing of the circle; and the event, if it is a single
-    one."""
+def _crossed_between_ends(within: Within, turned: bool) -> bool:
+    """True if the multipliers at both ends of a step show a crossing of the circle, beside that of a fold."""
     start, end = (np.linalg.eigvals(within.jacobian(place)) for place in (0.0, within.step.size))
     if within.step.start.leaving:
         start, end = (np.delete(nu, int(np.abs(nu - 1.0).argmin())) for nu in (start, end))
-    before, after = counts_outside(start.astype(np.complex128)), counts_outside(end.astype(np.complex128))
-    changed = {event: abs(a - b) for event, a, b in zip(_EVENTS, before, after, strict=True) if a != b}
-    if turned:
-        changed.pop(Event.PLUS, None)  # the fold itself
-    single = list(changed.values()) == [1] and not within.step.start.leaving
-    return bool(changed), next(iter(changed)) if single else None
-
-
-def _root(within: Within, event: Event) -> Crossing | None:
-    """Place where one multiplier, or one pair, crosses within a step; None if the test function leaves it undecided, as
-    for two real ones that cross together."""
-
-    def multipliers(place: float) -> ComplexArray:
-        return np.linalg.eigvals(within.jacobian(place)).astype(np.complex128)
-
-    def test(place: float) -> float:
-        return float(_tests(multipliers(place)[None])[0, _EVENTS.index(event)])
-
-    if not test(0.0) * test(within.step.size) < 0.0:
-        return None
-    root = float(brentq(test, 0.0, within.step.size, xtol=1e-3 * _CLOSE * within.step.size))
-    nu = multipliers(root)
-    nu = nu[nu.imag > _COMPLEX] if event is Event.PAIR else nu
-    away = distances(nu, event)
-    if not away.min(initial=np.inf) <= (_COMPLEX if event is Event.PAIR else np.inf):
-        return None
-    pair = 2 if event is Event.PAIR else 1
-    return Crossing(root, (root, root), event, pair, 1, complex(nu[away.argmin()]))
+    # Number of multipliers beyond -1, beyond +1, and of pairs outside the circle.
+    counts = []
+    for nu in (start, end):
+        real, outside = np.abs(nu.imag) < 1e-9 * np.maximum(1e-3, np.abs(nu)), np.abs(nu) > 1.0
+        beyond = (real & (nu.real < -1.0), real & (nu.real > 1.0), ~real & outside & (nu.imag > 0.0))
+        counts.append([int(each.sum()) for each in beyond])
+    changed = {event for event, a, b in zip(_EVENTS, *counts, strict=True) if a != b}
+    return bool(changed - {Event.PLUS} if turned else changed)

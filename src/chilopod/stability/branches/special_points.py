@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step
 from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.spectra import TARGETS, Event
+from chilopod.stability.unit_circle.spectra import distances
 
 _CRITICAL = 1e-5  # distance from the circle within which a multiplier is critical at a located point
 _AROUND = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]) / 40.0  # places round a turn, relative to the step
@@ -51,9 +52,8 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     point, regular = curve.arrived(within.at(crossing.value)).end.last, None
     if place.branching:  # its own tangent is any combination of those of both branches
         before, after = within.sides(crossing.value)
-        point = replace(
-            point, tangent=(before.tangent + after.tangent) / np.linalg.norm(before.tangent + after.tangent)
-        )
+        between = before.tangent + after.tangent
+        point = replace(point, tangent=between / np.linalg.norm(between))
     if not place.fold and (block is None or block.trivial):
 
         def bounded_at(_: float, moved: Array, error: Array, image: ReturnMap) -> Orbit:
@@ -74,9 +74,7 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     point = replace(point, value=value)
     kind = Kind.FOLD if place.fold else None
     found = described(curve.system(value), (value, error), orbit, crossing, block, kind=kind)
-    nu = found.multiplier
-    off = abs(abs(nu) - 1.0) if crossing.event is Event.PAIR else abs(nu - TARGETS[crossing.event])
-    if off > _CRITICAL and not crossing.collision:
+    if distances(np.array(found.multiplier), crossing.event) > _CRITICAL and not crossing.collision:
         return None
     bound = curve.multipliers(orbit.image)[1]
     return replace(point, orbit=orbit.state, special=found.kind, error_bound=bound, bifurcation=found)
@@ -92,18 +90,15 @@ def _orbit(within: Within, point: BranchPoint, place: Place) -> Orbit:
         trivial = (block for block in within.blocks if block is not None and block.trivial)
         x = sum((block.basis @ (block.dual @ x) for block in trivial), 0.0 * x)
     if not place.fold:
-        try:
+        with contextlib.suppress(AnalysisError):
             orbit = find_orbit(system, x, section=section)
-        except AnalysisError:
-            orbit = None
-        if orbit is not None and float((np.abs(orbit.state - x) / curve.units(x.size)[:-1]).max()) <= SAME_ORBIT:
-            return orbit
+            if float((np.abs(orbit.state - x) / curve.units(x.size)[:-1]).max()) <= SAME_ORBIT:
+                return orbit
     return Orbit(x, curve.image(x, point.value, section, with_error=True), np.zeros(x.size))
 
 
 def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -> float:
-    """Bound on the error of the parameter: that of the place times the parameter's rate of change; at a fold, where
-    that rate vanishes, from the orbit's equation."""
+    """Bound on the error of the parameter: that of the place times its rate, or at a fold from the orbit's equation."""
     curve, low, high, at = within.curve, within.low, within.step.size, within.at
     beside = _BESIDE * (high - low)
     middle = min(max(place.crossing.value, low + beside), high - beside)
@@ -117,8 +112,7 @@ def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -
 
 
 def _turn(within: Within, at: float) -> tuple[float, float]:
-    """The parameter where a curve turns at a branch point, by polynomials through places round it, as the equations are
-    singular there, and a bound on its error."""
+    """The parameter where a curve turns at a branch point, by polynomials through places round it, and its error."""
     parts = [within.at(at + each * within.step.size) for each in _AROUND]
     values = np.array([part.moved[-1] for part in parts])
     turned = []
@@ -139,7 +133,7 @@ def _fold_error(curve: Curve, here: Step[Anchor, OnCurve], image: ReturnMap) -> 
     sizes = curve.units(x.size)[:-1]
     matrix = here.matrix[:-1]
     left = np.linalg.svd(matrix[:, :-1])[0][:, -1]
-    wrong = image.error if isinstance(image.error, np.ndarray) else np.full((x.size, x.size), image.error)
+    wrong = np.broadcast_to(image.error, image.jacobian.shape)
     off = (np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes
     slope = abs(float(left @ matrix[:, -1]))
     return curve.scale * SAFETY * float(np.abs(left) @ off) / slope if slope > 0.0 else np.inf

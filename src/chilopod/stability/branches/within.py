@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 
 import numpy as np
@@ -30,17 +31,11 @@ class Within(Parts[Anchor, OnCurve, Returned]):
     """Orbits within a step, each corrected once."""
 
     def __init__(self, curve: Curve, step: Step[Anchor, OnCurve]) -> None:
-        super().__init__(curve, step)
+        closer = copy.copy(curve)  # places of events depend on these orbits more than on the ends
+        closer.precision *= _FURTHER
+        super().__init__(closer, step)
         self.curve = curve
         self.low = _LEAVING * step.size if step.start.leaving else 0.0
-
-    def at(self, place: float) -> Step[Anchor, OnCurve]:
-        """Part of the step up to a place, corrected further than the ends, because places of events depend on it."""
-        precision, self.curve.precision = self.curve.precision, _FURTHER * self.curve.precision
-        try:
-            return super().at(place)
-        finally:
-            self.curve.precision = precision
 
     @functools.cached_property
     def blocks(self) -> Blocks:

@@ -53,10 +53,7 @@ class Place(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Frame(ReadOnlyArrays):
-    """Units and borders of the equations; adapted from point to point of a curve.
-
-    With m directions of the orbit (0 if it is known) and k = 1 or 2 critical multipliers:
-    """
+    """Units and borders of the equations, for m directions of the orbit (0 if known) and k critical multipliers."""
 
     size: Array  # size of the states, shape (n,)
     widths: Array  # widths of the parameters' intervals, shape (2,)
@@ -113,8 +110,7 @@ class Evaluated(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Spot(Evaluated):
-    """A point of a curve from which steps start, with the equations there in a frame adapted to it: see
-    :class:`chilopod.stability.tracing.step.Anchor`."""
+    """Point of a curve from which steps start (:class:`chilopod.stability.tracing.step.Anchor`), in its own frame."""
 
     matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
     tangent: Array  # unit tangent, shape (m + k + 1,)
@@ -235,12 +231,10 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _onto(self, spot: Spot, direction: Array) -> Array:
         """A direction with its state projected along the motion onto the section of a spot, if it has one."""
-        image, frame = spot.image, spot.frame
-        if image.velocity is None or image.normal is None or not frame.basis.size:
+        frame, m = spot.frame, spot.frame.basis.shape[1]
+        if frame.section is None:
             return direction
-        m = frame.basis.shape[1]
-        state = frame.size * (frame.basis @ direction[:m])
-        state -= image.velocity * float(image.normal @ state) / float(image.normal @ image.velocity)
+        state = spot.image.across @ (frame.size * (frame.basis @ direction[:m]))
         return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
 
     def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:

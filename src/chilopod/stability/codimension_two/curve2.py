@@ -23,22 +23,10 @@ class CodimensionTwo(Labelled):
     """Kind of a point of codimension two; each member's ``sentence`` describes it in words."""
 
     CUSP = "cusp", "two curves of folds meet and vanish: beyond it one orbit is left of three"
-    DEGENERATE_PITCHFORK = (
-        "degenerate pitchfork",
-        "the pitchfork turns from super- to subcritical: a curve of folds of the orbits that branch off ends here",
-    )
-    DEGENERATE_TRANSCRITICAL = (
-        "degenerate transcritical",
-        "the quadratic term vanishes: the two orbits exchange stability as in a pitchfork",
-    )
-    GENERALISED_PERIOD_DOUBLING = (
-        "generalised period doubling",
-        "the period doubling turns from super- to subcritical: a curve of folds of the doubled orbit ends here",
-    )
-    CHENCINER = (
-        "Chenciner",
-        "the Neimark-Sacker bifurcation turns from super- to subcritical: tori that meet and vanish begin here",
-    )
+    DEGENERATE_PITCHFORK = "degenerate pitchfork", "it turns from super- to subcritical: folds of new orbits end here"
+    DEGENERATE_TRANSCRITICAL = "degenerate transcritical", "the quadratic term vanishes, as in a pitchfork"
+    GENERALISED_PERIOD_DOUBLING = "generalised period doubling", "it turns subcritical: folds of new orbits end here"
+    CHENCINER = "Chenciner", "the Neimark-Sacker bifurcation turns from super- to subcritical: folds of tori begin here"
     RESONANCE_1_1 = "1:1 resonance", "two multipliers of the return map are +1: the curve of Neimark-Sacker ends here"
     RESONANCE_1_2 = "1:2 resonance", "two multipliers of the return map are -1: the curve of Neimark-Sacker ends here"
     RESONANCE_1_3 = "1:3 resonance", "the pair of the return map is at 120 degrees: orbits of three returns are near"

@@ -6,6 +6,7 @@ Meijer, SIAM J. Sci. Comput. 26, 2005.
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import functools
 from collections.abc import Callable
@@ -132,8 +133,8 @@ class Detector:
             # A function that vanishes along the whole curve changes its sign as well.
             if any(abs(value) > _RESOLVED * error for value, error in (before[signal], after[signal])):
                 found.append(self._located(signal, parts))
-        known = [each for each in found if each is not None]
-        return [(spot, point) for _, spot, point in sorted(known, key=lambda each: each[0])]
+        known = sorted((each for each in found if each is not None), key=lambda each: each[0])
+        return [(spot, point) for _, spot, point in known]
 
     def form(self, here: Critical) -> NormalForm:
         """The normal form at a place."""
@@ -221,13 +222,11 @@ class Detector:
 
     def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
         """A point with its next coefficient, whose error includes its change over the error of the place."""
-        terms, forms = [], [self.form(each) for each in (here, beside)]
-        for each, form in zip((here, beside), forms, strict=True):
-            value, error = form.cubic, form.cubic_error
-            if self._kind not in WITHOUT_CRITICALITY:
-                fifth = self.fifth(each, form, *forms)
-                value, error = (np.nan, np.nan) if fifth is None else (fifth.coefficient, fifth.error)
-            terms.append((value, error))
+        forms = [self.form(each) for each in (here, beside)]
+        terms = [(form.cubic, form.cubic_error) for form in forms]
+        if self._kind not in WITHOUT_CRITICALITY:
+            fifths = [self.fifth(each, form, *forms) for each, form in zip((here, beside), forms, strict=True)]
+            terms = [(np.nan, np.nan) if each is None else (each.coefficient, each.error) for each in fifths]
         (value, error), (other, unsure) = terms
         error += share * (abs(other - value) + error + unsure)
         return replace(point, next_coefficient=value, next_coefficient_error=error) if np.isfinite(error) else point
@@ -262,12 +261,10 @@ class Detector:
 
 
 def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.nan, np.nan)) -> Point2:
-    image, place = here.at.image, here.at.place
-    value, error = (None, None) if np.isnan(coefficient[0]) else coefficient
-    frequency = abs(float(np.angle(here.multiplier**image.returns))) / image.period
-    return Point2(
-        place.values, bound, place.state, here.mode, here.multiplier, here.spectrum.values, frequency, value, error
-    )
+    image, place, nu = here.at.image, here.at.place, here.multiplier
+    known = (None, None) if np.isnan(coefficient[0]) else coefficient
+    frequency = abs(float(np.angle(nu**image.returns))) / image.period
+    return Point2(place.values, bound, place.state, here.mode, nu, here.spectrum.values, frequency, *known)
 
 
 def _zero(test: Test, length: float) -> tuple[float, float, float] | None:
@@ -306,16 +303,14 @@ def across(spot: Spot) -> Array:
 
 def _along(test: Test, parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float) -> Array:
     """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
-    try:
+    with contextlib.suppress(AnalysisError):
         slope = abs(test(root + h)[0] - test(root - h)[0]) / (2.0 * h)
         low, middle, high = (parts.at(root + s).found.place.values for s in (-h, 0.0, h))
-    except AnalysisError:
-        return np.full(2, np.inf)
-    if not slope > 0.0:
-        return np.full(2, np.inf)
-    off = _SAFETY * error / slope
-    first, second = np.abs(high - low) / (2.0 * h), np.abs(high - 2.0 * middle + low) / (h * h)
-    return np.asarray(first * off + 0.5 * second * off * off)
+        if slope > 0.0:
+            off = _SAFETY * error / slope
+            first, second = np.abs(high - low) / (2.0 * h), np.abs(high - 2.0 * middle + low) / (h * h)
+            return np.asarray(first * off + 0.5 * second * off * off)
+    return np.full(2, np.inf)
 
 
 def _product(factors: ComplexArray, sizes: Array, errors: Array) -> tuple[float, float]:

@@ -89,8 +89,7 @@ def switch2(
 
 
 class _Unfolding:
-    """Unfolding of a degenerate point on a curve: the critical orbit with its terms of fifth order, and the changes of
-    the cubic coefficient and of the multiplier."""
+    """Unfolding of a degenerate point on a curve: terms of fifth order, and changes of coefficient and multiplier."""
 
     def __init__(self, family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, budget: Budget) -> None:
         system = system_of(family2, *point.values.tolist())

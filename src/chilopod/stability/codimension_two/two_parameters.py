@@ -110,25 +110,18 @@ def follow2(
         detector = Detector(curve, start.kind, coefficients)
         origin = detector.station(first)
 
-        def half(sign: float) -> _Half:
-            curve.first = spot = first.towards(sign)
-            found = _Half(curve, detector, origin, progress)
-            found.ending, found.reason, _ = trace(
-                curve, spot, (min(step, longest), longest), points, found.look, found.keep
-            )
-            return found
-
         if outward is not None:
             beside = Place(first.place.state + outward[:-2], first.place.values + outward[-2:], 0.0)
             ahead = float(first.frame.between(first.place, beside) @ first.tangent)
         else:
             ahead = float(first.tangent[first.frame.parameters][1]) * (-1.0 if rising is False else 1.0)
-        after = half(math.copysign(1.0, ahead))
-        before = _Half(curve, detector, origin, progress)
+        after, before = (_Half(curve, detector, origin, progress) for _ in range(2))
+        steps = min(step, longest), longest
+        after.trace(first.towards(math.copysign(1.0, ahead)), steps, points)
         if after.ending is Ending.CLOSED:
             before.ending = Ending.CLOSED
         elif outward is None and rising is None:
-            before = half(math.copysign(1.0, -ahead))
+            before.trace(first.towards(math.copysign(1.0, -ahead)), steps, points)
     return Curve2(
         start.kind,
         (*reversed(before.points), origin.point, *after.points),
@@ -150,24 +143,21 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
     if start.kind in (Kind.KREIN_COLLISION, Kind.HOPF):
-        said = f"is of the kind {start.kind.label}, which is not followed"
-        raise ParameterError(
-            said, field="start", value=start.value, allowed="a point on a periodic orbit, of another kind"
-        )
+        said, allowed = f"is of the kind {start.kind.label}, which is not followed", "a point of another kind"
+        raise ParameterError(said, field="start", value=start.value, allowed=allowed)
     known = known_orbit(system) is not None and start.kind is not Kind.FOLD
     if start.kind is Kind.NEIMARK_SACKER:
         return 0, known
     target = 1 if start.multiplier.real > 0.0 else -1
-    if target < 0 or start.kind is Kind.FOLD or known:
-        return target, known
-    if not reverses(system, start.mode, sizes(system, start.orbit, return_duration(system))):
+    kept = target < 0 or start.kind is Kind.FOLD or known
+    if not (kept or reverses(system, start.mode, sizes(system, start.orbit, return_duration(system)))):
         said = f"is a {start.kind.label} that the second parameter unfolds"
         allowed = "a point that spatial_symmetry preserves, or systems with a known orbit"
         raise ParameterError(said, field="start", allowed=allowed)
     return target, known
 
 
-_Looked = tuple[Station | None, tuple[SpecialPoint2, ...]]
+_Looked = tuple[Station | None, list[SpecialPoint2]]
 """The station at the end of a step, if any, and the events within the step."""
 
 
@@ -184,12 +174,16 @@ class _Half:
     ending: Ending = Ending.START
     reason: str = ""
 
+    def trace(self, spot: Spot, steps: tuple[float, float], points: int | None) -> None:
+        """Follow the curve from its first point, towards its tangent."""
+        self.curve.first = spot
+        self.ending, self.reason, _ = trace(self.curve, spot, steps, points, self.look, self.keep)
+
     def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
-        station = self.detector.station(step.end)
-        special: tuple[SpecialPoint2, ...] = ()
+        station, special = self.detector.station(step.end), []
         for spot, point in self.detector.events(step, self.last.signals, station.signals):
-            special += (point,)
+            special.append(point)
             if self.curve.target == 0 and point.kind in _MEETINGS:
                 return (self.detector.station(spot), special), Ending.RESONANCE
         return (None if ending is Ending.CLOSED else station, special), ending

@@ -51,7 +51,7 @@ def find_fold(
     """
     between = value - scale, value + scale
     try:
-        curve = Curve(family, 2.0 * scale, between=between, symmetric=True, budget=budget)
+        curve = Curve(family, 2.0 * scale, between=between, symmetric=True, budget=budget or Budget(np.inf))
         with curve.budget:
             start = begin(family, value, orbit, rising, symmetric=True)
             branch = followed(curve, *opened(curve, start, _STEP), LONGEST, _STEPS, False, until=Kind.FOLD)

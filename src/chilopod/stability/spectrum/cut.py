@@ -49,8 +49,7 @@ class _Part:
 
 def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int = 0) -> Cut:
     """A return from a state on the orbit in parts of moderate condition, apart from the ``unresolved`` fastest
-    directions: those that contract too strongly are halved. The return of a map, which has no parts, stays whole.
-    Raises AnalysisError if no parts are of moderate condition."""
+    directions; AnalysisError if there are none. The return of a map, which has no parts, stays whole."""
     # The derivative on a section may be only round-off; an orbit that moves gives the sizes.
     autonomous, duration = is_autonomous(system), image.period / image.returns
     units = sizes(system, x, duration) if autonomous else numerical_balance(image.jacobian)
@@ -64,7 +63,14 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
             error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
             return Cut(units, np.eye(x.size), [whole], [error])
-    return _on_sections(system, x, _of_moderate_condition(system, x, parts, units, unresolved), units)
+    parts = _of_moderate_condition(system, x, parts, units, unresolved)
+    sections = [section_basis(system, state, units) for state in (x, *(part.state for part in parts[:-1]))]
+    turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
+    factors, errors = [], []
+    for part, turn, (before, after) in zip(parts, turns, itertools.pairwise([*sections, sections[0]]), strict=True):
+        factors.append(after.T @ turn @ part.factor @ before)
+        errors.append(np.abs(after.T) @ np.abs(turn) @ part.error @ np.abs(before))
+    return Cut(units, sections[0], factors, errors)
 
 
 def turn_in_units(system: SystemLike, units: Array) -> Array:
@@ -106,14 +112,3 @@ def _of_moderate_condition(
         first = _part(system, done[-1].state if done else x, part.start, middle, units)
         left += [_part(system, first.state, middle, part.end, units), first]
     return done
-
-
-def _on_sections(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> Cut:
-    states = [x, *(part.state for part in parts[:-1])]
-    sections = [section_basis(system, state, units) for state in states]
-    turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
-    factors, errors = [], []
-    for part, turn, (before, after) in zip(parts, turns, itertools.pairwise([*sections, sections[0]]), strict=True):
-        factors.append(after.T @ turn @ part.factor @ before)
-        errors.append(np.abs(after.T) @ np.abs(turn) @ part.error @ np.abs(before))
-    return Cut(units, sections[0], factors, errors)

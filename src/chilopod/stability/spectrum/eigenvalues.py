@@ -88,14 +88,3 @@ def phased(vectors: ComplexArray) -> ComplexArray:
     """Columns, or one vector, turned so that the largest entry is real and positive."""
     peaks = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=0, keepdims=True), axis=0)
     return np.asarray(vectors * (np.abs(peaks) / peaks))
-
-
-def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
-    """Number of multipliers beyond -1, beyond +1, and of complex pairs outside the unit circle."""
-    real = np.abs(values.imag) < 1e-9 * np.maximum(1e-3, np.abs(values))
-    outside = np.abs(values) > 1.0
-    return (
-        int((real & (values.real < -1.0)).sum()),
-        int((real & (values.real > 1.0)).sum()),
-        int((~real & outside & (values.imag > 0)).sum()),
-    )

@@ -25,9 +25,8 @@ _EPSILON = float(np.finfo(float).eps)
 
 
 def stable_within(values: ComplexArray, bound: float, bounds: Array | float | None = None) -> bool | None:
-    """Stability by multipliers, shape (n,), with a bound on the error of all that are not small, or one each: True
-    if all lie inside the unit circle by more than their bounds, False if one lies outside by more, None if the errors
-    leave it undecided."""
+    """Stability by multipliers with a bound on the error of all that are not small, or one each: True if all lie inside
+    the unit circle by more than their bounds, False if one lies outside by more, else None."""
     modulus = np.abs(values)
     if (modulus < 1.0 - bound).all():
         return True

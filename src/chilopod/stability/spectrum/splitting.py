@@ -12,6 +12,8 @@ formula), less those of the other directions.
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -32,9 +34,7 @@ _SHORTENINGS = 100
 _LEFT, _APART = 1e-12, 1e-4  # stretches over a short time above round-off, and that separate directions
 
 
-def split_product(
-    factors: Sequence[Array], errors: Sequence[Array] | None = None
-) -> tuple[ComplexArray, ComplexArray, Array]:
+def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tuple[ComplexArray, ComplexArray, Array]:
     """Logarithms ln|eigenvalue| + i angle of the eigenvalues of ``factors[-1] @ ... @ factors[0]`` by falling modulus,
     shape (n,), its unit eigenvectors as columns, and bounds on the change of the logarithms when the entries of the
     factors change by their errors, to first order between groups.
@@ -42,67 +42,52 @@ def split_product(
     Each factor must be invertible and of moderate condition; AnalysisError if one has no finite inverse.
     """
     n = factors[0].shape[0]
-    errors = [np.zeros((n, n)) for _ in factors] if errors is None else errors
-    if n == 1:  # nothing to be split
-        values = np.array([factor[0, 0] for factor in factors])
-        angle = np.pi if (values < 0.0).sum() % 2 else 0.0
-        with np.errstate(divide="ignore"):
-            bound = (np.array([error[0, 0] for error in errors]) / np.abs(values)).sum()
-        return np.array([np.log(np.abs(values)).sum() + 1j * angle]), np.ones((1, 1), dtype=np.complex128), bound[None]
     slow, stretches, slow_motion = _iterate(factors, n)
-    inverses = _inverses(factors[::-1]) if stretches.all() else None
-    if inverses is None:
+    inverses = np.full(1, np.inf)
+    if stretches.all():
+        with contextlib.suppress(np.linalg.LinAlgError):
+            inverses = np.linalg.inv(np.array(factors[::-1]))
+    if not np.isfinite(inverses).all():
         raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
     growth = np.log(stretches).sum(axis=0) / _AVERAGED
     fast, _, fast_motion = _iterate(inverses, n)
     # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
     fast = [fast[0], *reversed(fast[1:])]
     # Eigenvalues of one modulus in slanted directions can show a false gap for a while; their spaces do not converge.
-    borders = [
-        0,
-        *(
-            b
-            for b in range(1, n)
-            if growth[b - 1] - growth[b] > _GAP and max(slow_motion[b - 1], fast_motion[n - b - 1]) < _AT_REST
-        ),
-        n,
-    ]
+    settled = np.maximum(slow_motion, fast_motion[::-1]) < _AT_REST
+    borders = [0, *(1 + np.flatnonzero((growth[:-1] - growth[1:] > _GAP) & settled)).tolist(), n]
     groups = [
-        [intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
-        for a, b in zip(borders, borders[1:], strict=False)
+        [_intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
+        for a, b in itertools.pairwise(borders)
     ]
     logarithms, vectors = [], []
     for bases in groups:
-        # From one known basis to the next: a fast direction carried along would be lost in the round-off of the
-        # slow ones.
-        following = [*bases[1:], bases[0]]
-        values, columns = _eigen([after.T @ f @ base for f, base, after in zip(factors, bases, following, strict=True)])
+        # A fast direction carried along would be lost in the round-off of the slow ones.
+        values, columns = _eigen(_restricted(factors, bases))
         logarithms.append(values)
         vectors.append(bases[0] @ columns)
     log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
     order = np.argsort(-log_all.real, kind="stable")
-    return log_all[order], vec_all[:, order], _moved(factors, errors, groups, logarithms)[order]
+    return (
+        log_all[order],
+        vec_all[:, order],
+        _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, logarithms)[order],
+    )
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
     """The same for the ``count`` directions that grow most, separated by a gap from the others."""
     bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]
-    following = [*bases[1:], bases[0]]
-    restricted = [after.T @ f @ before for f, before, after in zip(factors, bases, following, strict=True)]
-    logarithms, vectors, _ = split_product(restricted)
+    logarithms, vectors, _ = split_product(_restricted(factors, bases))
     return logarithms, bases[0] @ vectors
 
 
-def _inverses(factors: Sequence[Array]) -> list[Array] | None:
-    """Inverses of square matrices; None if one is not finite."""
-    try:
-        inverses: list[Array] = [np.linalg.inv(factor).astype(np.float64, copy=False) for factor in factors]
-    except np.linalg.LinAlgError:
-        return None
-    return inverses if all(np.isfinite(inverse).all() for inverse in inverses) else None
+def _restricted(factors: Sequence[Array], bases: Sequence[Array]) -> list[Array]:
+    """The factors from each basis to the next."""
+    return [after.T @ f @ base for f, base, after in zip(factors, bases, [*bases[1:], bases[0]], strict=True)]
 
 
-def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Array]:
+def _iterate(factors: Sequence[Array] | Array, n: int) -> tuple[list[Array], Array, Array]:
     """Bases whose first j columns span the j directions that grow most, one before every factor; the stretch of each
     column by every factor of the last passes, shape (k, n), zero where a factor maps it to zero; and the change of the
     space of the first j in a pass."""
@@ -120,7 +105,7 @@ def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Arra
     return bases, np.array(stretches[-_AVERAGED * len(factors) :]), motion
 
 
-def intersection(one: Array, other: Array, dimension: int) -> Array:
+def _intersection(one: Array, other: Array, dimension: int) -> Array:
     """Orthonormal basis of the intersection of two column spaces, of the given dimension."""
     left = np.linalg.svd(one.T @ other)[0]
     return one @ left[:, :dimension]
@@ -138,22 +123,19 @@ def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
     return np.log(np.abs(values)) + scale + 1j * np.angle(values), columns
 
 
-def _moved(
-    factors: Sequence[Array], errors: Sequence[Array], groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]
-) -> Array:
+def _moved(factors: Array, errors: Array, groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]) -> Array:
     """Largest change of the logarithms when factors change by their errors with random signs, with a safety factor."""
-    nodes = [np.hstack(bases) for bases in zip(*groups, strict=True)]
+    nodes = np.array([np.hstack(bases) for bases in zip(*groups, strict=True)])
     sizes = np.cumsum([0, *(len(values) for values in known)])
     moved = np.zeros(sizes[-1])
     try:
-        duals = [np.linalg.inv(node) for node in nodes]
+        ends = np.roll(np.linalg.inv(nodes), -1, axis=0)
     except np.linalg.LinAlgError:
         return np.full(moved.size, np.inf)
-    ends, random = [*duals[1:], duals[0]], np.random.default_rng(0)
+    random = np.random.default_rng(0)
     for _ in range(DRAWS):
-        signs = [random.choice([-1.0, 1.0], factor.shape) for factor in factors]
-        others = [e @ (f + w * s) @ n for f, w, s, n, e in zip(factors, errors, signs, nodes, ends, strict=True)]
-        for values, a, b in zip(known, sizes, sizes[1:], strict=False):
+        others = ends @ (factors + errors * random.choice([-1.0, 1.0], factors.shape)) @ nodes
+        for values, (a, b) in zip(known, itertools.pairwise(sizes), strict=True):
             apart = values[:, None] - _eigen([other[a:b, a:b] for other in others])[0]
             apart = np.abs(apart.real + 1j * np.angle(np.exp(1j * apart.imag)))
             moved[a:b] = np.maximum(moved[a:b], apart.min(axis=1))
@@ -161,8 +143,7 @@ def _moved(
 
 
 def split_stiff(system: Capabilities, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
-    """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and the errors of the
-    logarithms; AnalysisError if more than one direction decays too fast to be resolved."""
+    """As :func:`split_product` for a return; AnalysisError if more than one direction decays too fast."""
     cut = moderate_cut(system, x, image, unresolved=1)
     slow = cut.section.shape[1] - 1
     values, modes, errors = np.empty(0, np.complex128), np.empty((slow + 1, 0), np.complex128), np.zeros(slow)
@@ -179,8 +160,7 @@ def split_stiff(system: Capabilities, x: Array, image: ReturnMap) -> tuple[Compl
 
 
 def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
-    """The direction on the section at time 0 that the flow contracts most, over a time so short that it is still above
-    round-off, shape (directions, 1)."""
+    """The direction on the section that the flow contracts most, over a time that leaves it above round-off."""
     slow = cut.section.shape[1] - 1
     if slow == 0:
         return np.eye(1)

@@ -28,31 +28,12 @@ _MOST_ENTRIES = 2**23  # numbers in the projectors to the fixed-point spaces of 
 class SymmetricKind(Labelled):
     """Kind of a bifurcation in a block; each member's ``sentence`` describes it in words."""
 
-    SYMMETRY_KEPT = (
-        "symmetry kept",
-        "no spatial symmetry is broken: the kind of the point says what happens",
-    )
-    PITCHFORK = (
-        "pitchfork",
-        "the orbit loses half of its symmetries and a pair of orbits that they exchange branches off",
-    )
-    EQUIVARIANT_PITCHFORK = (
-        "equivariant pitchfork",
-        "several multipliers cross at once; branches of orbits with less symmetry grow, each on one side of the point",
-    )
-    EQUIVARIANT_TRANSCRITICAL = (
-        "equivariant transcritical",
-        "several multipliers cross at once; branches of orbits with less symmetry, those whose halves differ on both "
-        "sides of the point, leave unstable as a rule",
-    )
-    SYMMETRIC_PERIOD_DOUBLING = (
-        "symmetric period doubling",
-        "orbits of twice the period and with less symmetry at an instant branch off",
-    )
-    SYMMETRIC_NEIMARK_SACKER = (
-        "symmetric Neimark-Sacker",
-        "oscillations at a second frequency branch off that are waves: rotating, standing, or both kinds",
-    )
+    SYMMETRY_KEPT = "symmetry kept", "no spatial symmetry is broken: the kind of the point says what happens"
+    PITCHFORK = "pitchfork", "half of the symmetries are lost, and a pair of orbits that they exchange branches off"
+    EQUIVARIANT_PITCHFORK = "equivariant pitchfork", "branches with less symmetry grow, each on one side of the point"
+    EQUIVARIANT_TRANSCRITICAL = "equivariant transcritical", "branches with less symmetry leave, unstable as a rule"
+    SYMMETRIC_PERIOD_DOUBLING = "symmetric period doubling", "orbits of twice the period and less symmetry branch off"
+    SYMMETRIC_NEIMARK_SACKER = "symmetric Neimark-Sacker", "oscillations at a second frequency branch off as waves"
 
 
 @dataclass(frozen=True)
@@ -145,11 +126,10 @@ def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
     def take(projector: Array) -> None:
         """Note a space, unless it or a conjugate one is known."""
         size = round(float(np.trace(projector)))
-        if size == 0 or seen.number(projector @ seen.probes) is not None:
+        if size == 0 or seen.known(projector @ seen.probes):
             return
         for image in rho @ projector @ np.swapaxes(rho, 1, 2) @ seen.probes:
-            if seen.number(image) is None:
-                seen.add(image)
+            seen.new(image)
         space = np.linalg.eigh(projector)[1][:, -size:]
         if size == 1:
             lines.append(space[:, 0])
@@ -174,12 +154,8 @@ def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
 
 def _once(matrices: Array) -> Array:
     """Matrices of some, shape (k, d, d), each once."""
-    images, first = Images(matrices.shape[1]), []
-    for number, image in enumerate(matrices @ images.probes):
-        if images.number(image) is None:
-            images.add(image)
-            first.append(number)
-    return matrices[first]
+    images = Images(matrices.shape[1])
+    return matrices[[images.new(image) for image in matrices @ images.probes]]
 
 
 def _branch(line: Array, block: Block, critical: Event) -> AxialBranch:

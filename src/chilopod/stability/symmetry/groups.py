@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
 
@@ -32,6 +31,7 @@ _MIXED = 1e-11  # least entry, relative to elements of order one, that mixes two
 _CHANCE = 1e-12  # entry that is round-off, relative to the coupling of two coordinates through a third
 _LEVELLED = 0.125  # exponent that makes a weight of 1e-17 one of 0.7 %
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
+_INFINITE = "generate an infinite group, or too large a one"
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,16 @@ class Group(ReadOnlyArrays):
 
 
 def finite_group(generators: ArrayLike) -> Group:
-    """The group of all products of some real matrices, shape (n, n) each, such as the cyclic shift and the reversal of
-    a ring, in any units; a ParameterError if the products are too many, or the matrices are invalid."""
-    given = _checked(generators)
-    n = given.shape[1]
+    """The group of all products of real matrices, shape (n, n) each, in any units; a ParameterError if there are too
+    many, or the matrices are invalid."""
+    try:
+        given = np.atleast_1d(np.array(generators, dtype=np.float64))
+    except (TypeError, ValueError):  # also for matrices of several shapes
+        given = np.empty(0)
+    n = given.shape[-1]
+    if given.shape[1:] != (n, n) or not (n and 1 <= len(given) <= _MOST_GENERATORS and np.isfinite(given).all()):
+        allowed = f"1 to {_MOST_GENERATORS} real and finite ones of shape (n, n)"
+        raise ParameterError("must be square matrices", field="generators", value=generators, allowed=allowed)
     most = max(1, min(_LARGEST_ORDER, _MOST_ENTRIES // n**2))
     returns = [_powers(matrix, most) for matrix in given]
     scales = _coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
@@ -79,11 +85,7 @@ def finite_group(generators: ArrayLike) -> Group:
             raise _infinite(matrix, most)
     found = _closure(given, scales, most)
     if found is None:
-        raise ParameterError(
-            "generate an infinite group, or too large a one",
-            field="generators",
-            allowed=f"{most} elements or fewer in dimension {n}",
-        )
+        raise ParameterError(_INFINITE, field="generators", allowed=f"{most} elements or fewer in dimension {n}")
     return _with_metric(*found, scales)
 
 
@@ -109,11 +111,8 @@ def centraliser(group: Group, gamma: Array) -> Group:
         raise ParameterError("is not invertible", field="symmetry")
     for image in matrix @ _scaled(group.generators, group.scales):  # which is P gamma for some element P
         if not np.abs(right - image).max(axis=(1, 2)).min() <= _SAME * size:
-            raise ParameterError(
-                "does not normalise the group of the spatial symmetries",
-                field="symmetry",
-                allowed="S P S^-1 in the group for every P of it",
-            )
+            said, allowed = "does not normalise the spatial symmetries", "S P S^-1 in their group for every P of it"
+            raise ParameterError(said, field="symmetry", allowed=allowed)
     return _subgroup(group, np.all(np.abs(left - right) <= _SAME * size, axis=(1, 2)), "symmetry")
 
 
@@ -128,22 +127,6 @@ def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
     p = group.generators
     explained = np.abs(p) @ bound + bound @ np.abs(p)
     return float((np.abs(p @ matrix - matrix @ p) / explained).max())
-
-
-def _checked(generators: ArrayLike) -> Array:
-    try:
-        raw = np.asarray(generators)
-    except ValueError:  # matrices of several shapes
-        raise ParameterError("must be matrices of one shape", field="generators", allowed="(n, n) each") from None
-    if raw.dtype.kind not in "biuf":
-        raise ParameterError("must be real numbers", field="generators", value=generators)
-    if raw.ndim != 3 or raw.shape[0] < 1 or raw.shape[1] != raw.shape[2] or raw.shape[1] < 1:
-        raise ParameterError(
-            "must be square matrices", field="generators", value=raw.shape, allowed="one or more of shape (n, n)"
-        )
-    if len(raw) > _MOST_GENERATORS:
-        raise ParameterError("are too many", field="generators", value=len(raw), allowed=f"{_MOST_GENERATORS} or fewer")
-    return finite_array(raw, raw.shape, "generators")
 
 
 def _powers(matrix: Array, most: int) -> tuple[Array, Array]:
@@ -184,11 +167,8 @@ def _coordinate_scales(envelope: Array) -> Array:
 def _infinite(matrix: Array, most: int) -> ParameterError:
     if np.linalg.slogdet(matrix)[1] < -1.0:  # ±1 in a finite group
         return ParameterError("is not invertible, or shrinks volumes", field="generators", allowed="determinant ±1")
-    return ParameterError(
-        "generate an infinite group, or too large a one",
-        field="generators",
-        allowed=f"matrices of which a power up to {most} is the identity, to 9 digits",
-    )
+    allowed = f"matrices of which a power up to {most} is the identity, to 9 digits"
+    return ParameterError(_INFINITE, field="generators", allowed=allowed)
 
 
 def _scaled(matrices: Array, scales: Array) -> Array:
@@ -214,66 +194,57 @@ def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
         root = np.linalg.cholesky(metric).T
         inverse = np.linalg.inv(root)
     except np.linalg.LinAlgError:
-        raise AnalysisError(
-            "have no invariant metric in double precision",
-            field="generators",
-            allowed="coordinates less oblique to each other",
-        ) from None
+        said, allowed = "have no invariant metric in double precision", "coordinates less oblique to each other"
+        raise AnalysisError(said, field="generators", allowed=allowed) from None
     group = Group(generators, elements, root / scales, scales[:, None] * inverse, scales, component)
     q = group.orthogonal
     if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < _SAME:
-        raise AnalysisError(
-            "must be exact symmetries, less oblique", field="generators", allowed="matrices exact to 1e-9 or better"
-        )
+        said, allowed = "must be exact symmetries, less oblique", "matrices exact to 1e-9 or better"
+        raise AnalysisError(said, field="generators", allowed=allowed)
     return group
 
 
 class Images:
-    """Images of the probes, each with the number of its element."""
+    """Set of images of the probes, shape (n, probes) each, that differ by more than rounding."""
 
     def __init__(self, dimension: int) -> None:
         random = np.random.default_rng(0)
         self.probes: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES))
         self._weights: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES)) / dimension
-        self.all: list[Array] = []
-        self._cells: dict[int, list[int]] = {}
+        self._cells: dict[int, list[Array]] = {}
 
-    def add(self, image: Array) -> None:
-        """Give an image the next number."""
-        self._cells.setdefault(self._cell(image), []).append(len(self.all))
-        self.all.append(image)
-
-    def number(self, image: Array) -> int | None:
-        """Number of an image, shape (n, probes); None if it is unknown."""
+    def known(self, image: Array) -> bool:
+        """True if an image is in the set."""
         cell = self._cell(image)
-        for near in (cell, cell - 1, cell + 1):
-            for number in self._cells.get(near, ()):
-                if np.abs(self.all[number] - image).max() < _SAME:
-                    return number
-        return None
+        near = (each for beside in (cell, cell - 1, cell + 1) for each in self._cells.get(beside, ()))
+        return any(np.abs(each - image).max() < _SAME for each in near)
+
+    def new(self, image: Array) -> bool:
+        """True if an image was not in the set, to which it is added."""
+        if self.known(image):
+            return False
+        self._cells.setdefault(self._cell(image), []).append(image)
+        return True
 
     def _cell(self, image: Array) -> int:
         return math.floor(float(np.vdot(self._weights, image)) / _CELL)
 
 
 def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Array] | None:
-    """Generators that suffice for a group, one at least, and all products, the identity first, shape (order, n, n);
-    None for more than ``largest``."""
+    """Generators that suffice for a group, one at least, and its elements, the identity first; None if too many."""
     n, needed = len(scales), generators[:0]
     images, elements = Images(n), [np.eye(n)]
-    images.add(images.probes)
+    images.new(images.probes)
     for generator in generators:
-        if images.number(_scaled(generator, scales) @ images.probes) is not None:
+        if images.known(_scaled(generator, scales) @ images.probes):
             continue
         needed = np.concatenate([needed, generator[None]])  # and the order at least doubles
         images, elements = Images(n), [np.eye(n)]
-        images.add(images.probes)
+        images.new(images.probes)
         for element in elements:  # which grow meanwhile
             for product in needed @ element:
-                image = _scaled(product, scales) @ images.probes
-                if images.number(image) is None:
+                if images.new(_scaled(product, scales) @ images.probes):
                     if len(elements) == largest:
                         return None
-                    images.add(image)
                     elements.append(product)
     return needed if len(needed) else generators[:1], np.array(elements)

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
@@ -36,9 +36,8 @@ class Block(ReadOnlyArrays):
     basis: Array
     dual: Array  # left inverse of the basis, zero on the other blocks, shape (m d, n)
     representation: Array  # orthogonal matrices rho(P) of the elements, shape (order, d, d)
-    kernel: NDArray[
-        np.bool_
-    ]  # truth values, shape (order,), of elements that act as the identity: new orbits keep them
+    # truth values, shape (order,), of elements that act as the identity: new orbits keep them
+    kernel: NDArray[np.bool_]
 
     @property
     def dimension(self) -> int:
@@ -60,46 +59,40 @@ class Block(ReadOnlyArrays):
         """Multiplicity in the full matrix of an eigenvalue of the reduced form."""
         return self.dimension if self.real else 1
 
-    def reduced(self, matrices: ArrayLike) -> Array:
+    def reduced(self, matrices: Array) -> Array:
         """Reduced form of matrices M, shape (..., n, n), that commute with the group (else of the mean of P M P^-1).
 
         Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d. Complex type: dual @ M @ basis.
         """
-        return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
+        return self._diagonal(self.dual @ matrices @ self.basis)
 
-    def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
+    def reduced_error(self, matrices: Array, error: Array | float = 0.0) -> Array:
         """Bound on the error of the reduced matrices, from that of the entries (one number or all) and round-off."""
-        round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
-        entries = np.asarray(error, dtype=np.float64) + round_off
+        entries = error + 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(matrices)
         return self._diagonal(np.abs(self.dual) @ entries @ np.abs(self.basis))
 
     def _diagonal(self, full: Array) -> Array:
         """Means over the diagonals of the parts between two copies for the real type; else the argument."""
         if not self.real:
-            return np.asarray(full)
+            return full
         m, d = self.multiplicity, self.dimension
         return np.asarray(np.einsum("...iaja->...ij", full.reshape(*full.shape[:-2], m, d, m, d)) / d)
 
-    def mode(self, eigenvector: ArrayLike, direction: ArrayLike) -> ComplexArray:
-        """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix of real
-        type, shape (m,), and any vector, shape (d,)."""
-        a, w = np.asarray(eigenvector, dtype=np.complex128), np.asarray(direction, dtype=np.complex128)
-        return np.asarray(self.basis @ np.kron(a, w))
+    def mode(self, eigenvector: ComplexArray, direction: Array) -> ComplexArray:
+        """The eigenvector of the full matrix to one of its reduced matrix of real type, and any vector, shape (d,)."""
+        return np.asarray(self.basis @ np.kron(eigenvector, direction), dtype=np.complex128)
 
 
 def isotypic(group: Group) -> tuple[Block, ...]:
-    """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel; AnalysisError
-    if its matrices are not exact enough, or a representation is of quaternionic type."""
+    """The blocks of a finite group, the trivial one first; AnalysisError if its matrices are not exact enough, or a
+    representation is of quaternionic type."""
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
         blocks = _blocks(group, random)
         if blocks is not None:
             return tuple(sorted(blocks, key=_rank))
-    raise AnalysisError(
-        "no symmetry-adapted basis found: the matrices are not exact symmetries",
-        field="group",
-        allowed="matrices exact to 1e-9 or better",
-    )
+    said = "no symmetry-adapted basis found: the matrices are not exact symmetries"
+    raise AnalysisError(said, field="group", allowed="matrices exact to 1e-9 or better")
 
 
 def _blocks(group: Group, random: np.random.Generator) -> list[Block] | None:
@@ -169,11 +162,8 @@ def _is_real(rho: Array, character: Array) -> bool | None:
     if np.abs(means - whole).max() > _EXACT:
         return None
     if whole == (4, -2):
-        raise AnalysisError(
-            "the group has a representation of quaternionic type",
-            field="group",
-            allowed="representations of real or complex type",
-        )
+        said, allowed = "the group has a representation of quaternionic type", "those of real or complex type"
+        raise AnalysisError(said, field="group", allowed=allowed)
     return {(1, 1): True, (2, 0): False}.get(whole)
 
 

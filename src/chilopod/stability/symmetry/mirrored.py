@@ -16,16 +16,11 @@ _LOOSE = 1e-6  # largest residual of a symmetry of a state, relative to the size
 def symmetric_states(system: SystemLike, state: Array, size: Array, near: float = _LOOSE) -> Array:
     """Orthonormal basis, in units of the states' sizes, shape (n,), of the space of states with the spatial symmetries
     of a state: those that change it by at most ``near``."""
-    n = size.size
-    conditions = [np.zeros((0, n))]
-    generators = spatial_symmetries(system)
-    for matrix in _elements(np.stack(generators).tobytes(), n) if generators else ():
-        if (np.abs(matrix @ state - state) <= near * size).all():
-            conditions.append(matrix * size / size[:, None] - np.eye(n))
-    stacked = np.vstack(conditions)
-    _, values, right = np.linalg.svd(stacked) if len(stacked) else (None, np.zeros(0), np.eye(n))
-    rank = int((values > _LOOSE).sum())
-    return np.asarray(right[rank:].T)
+    n, generators = size.size, spatial_symmetries(system)
+    elements = _elements(np.stack(generators).tobytes(), n) if generators else np.empty((0, n, n))
+    kept = (np.abs(elements @ state - state) <= near * size).all(axis=1)
+    _, values, right = np.linalg.svd((elements[kept] * size / size[:, None] - np.eye(n)).reshape(-1, n))
+    return np.asarray(right[int((values > _LOOSE).sum()) :].T)
 
 
 @functools.lru_cache(maxsize=8)
