@@ -23,6 +23,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
 
 SAFETY = 1.5  # factor on the error of a multiplier, for that of its rate of change
 
+_NEAR = 1e3  # largest distance of known sides of a crossing, relative to the usual one
 _TOUCH_STEP = 1e-3  # distance from a touch at which the multiplier is computed, relative to the course
 _ASIDE = np.arange(1.0, 9.0) / 4.0  # nodes of the interpolation of a singular orbit on one side, in units of the reach
 _AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both sides
@@ -69,9 +70,12 @@ class Course:
     width: float  # width of the whole search, which may exceed that from low to high
     beside: float  # distance from a place at which rates of change are computed
 
-    def jacobians(self, place: float) -> tuple[Array, Array, float]:
-        """Derivatives of the return map on both sides of a place, and the distance of the sides."""
-        a, b = max(place - self.beside, self.low), min(place + self.beside, self.high)
+    def jacobians(self, crossing: Crossing) -> tuple[Array, Array, float]:
+        """Derivatives of the return map on both sides of a crossing, where known if near, and the distance of the
+        sides."""
+        place, (a, b) = crossing.value, crossing.around
+        if not (a < place < b and self.beside <= b - a <= _NEAR * self.beside):
+            a, b = max(place - self.beside, self.low), min(place + self.beside, self.high)
         before, after = self.at(np.array([a, b]))
         return before.image.jacobian, after.image.jacobian, b - a
 
@@ -106,7 +110,7 @@ def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
 
 def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
     """d nu = left^H dH' right, which holds also near other multipliers; the slowest of several."""
-    before, after, apart = course.jacobians(crossing.value)
+    before, after, apart = course.jacobians(crossing)
     between = spectrum(replace(image, jacobian=0.5 * (before + after), error=0.0))
     critical = critical_multipliers(between, crossing)
     left, right = between.left[:, critical], between.right[:, critical]
@@ -137,7 +141,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
     here = _collision(matrix, crossing)
     moved = max(abs(_collision(other, crossing) - here) for other in errors.disturbed(matrix, error))
-    before, after, apart = course.jacobians(crossing.value)
+    before, after, apart = course.jacobians(crossing)
     slope = abs(_collision(after, crossing) - _collision(before, crossing)) / apart
     # All of eight draws are less than a third of the root mean square in one case of 50 000.
     return SAFETY * (3.0 * moved + abs(here)) / slope if slope > 0.0 else np.inf
