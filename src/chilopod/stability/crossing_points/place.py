@@ -4,6 +4,7 @@ multiplier +1 of the return map H, where H - 1 is singular, place and orbit are 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -262,5 +263,6 @@ def _root_near_zero(polynomial: Polynomial, nodes: Array) -> float | None:
 
 def through(nodes: Array, values: Array, place: float) -> Array:
     """The polynomial through the rows of ``values`` at some nodes, at another place."""
-    weights = [np.prod([(place - w) / (v - w) for w in nodes if w != v]) for v in nodes]
+    at = nodes.tolist()
+    weights = [math.prod((place - w) / (v - w) for w in at if w != v) for v in at]
     return np.asarray(np.array(weights) @ values)
