@@ -45,16 +45,20 @@ class Sample(ReadOnlyArrays):
     image: ReturnMap
 
     @functools.cached_property
-    def off_plus_one(self) -> float:
-        """Distance of the return map's multipliers from +1, without the one along the motion."""
-        return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
+    def _nearest(self) -> complex:
+        """Least difference of the return map's multipliers from +1, without the one along the motion."""
+        off = return_multipliers(self.image) - 1.0
+        return complex(off[np.abs(off).argmin()]) if off.size else complex(np.inf)
 
-    @functools.cached_property
+    @property
+    def off_plus_one(self) -> float:
+        """Distance of the nearest multiplier from +1."""
+        return abs(self._nearest)
+
+    @property
     def beside_plus_one(self) -> float:
         """Signed distance of the nearest real multiplier from +1; NaN if a pair is nearer."""
-        off = return_multipliers(self.image) - 1.0
-        nearest = complex(off[np.abs(off).argmin()]) if off.size else np.nan
-        return nearest.real if nearest.imag == 0.0 else np.nan
+        return self._nearest.real if self._nearest.imag == 0.0 and np.isfinite(self._nearest) else np.nan
 
     def passes(self, other: Sample) -> bool:
         """True if the multiplier nearest +1 is on the other side of it in another sample."""

@@ -10,10 +10,8 @@ import numpy as np
 
 from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.center_manifold import (
-    UNDEFINED,
     CriticalOrbit,
     Curve,
-    Departure,
     Manifold,
     Powers,
     ReturnedStates,
@@ -67,12 +65,12 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
     bends = ups = downs = turned = 0
     growing = 0.0
     for _ in range(_TRIALS):
-        found = manifold.sample(radius, _TOO_FAR)
-        share, order, seen = (*found, True) if isinstance(found, Departure) else _departure(found)
-        if isinstance(found, Departure):
-            high, factor = radius, _FIRST_DOWN if found == UNDEFINED else _toward(share, order)
-        elif found.blur > _BLURRED * radius:
+        found = manifold.sample(radius)
+        share, order, seen = (np.inf, 2, True) if found is None else _departure(found, at)
+        if found is not None and found.blur > _BLURRED * radius:
             low, factor = radius, _UP
+        elif found is None or share > _TOO_FAR:
+            high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
         elif (
             seen and status is NormalFormStatus.LINEAR and downs < _DOWNS and found.falling and found.shrink < _RESOLVED
         ):
@@ -132,7 +130,7 @@ def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: 
     return factor
 
 
-def _departure(found: Sampled) -> tuple[float, int, bool]:
+def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
     """Departure from linearity relative to the amplitude, order of its main term, True if it exceeds the noise."""
     share, order = 0.0, 2
     for one in found.harmonics:
@@ -140,7 +138,12 @@ def _departure(found: Sampled) -> tuple[float, int, bool]:
         largest = int(sizes.argmax())
         if sizes[largest] > share:
             share, order = float(sizes[largest]), one.parity + 2 * (largest + 1)
-    return share / found.radius, order, share > 4.0 * float(found.noise[-1])
+    seen = share > 4.0 * float(found.noise[-1])
+    # A saturating map is linear again far out, with another slope.
+    slope = abs(found.harmonics[1].coefficients[0, -1] - at.multiplier * found.radius)
+    if slope > _TOO_FAR * found.radius:
+        share, seen = max(share, float(slope)), True
+    return share / found.radius, order, seen
 
 
 def _highest(found: Sampled) -> int:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,16 +85,6 @@ class Sampled:
         return complex(value[-1]), float(error[-1])
 
 
-class Departure(NamedTuple):
-    """Largest term beside the linear one in the projection of H(W(z)) at the largest radius."""
-
-    share: float  # its size relative to the radius; infinite where the map is undefined
-    order: int  # its order, 2 or 3
-
-
-UNDEFINED = Departure(np.inf, 2)
-
-
 def turns(at: CriticalOrbit) -> ComplexArray:
     """Sampled directions of z: +-1 for a real one, else a circle."""
     count = 2 if at.real else _ANGLES
@@ -165,30 +154,21 @@ class Manifold:
         self.curve: dict[Powers, ComplexArray] = {(1, 0): at.right.astype(np.complex128)}
         self.curve |= dict.fromkeys(self._resonant, nothing)
 
-    def sample(self, radius: float, farthest: float = np.inf) -> Sampled | Departure:
-        """The map on the manifold up to a radius; the departure alone if it exceeds ``farthest``."""
+    def sample(self, radius: float) -> Sampled | None:
+        """The map on the manifold up to a radius; None where it is undefined."""
         at = self._at
         directions = turns(at)
         displaced = displacements(at, self.curve, radius * radii()[:, None] * directions)
         highest = np.power(radius, _HIGHEST)
         if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
-            return UNDEFINED
-        outer = images(self._mapped, at, displaced[:1])
-        if outer is None:
-            return UNDEFINED
-        terms = np.fft.fft(outer[0] @ at.left.conj()) / directions.size
-        terms[1] -= at.multiplier * radius * radii()[0]
-        largest = int(np.abs(terms).argmax())
-        if not abs(terms[largest]) <= farthest * radius:
-            return Departure(float(abs(terms[largest])) / radius, 2 + largest % 2)
-        inner = images(self._mapped, at, displaced[1:])
-        if inner is None:
-            return UNDEFINED
-        image = np.concatenate([outer, inner])
+            return None
+        image = images(self._mapped, at, displaced)
+        if image is None:
+            return None
         columns = np.concatenate([image, (image @ at.left.conj())[..., None]], axis=-1)
         harmonics = np.fft.fft(columns, axis=1) / directions.size
         if not np.isfinite(harmonics).all():
-            return UNDEFINED
+            return None
         found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
         size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
         blur, floor = (_expected_noise(at, reached) for reached in (np.abs(at.state), np.abs(at.state) + size))

@@ -14,18 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fitted
-from chilopod.stability.normal_forms.center_manifold import (
-    CriticalOrbit,
-    Curve,
-    Departure,
-    Manifold,
-    ReturnedStates,
-    Term,
-    images,
-)
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, Term, images
 from chilopod.stability.spectrum.eigenvalues import spectrum
 
-_START = 0.2  # first amplitude of the search, relative to the scale of the states
+_START = 0.05  # first amplitude of the search, relative to the scale of the states
 
 
 @dataclass(frozen=True)
@@ -175,10 +167,10 @@ def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float) -> Quin
 def _measured(manifold: Manifold, at: CriticalOrbit, radius: float) -> Quintic | None:
     found = manifold.sample(radius)
     for _ in range(_BENDS):
-        if isinstance(found, Departure) or not manifold.bend(found):
+        if found is None or not manifold.bend(found):
             break
         found = manifold.sample(radius)
-    if isinstance(found, Departure):
+    if found is None:
         return None
     powers = ((3, 0), (5, 0)) if at.real else ((2, 1), (3, 2))
     third, fifth = (manifold.coefficient(found, each) for each in powers)

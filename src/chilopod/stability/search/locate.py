@@ -234,7 +234,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
             shape = found[0].image.jacobian.shape
             errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
         elif blocks == (None,):
-            errors = np.array([samples.error(each, uncertain) for each in found])
+            errors = samples.errors(found, uncertain)
         else:  # a symmetry-breaking mode does not affect the orbit's accuracy
             errors = np.full(len(found), uncertain)
         return np.stack([each.image.jacobian for each in found]), errors
