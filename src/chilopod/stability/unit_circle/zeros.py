@@ -245,7 +245,9 @@ class _Search:
             if seen and before.sign * after.sign <= 0.0 and all(part.kind is not _Kind.BENT for part in run):
                 continue
             a, b = run[0].a, run[-1].b
-            if self._fine(a, b, _FINEST) or self._vanishes(a, b, max(part.wrong for part in run)):
+            level = max(part.wrong for part in run) - np.log(_CLEAR)
+            # The function's own error may reach its polynomial's distance from zero.
+            if self._fine(a, b, _FINEST) or (self.error and level <= self.error(np.array([0.5 * a + 0.5 * b]))[0]):
                 self.put([_Part(a, b, _Kind.ZERO)])
                 continue
             wider = 0.5 * (b - a)
@@ -258,10 +260,6 @@ class _Search:
         middle, apart = 0.5 * a + 0.5 * b, _BESIDE * (self.high - self.low)
         left, right = before.a if before.sign else before.b, after.b if after.sign else after.a
         return max(min(a, middle - apart), left), min(max(b, middle + apart), right)
-
-    def _vanishes(self, a: float, b: float, wrong: float) -> bool:
-        """True if the function's own error reaches its polynomial's distance from zero."""
-        return self.error is not None and wrong <= float(self.error(np.array([0.5 * a + 0.5 * b]))[0]) + np.log(_CLEAR)
 
     def _runs(self) -> Iterator[tuple[_Part, list[_Part], _Part]]:
         """Groups of adjacent parts where the function may vanish, with the parts before and after."""
