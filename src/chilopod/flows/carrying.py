@@ -58,7 +58,7 @@ def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[floa
 
 def carry_all(carry: Callable[[slice], None], count: int, fewest: int) -> None:
     """Call a function for all of a number of states, in several threads if each has at least ``fewest`` of them."""
-    threads = min(cores(), count // fewest)
+    threads = min(cores(), count // fewest) if count >= 2 * fewest else 1
     if threads > 1:
         borders = [count * i // threads for i in range(threads + 1)]
         with ThreadPoolExecutor(threads) as pool:

@@ -109,24 +109,26 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
     """Root mean square of a mode over a return, across the motion; 1 for a given period, which fixes time 0."""
     if not is_autonomous(system):
         return 1.0
-    moves: list[tuple[Array, ComplexArray]] = [(orbit.state, mode)]
+    # The flow carries the velocity as it carries the mode.
+    start = np.stack([mode, system.velocity(np.array(orbit.state))], axis=1)
+    moves: list[tuple[Array, ComplexArray]] = [(orbit.state, start)]
     duration = orbit.period / orbit.image.returns
 
-    def carried(x: Array, v: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
+    def carried(x: Array, directions: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
         x, derivative = system.flow(np.array(x), 0.0, part * duration)
-        return x, derivative @ v
+        return x, derivative @ directions
 
-    def square(x: Array, v: ComplexArray) -> float:
-        velocity = np.asarray(system.velocity(np.array(x)))
-        across = v - velocity * (velocity @ v) / (velocity @ velocity)
-        return float(np.vdot(across, across).real)
+    def mean_square(moves: list[tuple[Array, ComplexArray]]) -> float:
+        vectors, velocities = np.moveaxis(np.array([directions for _, directions in moves]), 2, 0)
+        along = (vectors * velocities).sum(axis=1) / (velocities * velocities).sum(axis=1)
+        return float((np.abs(vectors - along[:, None] * velocities) ** 2).sum(axis=1).mean())
 
     for _ in range(_FEWEST_PARTS - 1):
         moves.append(carried(*moves[-1], 1.0 / _FEWEST_PARTS))
-    mean = float(np.mean([square(*move) for move in moves]))
+    mean = mean_square(moves)
     while True:
         between = [carried(*move, 0.5 / len(moves)) for move in moves]
-        before, mean = mean, 0.5 * (mean + float(np.mean([square(*move) for move in between])))
+        before, mean = mean, 0.5 * (mean + mean_square(between))
         moves = [move for pair in zip(moves, between, strict=True) for move in pair]
         if abs(mean - before) <= _SETTLED * mean or len(moves) >= _MOST_PARTS:
             return float(np.sqrt(mean))

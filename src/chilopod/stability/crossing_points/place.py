@@ -4,6 +4,7 @@ multiplier +1 of the return map H, where H - 1 is singular, place and orbit are 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -23,6 +24,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
 
 SAFETY = 1.5  # factor on the error of a multiplier, for that of its rate of change
 
+_NEAR = 1e3  # largest distance of known sides of a crossing, relative to the usual one
 _TOUCH_STEP = 1e-3  # distance from a touch at which the multiplier is computed, relative to the course
 _ASIDE = np.arange(1.0, 9.0) / 4.0  # nodes of the interpolation of a singular orbit on one side, in units of the reach
 _AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both sides
@@ -43,16 +45,20 @@ class Sample(ReadOnlyArrays):
     image: ReturnMap
 
     @functools.cached_property
-    def off_plus_one(self) -> float:
-        """Distance of the return map's multipliers from +1, without the one along the motion."""
-        return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
+    def _nearest(self) -> complex:
+        """Least difference of the return map's multipliers from +1, without the one along the motion."""
+        off = return_multipliers(self.image) - 1.0
+        return complex(off[np.abs(off).argmin()]) if off.size else complex(np.inf)
 
-    @functools.cached_property
+    @property
+    def off_plus_one(self) -> float:
+        """Distance of the nearest multiplier from +1."""
+        return abs(self._nearest)
+
+    @property
     def beside_plus_one(self) -> float:
         """Signed distance of the nearest real multiplier from +1; NaN if a pair is nearer."""
-        off = return_multipliers(self.image) - 1.0
-        nearest = complex(off[np.abs(off).argmin()]) if off.size else np.nan
-        return nearest.real if nearest.imag == 0.0 else np.nan
+        return self._nearest.real if self._nearest.imag == 0.0 and np.isfinite(self._nearest) else np.nan
 
     def passes(self, other: Sample) -> bool:
         """True if the multiplier nearest +1 is on the other side of it in another sample."""
@@ -69,9 +75,12 @@ class Course:
     width: float  # width of the whole search, which may exceed that from low to high
     beside: float  # distance from a place at which rates of change are computed
 
-    def jacobians(self, place: float) -> tuple[Array, Array, float]:
-        """Derivatives of the return map on both sides of a place, and the distance of the sides."""
-        a, b = max(place - self.beside, self.low), min(place + self.beside, self.high)
+    def jacobians(self, crossing: Crossing) -> tuple[Array, Array, float]:
+        """Derivatives of the return map on both sides of a crossing, where known if near, and the distance of the
+        sides."""
+        place, (a, b) = crossing.value, crossing.around
+        if not (a < place < b and self.beside <= b - a <= _NEAR * self.beside):
+            a, b = max(place - self.beside, self.low), min(place + self.beside, self.high)
         before, after = self.at(np.array([a, b]))
         return before.image.jacobian, after.image.jacobian, b - a
 
@@ -106,7 +115,7 @@ def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
 
 def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
     """d nu = left^H dH' right, which holds also near other multipliers; the slowest of several."""
-    before, after, apart = course.jacobians(crossing.value)
+    before, after, apart = course.jacobians(crossing)
     between = spectrum(replace(image, jacobian=0.5 * (before + after), error=0.0))
     critical = critical_multipliers(between, crossing)
     left, right = between.left[:, critical], between.right[:, critical]
@@ -137,7 +146,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
     here = _collision(matrix, crossing)
     moved = max(abs(_collision(other, crossing) - here) for other in errors.disturbed(matrix, error))
-    before, after, apart = course.jacobians(crossing.value)
+    before, after, apart = course.jacobians(crossing)
     slope = abs(_collision(after, crossing) - _collision(before, crossing)) / apart
     # All of eight draws are less than a third of the root mean square in one case of 50 000.
     return SAFETY * (3.0 * moved + abs(here)) / slope if slope > 0.0 else np.inf
@@ -258,5 +267,6 @@ def _root_near_zero(polynomial: Polynomial, nodes: Array) -> float | None:
 
 def through(nodes: Array, values: Array, place: float) -> Array:
     """The polynomial through the rows of ``values`` at some nodes, at another place."""
-    weights = [np.prod([(place - w) / (v - w) for w in nodes if w != v]) for v in nodes]
+    at = nodes.tolist()
+    weights = [math.prod((place - w) / (v - w) for w in at if w != v) for v in at]
     return np.asarray(np.array(weights) @ values)

@@ -132,12 +132,9 @@ def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: 
 
 def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
     """Departure from linearity relative to the amplitude, order of its main term, True if it exceeds the noise."""
-    share, order = 0.0, 2
-    for one in found.harmonics:
-        sizes = np.abs(one.coefficients[1:, -1])
-        largest = int(sizes.argmax())
-        if sizes[largest] > share:
-            share, order = float(sizes[largest]), one.parity + 2 * (largest + 1)
+    sizes = np.abs([one.coefficients[1:, -1] for one in found.harmonics])
+    h, k = np.unravel_index(int(sizes.argmax()), sizes.shape)
+    share, order = float(sizes[h, k]), found.harmonics[h].parity + 2 * int(k) + 2
     seen = share > 4.0 * float(found.noise[-1])
     # A saturating map is linear again far out, with another slope.
     slope = abs(found.harmonics[1].coefficients[0, -1] - at.multiplier * found.radius)

@@ -56,16 +56,13 @@ class Series(ReadOnlyArrays):
         sizes = np.abs(terms)
         # Coefficients after the next two count only above the noise.
         standing_out = np.maximum(sizes - 2.0 * np.abs(weights[:, None]) * self.roughness, 0.0)
-        beyond = np.cumsum(standing_out[::-1], axis=0)[::-1]
-        first = (order - self.parity) // 2
-        value = np.cumsum(terms, axis=0)
-        best, error = value[first], np.full(value.shape[1:], np.inf)
-        for last in range(first, RADII - _TAIL):
-            after = beyond[last + 3] if last + 3 < RADII else 0.0
-            estimate = _SAFETY * (gains[last] * noise + sizes[last + 1] + sizes[last + 2] + after)
-            better = estimate < error
-            best, error = np.where(better, value[last], best), np.where(better, estimate, error)
-        return best, error
+        beyond = np.cumsum(np.vstack([np.zeros(noise.size), standing_out[::-1]]), axis=0)[::-1]
+        first, last = (order - self.parity) // 2, RADII - _TAIL
+        after = sizes[first + 1 : last + 1] + sizes[first + 2 : last + 2] + beyond[first + 3 : last + 3]
+        errors = _SAFETY * (gains[first:last, None] * noise + after)
+        errors = np.where(errors < np.inf, errors, np.inf)
+        best, entries = errors.argmin(axis=0), np.arange(noise.size)
+        return np.cumsum(terms, axis=0)[first + best, entries], errors[best, entries]
 
 
 def series(values: ComplexArray, parity: int) -> Series:

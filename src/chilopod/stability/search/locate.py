@@ -234,7 +234,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
             shape = found[0].image.jacobian.shape
             errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
         elif blocks == (None,):
-            errors = np.array([samples.error(each, uncertain) for each in found])
+            errors = samples.errors(found, uncertain)
         else:  # a symmetry-breaking mode does not affect the orbit's accuracy
             errors = np.full(len(found), uncertain)
         return np.stack([each.image.jacobian for each in found]), errors
@@ -246,15 +246,11 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     return [(block, crossings_in(block, whole, search)) for block in blocks]
 
 
-def _touches(samples: Samples, crossing: Crossing) -> bool:
-    """True if one multiplier, or one pair, touches the circle within the interval and goes back."""
-    simple = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1)
-    return simple and crossing.change == 0 and not crossing.collision and samples.low < crossing.value < samples.high
-
-
 def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> Found:
     """Description of a crossing of a known or followed orbit."""
-    touch = _touches(samples, crossing)
+    # One multiplier, or one pair, touches the circle within the interval and goes back.
+    touch = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1) and crossing.change == 0
+    touch = touch and not crossing.collision and samples.low < crossing.value < samples.high
 
     def bounded_at(value: float, state: Array, error: Array, image: ReturnMap) -> Orbit:
         return bounded(samples.family(value), state, image, error=error)
@@ -264,7 +260,9 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     trivial = block is None or block.trivial
     regular = past_singular(course, crossing, bounded_at) if trivial and not samples.known else None
     if regular is None:
-        value, orbit = crossing.value, _orbit(samples, crossing.value)
+        value, (sample,) = crossing.value, samples.at(np.array([crossing.value]))
+        system, x, image = samples.family(value), sample.orbit, sample.image
+        orbit = from_known(system, x, image=image) if samples.known else bounded(system, x, image)
         bound = place_error(course, crossing, orbit.image)
     else:
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit
@@ -287,17 +285,6 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
     crossing = Crossing(fold.value, (fold.value, fold.value), Event.PLUS, 1, 1, 1.0 + 0.0j)
     system, place = samples.family(fold.value), (fold.value, fold.error_bound)
     return described(system, place, orbit, crossing, None, kind=Kind.FOLD, with_normal_form=with_normal_form)
-
-
-def _orbit(samples: Samples, value: float) -> Orbit:
-    """The orbit at a value, with error bounds."""
-    sample = samples.at(np.array([value]))[0]
-    system = samples.family(value)
-    return (
-        from_known(system, sample.orbit, image=sample.image)
-        if samples.known
-        else bounded(system, sample.orbit, sample.image)
-    )
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:

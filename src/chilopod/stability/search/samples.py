@@ -122,22 +122,24 @@ class Samples:
         # Failed orbits do not predict the cost of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
-    def error(self, sample: Sample, of_flow: float) -> float:
-        """Relative error of the derivative at a sample of a followed orbit: that of the flow and its derivative,
+    def errors(self, samples: list[Sample], of_flow: float) -> Array:
+        """Relative errors of the derivatives at samples of a followed orbit: that of the flow and its derivative,
         ``of_flow``, and that due to the orbit's error, the flow's times the inverse of H - 1."""
-        scaled = sample.image.jacobian * self.size / self.size[:, None]
+        units, result = self.size / self.size[:, None], np.full(len(samples), of_flow)
+        scaled = np.array([each.image.jacobian for each in samples]) * units
         _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
-        if values[-1] > _SURE:
-            return of_flow
-        if sample.value not in self._bends:
-            system, duration = self.family(sample.value), sample.image.period / sample.image.returns
-            section = section_at(system, sample.orbit, self.size, duration)
-            beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[-1], False, section)
-            change = (beside.jacobian - sample.image.jacobian) * self.size / self.size[:, None]
-            self._bends[sample.value] = float(np.linalg.norm(change)) / _BESIDE
-        # Where H - 1 vanishes along a direction, the rest is of third order, except in special cases.
-        off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
-        return min(1.0, of_flow + self._bends[sample.value] * off)
+        for i in np.flatnonzero(values[:, -1] <= _SURE):
+            sample = samples[i]
+            if sample.value not in self._bends:
+                system, duration = self.family(sample.value), sample.image.period / sample.image.returns
+                section = section_at(system, sample.orbit, self.size, duration)
+                beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[i, -1], False, section)
+                change = (beside.jacobian - sample.image.jacobian) * units
+                self._bends[sample.value] = float(np.linalg.norm(change)) / _BESIDE
+            # Where H - 1 vanishes along a direction, the rest is of third order, except in special cases.
+            off = min(of_flow / max(float(values[i, -1]), of_flow), of_flow ** (1.0 / 3.0))
+            result[i] = min(1.0, of_flow + self._bends[sample.value] * off)
+        return result
 
     def of_flow(self) -> ReturnMap:
         """The return map at the first orbit, with the error of the flow alone."""

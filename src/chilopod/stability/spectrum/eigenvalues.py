@@ -64,8 +64,11 @@ def spectrum(image: ReturnMap) -> Spectrum:
 
 def return_multipliers(image: ReturnMap) -> ComplexArray:
     """Eigenvalues of a return map by falling modulus, without the zero of the direction of motion."""
-    into, out_of = _across(image)
-    values = np.linalg.eigvals(out_of @ image.jacobian @ into).astype(np.complex128)
+    matrix = image.jacobian
+    if image.normal is not None:
+        into, out_of = _across(image)
+        matrix = out_of @ matrix @ into
+    values = np.linalg.eigvals(matrix).astype(np.complex128)
     return values[np.lexsort((-values.imag, -np.abs(values)))]
 
 

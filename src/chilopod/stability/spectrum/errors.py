@@ -9,6 +9,8 @@ Laub, *SIAM J. Sci. Comput.* 15, 36, 1994); all of ``DRAWS`` are so small in one
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,8 +44,12 @@ def falling_order(values: ComplexArray) -> NDArray[np.intp]:
 
 def disturbed(matrix: Array, error: Array, draws: int = DRAWS) -> Array:
     """Copies of matrices, shape (draws, ...), every entry changed by its error with a random sign."""
-    signs = np.random.default_rng(0).choice(np.array([-1.0, 1.0]), (draws, *matrix.shape))
-    return np.asarray(matrix + error * signs)
+    return np.asarray(matrix + error * _signs((draws, *matrix.shape)))
+
+
+@cache
+def _signs(shape: tuple[int, ...]) -> Array:
+    return np.random.default_rng(0).choice(np.array([-1.0, 1.0]), shape)
 
 
 def eigenvalue_errors(values: ComplexArray, matrix: Array, error: Array) -> Array:

@@ -60,6 +60,7 @@ class Crossing:
     change: int  # rise of the number outside; 0 for a touch; at an end of the interval for a continued motion
     multiplier: complex  # critical multiplier, the one with positive imaginary part of a pair
     collision: bool = False  # True if they meet on the circle and leave it, or come back: a conservative family
+    around: tuple[float, float] = (0.0, 0.0)  # evaluated values on both sides without another root, if known
 
 
 def tolerances(spectra: Spectra, root: Root) -> Array:
@@ -97,7 +98,7 @@ def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
         # No function vanishes here: an undetermined multiplier does not count as critical.
         critical &= allowed <= UNKNOWN
     rest, found = nu[critical], []
-    conservative, bracket = spectra.conservative, (root.left, root.right)
+    conservative, bracket, around = spectra.conservative, (root.left, root.right), root.known
     for event, target in TARGETS.items():
         if not rest.size:
             break
@@ -109,14 +110,14 @@ def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
         if number > 0 and (not conservative or root.event in (event, None)):
             best = complex(rest[near][np.abs(rest[near] - target).argmin()])
             meeting = conservative and number % 2 == 0
-            found.append(Crossing(root.place, bracket, event, number, 0, best, meeting))
+            found.append(Crossing(root.place, bracket, event, number, 0, best, meeting, around))
         rest = rest[~near]
     upper = rest[rest.imag > 0.0]
     if conservative:
         upper = _meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
     if upper.size:
         best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
-        found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative))
+        found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative, around))
     return found
 
 

@@ -34,8 +34,9 @@ _MOSTLY = 0.25  # part of the first places that may disagree on factors that van
 _MANY = 800  # pairs of multipliers beyond which the bialternate product has too many meaningless zeros
 _PROBES = 65
 _FINEST_PROBE = 1e-6  # finest spacing of probes, relative to the interval
-_OF_ERROR = 1e-4  # width of a root's enclosure, relative to its error from those of all entries
+_OF_ERROR = 1e-3  # width of a root's enclosure, relative to its error from those of all entries
 _NARROW = 1e-13  # narrowest enclosure of a root, relative to its value
+_DIGITS = 4.0 * float(np.finfo(float).eps)  # rounding of a root's place, relative to its value
 _CLOSE = 0.25  # predicted approach to the circle, relative to the nearer end, that calls for a probe
 
 
@@ -89,8 +90,8 @@ def find_crossings(
     status = finder.search()
     crossings = []
     for each in finder.crossings:
-        value, left, right = parameter(np.array([each.value, *each.bracket])).tolist()
-        crossings.append(replace(each, value=value, bracket=(left, right)))
+        value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
+        crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
     return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), spectra.evaluations)
 
 
@@ -257,17 +258,20 @@ class _Finder:
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]
 
     def _root(self, event: Event, left: float, right: float) -> Root:
-        reference = float(self.spectra.function(np.array([left, right]), event)[1].max())
-        within = 0.1 * (right - left)
+        logs = self.spectra.function(np.array([left, right]), event)[1]
+        reference, within, slope = float(logs.max()), 0.1 * (right - left), 0.0
         if within > _NARROW * max(abs(left), abs(right)):
             error = float(self.spectra.function_error(np.array([left]), event)[0])
-            wrong = float(np.exp(min(error - reference, 0.0)))
-            # Between the two the function is nearly linear, if its signs there are certain.
-            within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left) if wrong < _TELLING else 0.0
+            wrong, within = float(np.exp(min(error - reference, 0.0))), 0.0
+            if wrong < _TELLING:  # the signs are certain, and the function is nearly linear in between
+                within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left)
+                slope = float(np.exp(logs - reference).sum()) / (right - left)
 
         def value(place: float) -> float:
-            signs, logs = self.spectra.function(np.array([place]), event)
-            return float(signs[0] * np.exp(logs[0] - reference)) if np.isfinite(signs[0]) else 0.0
+            (sign,), (log,) = self.spectra.function(np.array([place]), event)
+            found = float(sign * np.exp(log - reference))
+            # Zero within the digits of the place, or where there is no matrix.
+            return found if abs(found) > slope * max(within, _DIGITS * abs(place)) else 0.0
 
         return rooted(self.spectra, value, left, right, event, within)
 

@@ -223,15 +223,13 @@ class Spectra:
 
     def function_error(self, values: Array, event: Event) -> Array:
         """Logarithm of the error of :meth:`function`, shape (k,)."""
-        idle = self.idle[event]
-        signs, logs = symmetric(factors(self.at(values), event), idle)
-        largest = np.full(values.size, -np.inf)
-        for copy in np.moveaxis(self.disturbed(values), 1, 0):
-            other_signs, other_logs = symmetric(factors(copy, event), idle)
-            top = np.maximum(np.maximum(logs, other_logs), _SMALLEST)
-            with np.errstate(divide="ignore"):
-                moved = np.log(np.abs(signs * np.exp(logs - top) - other_signs * np.exp(other_logs - top)))
-            largest = np.fmax(largest, moved + top)
+        both = np.concatenate([self.at(values)[:, None], self.disturbed(values)], axis=1)
+        of_all = symmetric(factors(both.reshape(-1, self.size), event), self.idle[event])
+        signs, logs = (part.reshape(both.shape[:2]) for part in of_all)
+        top = np.maximum(np.maximum(logs[:, :1], logs[:, 1:]), _SMALLEST)
+        with np.errstate(divide="ignore"):
+            moved = signs[:, :1] * np.exp(logs[:, :1] - top) - signs[:, 1:] * np.exp(logs[:, 1:] - top)
+            largest = np.fmax.reduce(np.log(np.abs(moved)) + top, axis=1, initial=-np.inf)
         return np.asarray(largest - self._bounds(values, event) + np.log(SAFETY))
 
 

@@ -38,6 +38,7 @@ _HOLE = 2.0**-8  # width of a piece where the function exists in part, relative 
 _ROUGH = 2.0**-34  # least width of a piece that is not a polynomial, relative to the interval
 _FINEST = 1e-12  # width of a part in which zeros are not separated, relative to the interval
 _ULPS = 256.0  # width of the finest piece in units in the last place
+_BESIDE = 1e-6  # distance from a zero, relative to the interval, at which signs also give a rate of change
 
 _WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # places in a part, and least relative slope for a simple zero
 _REAL = 1e-6  # largest imaginary part of a place where a level is just reached
@@ -230,7 +231,7 @@ class _Search:
     def doubtful(self, room: int) -> list[Interval]:
         """Pieces around parts that need their own scale, within ``room`` values of the function."""
         runs = [run for run in self._runs() if any(part.kind in _OPEN for part in run[1])]
-        ends = [(run[0].a, run[-1].b) for _, run, _ in runs]
+        ends = [self._ends(*run) for run in runs]
         unknown = sorted({place for place in itertools.chain(*ends) if place not in self.signs})
         if room < len(unknown) + len(runs):
             self.spent = True
@@ -238,33 +239,38 @@ class _Search:
         if unknown:
             self._ask(np.array(unknown))
         pieces = []
-        for (before, run, after), (a, b) in zip(runs, ends, strict=True):
+        for (before, run, after), (start, end) in zip(runs, ends, strict=True):
             # Beyond the known parts the function keeps the sign at their end.
-            seen = before in (self.signs[a], 0.0) and after in (self.signs[b], 0.0)
-            if seen and before * after <= 0.0 and all(part.kind is not _Kind.BENT for part in run):
+            seen = before.sign in (self.signs[start], 0.0) and after.sign in (self.signs[end], 0.0)
+            if seen and before.sign * after.sign <= 0.0 and all(part.kind is not _Kind.BENT for part in run):
                 continue
-            if self._fine(a, b, _FINEST) or self._vanishes(a, b, max(part.wrong for part in run)):
+            a, b = run[0].a, run[-1].b
+            level = max(part.wrong for part in run) - np.log(_CLEAR)
+            # The function's own error may reach its polynomial's distance from zero.
+            if self._fine(a, b, _FINEST) or (self.error and level <= self.error(np.array([0.5 * a + 0.5 * b]))[0]):
                 self.put([_Part(a, b, _Kind.ZERO)])
                 continue
             wider = 0.5 * (b - a)
             pieces.append((max(a - wider, self.low), min(b + wider, self.high)))
         return pieces
 
-    def _vanishes(self, a: float, b: float, wrong: float) -> bool:
-        """True if the function's own error reaches its polynomial's distance from zero."""
-        return self.error is not None and wrong <= float(self.error(np.array([0.5 * a + 0.5 * b]))[0]) + np.log(_CLEAR)
+    def _ends(self, before: _Part, run: list[_Part], after: _Part) -> Interval:
+        """Places on both sides of a run, in the parts with a sign beside it if there are any."""
+        a, b = run[0].a, run[-1].b
+        middle, apart = 0.5 * a + 0.5 * b, _BESIDE * (self.high - self.low)
+        left, right = before.a if before.sign else before.b, after.b if after.sign else after.a
+        return max(min(a, middle - apart), left), min(max(b, middle + apart), right)
 
-    def _runs(self) -> Iterator[tuple[float, list[_Part], float]]:
-        """Groups of adjacent parts where the function may vanish, with the signs before and after, 0 at the ends of the
-        known range."""
-        before, run = 0.0, []
+    def _runs(self) -> Iterator[tuple[_Part, list[_Part], _Part]]:
+        """Groups of adjacent parts where the function may vanish, with the parts before and after."""
+        before, run = _Part(self.low, self.low, _Kind.SKIPPED), []
         for part in [*self.parts, _Part(self.high, self.high, _Kind.SKIPPED)]:
             if part.kind in (*_OPEN, _Kind.ZERO):
                 run.append(part)
                 continue
             if run:
-                yield before, run, part.sign
-            before, run = part.sign, []
+                yield before, run, part
+            before, run = part, []
 
     def result(self) -> Zeros:
         """The zeros from the current parts."""
@@ -274,8 +280,8 @@ class _Search:
         touches: list[Interval] = []
         for before, run, after in self._runs():
             first, last = run[0], run[-1]
-            u = before or (first.kind is not _Kind.ZERO) * self.signs.get(first.a, 0.0)
-            v = after or (last.kind is not _Kind.ZERO) * self.signs.get(last.b, 0.0)
+            u = before.sign or (first.kind is not _Kind.ZERO) * self.signs.get(first.a, 0.0)
+            v = after.sign or (last.kind is not _Kind.ZERO) * self.signs.get(last.b, 0.0)
             if u * v < 0.0:
                 left = [place for place, sign in met if place <= first.a and sign == u]
                 right = [place for place, sign in met if place >= last.b and sign == v]
