@@ -126,6 +126,10 @@ WALKS = {
     "status raises": "    @property\n    def status(self):\n        raise RuntimeError('x')\n",
     "status is another": "    status = property(lambda self: (Status.FALLEN,) * len(self.walk.status))\n",
     "observe raises": "    def observe(self):\n        raise one_of((ValueError, Fatal))('x')\n",
+    "observes another shape": "    def observe(self):\n        from dataclasses import replace\n"
+    "        name = one_of(('bearing', 'distance', 'joint_angles', 'leg_yaw', 'stiffness'))\n"
+    "        return replace(self.walk.observe(), **{name: one_of((None, np.zeros((1, 9)), np.zeros(2, int)))})\n",
+    "observes nothing": "    def observe(self):\n        return one_of((None, 3, {}))\n",
     "command raises": "    def command(self, command):\n        raise one_of((ValueError, Fatal))('x')\n",
     "command does nothing": "    def command(self, command):\n        pass\n",
 }

@@ -263,15 +263,10 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
         found["distance"] = (("time", "robot"), away, {"units": "m"})
         found["bearing"] = (("time", "robot"), angle, {"units": "rad"})
     data.update(found)
-    failed = np.flatnonzero(np.isnan(data.heading.values))
-    for name, each in data.variables.items():
+    failed = np.isnan(data.heading.values)
+    for each in data.variables.values() if failed.any() else ():
         if each.dims[:2] == ("time", "robot"):
-            rows = each.values.reshape(-1, *each.shape[2:])
-            if not np.isnan(rows[failed]).all():
-                rows = rows.copy()
-                rows[failed] = np.nan
-                found[str(name)] = (each.dims, rows.reshape(each.shape), each.attrs)
-    data.update(found)
+            np.copyto(each.values, np.nan, where=failed.reshape(*failed.shape, *[1] * (each.ndim - 2)))
 
 
 def spring_work(data: xr.Dataset) -> xr.DataArray:

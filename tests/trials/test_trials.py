@@ -2,14 +2,15 @@
 
 import dataclasses
 import pickle
+import threading
 
 import numpy as np
 import pytest
 
 from chilopod import load_robot, twin
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.steering import LegYawController, Target
-from chilopod.trials import NONE, Disturbance, Trial, batches, run, together
+from chilopod.trials import NONE, Disturbance, Trial, batch, batches, run, together, walked
 
 ROBOT = load_robot("aoi2022-planar")
 WHOLE = load_robot("aoi2022")
@@ -113,3 +114,35 @@ def test_batches_keep_apart_what_cannot_walk_together():
     stride = dataclasses.replace(BASE, robot=ROBOT.set_from_text(["gait.stride=2 cm"]))
     spring = dataclasses.replace(BASE, robot=ROBOT.set_from_text(["springs.stiffness[0]=12 N*mm/deg"]))
     assert [len(each) for each in batches([BASE, other, quick, stride, spring])] == [2, 1, 1, 1]
+
+
+def test_records_do_not_depend_on_threads(monkeypatch):
+    trials = [dataclasses.replace(BASE, seed=seed, duration=1.5) for seed in range(24)]
+    records = []
+    for threads in (1, 3):
+        monkeypatch.setattr("numba.get_num_threads", lambda threads=threads: threads)
+        records.append(walked(trials))
+    for one, other in zip(*records, strict=True):
+        assert one.identical(other)
+
+
+def test_a_failure_in_a_thread_ends_the_others(monkeypatch):
+    monkeypatch.setattr("numba.get_num_threads", lambda: 3)
+    steered, times, faults = batch.steer, [], [AnalysisError("is broken", field="walk")]
+    begun = threading.Barrier(3, timeout=60.0)
+
+    def fails_in_one(walk, until, controller, *, progress, **options):
+        begun.wait()
+        if faults:
+            raise faults.pop()
+        try:
+            steered(walk, until, controller, progress=progress, **options)
+        finally:
+            times.append(walk.time)
+
+    monkeypatch.setattr(batch, "steer", fails_in_one)
+    trials = [dataclasses.replace(BASE, seed=seed, duration=1000.0) for seed in range(24)]
+    with pytest.raises(AnalysisError, match="is broken"):
+        walked(trials)
+    assert len(times) == 2
+    assert max(times) < 900.0

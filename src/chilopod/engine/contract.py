@@ -272,6 +272,8 @@ class Traits:
         True if its sensors have noise of their own, drawn from ``seeds``.
     poses
         True if it can record the positions of all joints, to be drawn.
+    threads
+        True if walks of several threads run at the same time, because the interpreter's lock is free meanwhile.
     robots_per_core
         Number of robots that one core should walk at a time: a few seconds of work.
     walks_per_round
@@ -287,6 +289,7 @@ class Traits:
     exact: bool = False
     noisy: bool = False
     poses: bool = False
+    threads: bool = False
     robots_per_core: int = 1
     walks_per_round: int = 8
     duration_ratio: float = 2.0

@@ -7,9 +7,11 @@ import re
 from collections.abc import Callable, Hashable, Mapping
 from functools import partial
 from importlib import import_module
-from typing import Any, Final
+from typing import Any, Final, cast
 
-from chilopod.engine.contract import Controller, Engine, Traits, Walk, missing_parts
+import numpy as np
+
+from chilopod.engine.contract import Controller, Engine, Observation, Traits, Walk, missing_parts
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words, nearest_name
 from chilopod.frozen import Array
 from chilopod.robot import Robot
@@ -113,6 +115,26 @@ class _OwnWalk:
         _theirs(self._name, "advance", self._walk.advance, until)
         if not abs(self.time - until) <= _SAME_TIME:
             raise AnalysisError(f"advance({until:g}) must end at that time, not at {self.time} s", field=self._name)
+
+    def observe(self) -> Observation:
+        seen: Any = _theirs(self._name, "observe", self._walk.observe)
+        robots, joints = len(self.robots), self.robots[0].body.modules - 1
+        shapes = {"bearing": (robots,), "distance": (robots,), "joint_angles": (robots, joints)}
+        for name, shape in {**shapes, "leg_yaw": (robots, 2), "stiffness": (robots, joints)}.items():
+            self._check(f"observe().{name}", getattr(seen, name, None), shape)
+        return cast(Observation, seen)
+
+    def pose(self) -> Array:
+        pose: Any = _theirs(self._name, "pose", self._walk.pose)
+        self._check("pose()", pose, (len(self.robots), 3))
+        return cast(Array, pose)
+
+    def _check(self, what: str, values: Any, shape: tuple[int, ...]) -> None:
+        if not isinstance(values, np.ndarray) or values.dtype.kind != "f" or values.shape != shape:
+            found = (
+                f"{values.dtype} of shape {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
+            )
+            raise AnalysisError(f"{what} must be an array of floats of shape {shape}, not {found}", field=self._name)
 
 
 def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Any:

@@ -29,6 +29,7 @@ traits = Traits(
     name="planar",
     sentence="the paper's planar model",
     exact=True,
+    threads=True,
     robots_per_core=32,
     walks_per_round=48,
     duration_ratio=1.6,

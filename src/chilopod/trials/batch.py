@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from itertools import chain
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,7 @@ import xarray as xr
 from chilopod.cores import cores
 from chilopod.engine import Walk, engine_named, event_times, steer
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.steering import CourseReferee, Target, add_measures
 from chilopod.steering.measures import lengths
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
@@ -24,6 +28,7 @@ NOT_KEPT = "not kept"
 
 _CHANGES = "an object that its code can reach changes while it steers"
 _KNOWN: dict[str, str] = {}  # findings about controllers, by everything that defines them
+_LEAST = 8  # robots in a thread, which a core walks at once in the planar model
 _MOST_BYTES = 256e6
 """Approximate largest size of the records of a batch, bytes."""
 
@@ -50,11 +55,43 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
 
 def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     """Records of the trials of one of :func:`batches`, each with one ``robot``, and robot file and trial in the
-    attributes. Raises ParameterError or AnalysisError if an argument is out of range or a controller fails."""
+    attributes. Raises ParameterError or AnalysisError if an argument is out of range or a controller fails.
+
+    Every thread walks its part of the trials, unless their controller is a user's, which may not expect threads. The
+    results do not depend on the number of threads.
+    """
+    import numba  # takes half a second to load
+
+    several = engine_named(trials[0].engine).traits.threads and not _is_own(trials[0])
+    threads = min(numba.get_num_threads(), len(trials) // _LEAST) if several else 1
+    if threads < 2:
+        return _walked(trials)
+    stopped = Event()
+
+    def go_on(done: float, words: str) -> None:
+        if stopped.is_set():
+            raise AnalysisError("was stopped", field="walk")
+
+    def part(number: int) -> list[xr.Dataset]:
+        numba.set_num_threads(1)  # of this thread
+        return _walked(trials[number * len(trials) // threads : (number + 1) * len(trials) // threads], go_on)
+
+    with ThreadPoolExecutor(threads) as pool:
+        parts = [pool.submit(part, number) for number in range(threads)]
+        try:
+            done, _ = wait(parts, return_when=FIRST_EXCEPTION)
+            failed = [each for each in done if each.exception()]
+            return list(chain.from_iterable(each.result() for each in failed or parts))
+        finally:
+            stopped.set()
+
+
+def _walked(trials: Sequence[Trial], progress: Progress = silent) -> list[xr.Dataset]:
+    """Records as of :func:`walked`, of trials that walk together in this thread."""
     first = trials[0]
     # A controller that is not reproducible is found before.
     doubts = first.code[1] or first.code[2] or _doubts(first)
-    walk, drawn, referee = _steered(trials, first.duration)
+    walk, drawn, referee = _steered(trials, first.duration, progress)
     name = type(first.controller).__name__
     if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
         raise AnalysisError("must not change its own fields while it steers: they name the trial", field=name)
@@ -67,7 +104,9 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     return _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)
 
 
-def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], CourseReferee | None]:
+def _steered(
+    trials: Sequence[Trial], until: float, progress: Progress = silent
+) -> tuple[Walk, list[Drawn], CourseReferee | None]:
     """Walk trials of one batch up to a time, s; return their walk, the drawn disturbances and the referee."""
     first = trials[0]
     engine = engine_named(first.engine)
@@ -88,7 +127,7 @@ def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], 
     noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
     referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
-    steer(walk, until, first.controller, bearing_noise=noise, referee=referee)
+    steer(walk, until, first.controller, bearing_noise=noise, referee=referee, progress=progress)
     return walk, drawn, referee
 
 
