@@ -1,238 +1,259 @@
-"""Fit of constants of the planar model to recorded walks, by nonlinear least squares.
+"""Identification of constants of the planar model from recorded walks, by nonlinear least squares.
 
-Unknown are the free constants and, for each walk, the phase of the gait and the joint angles when the recording begins,
-for positions also the pose. Rates are forgotten within a fraction of a step, so each walk begins at rest in its joints
-a quarter of a cycle earlier. Derivatives are differences of walks that run together.
+Unknown are the free constants and, for each walk, the phase of the gait and the joint angles when the recording begins.
+Rates are forgotten within a fraction of a step, so each walk begins at rest in its joints a quarter of a cycle earlier.
+Derivatives are differences of walks that run together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from scipy.optimize import least_squares
+from scipy.special import stdtrit
 
+from chilopod import units
 from chilopod.frozen import Array
-from chilopod.kinematics import module_centres, module_headings
+from chilopod.notebook import Shown, aligned
 from chilopod.planar import PlanarModel, initial_states
 from chilopod.planar.sampled import states_at
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.tasks.identify.recordings import Recording
+from chilopod.tasks.identify.planar_fit import CONFIDENCE
+from chilopod.tasks.identify.recordings import RecordedWalks, Recording
 
-_STEP, _TOLERANCE = 1e-5, 1e-8  # of differences, in units of ranges, cycles, rad and m, and of walks
+_STEP, _TOLERANCE = 1e-5, 1e-8  # of differences, in units of ranges, cycles and rad, and of walks
 _EARLIER = 0.25  # cycles from the start of a walk to its first sample
 _PHASES, _CYCLES = 6, 10  # number of phases to start from, each tried on so many cycles
-_ROUGH, _MOST = (1e-3, 12), (1e-9, 40)  # relative change of the sum of squares that ends a fit, and most steps
-_BEST, _APART = 2, 0.1  # number of these phases that are tried on the whole walk, and their distance, cycles
-_SCATTER, _FAR = np.deg2rad(0.5), np.pi  # scatter to start from, rad or module lengths, and value after a failure
-_ROUNDS, _SAME = 4, 0.01  # of fits with weights from the last one, until these change less
+_ROUGH, _FINE = (1e-3, 12), (1e-9, 40)  # change of the sum of squares, relative, that ends a fit, and most steps
+_SCATTER, _FAR = np.deg2rad(0.5), np.pi  # of angles, first guess, and angle of a walk that has failed
+_OPEN = 0.5  # half of an interval, in units of the range, from which on a constant is left open
+_SMALL, _ALIKE = 0.02, 2.0  # change that is not said, over the largest, and factor of the variance that is said
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Fit of constants to recorded walks.
+@dataclass(frozen=True)
+class RecordedIdentification(Shown):
+    """Result of an identification from recorded walks.
 
-    Attributes
-    ----------
-    constants
-        Free constants, SI, shape (free,).
-    starts
-        Phase of the gait at the first sample of each walk, cycles, and its start a quarter of a cycle earlier: joint
-        angles, rad, and, for positions, the pose, m and rad.
-    noise
-        Standard deviation of the residuals of each walk, rad or m, shape (walks,).
-    alike
-        Factor by which residuals enlarge variances where those of neighbouring samples are alike, shape (walks,).
-    fitted
-        Computed values of each walk, rad or m, shape (samples, columns).
-    slopes
-        Derivatives of the residuals, over their noise, over the constants, SI, less what other starts of the walks make
-        up for, shape (residuals, free).
+    ``best`` is the robot with the best constants, and their 90 % intervals as provenance. ``found`` has these
+    constants and intervals (None where the walks leave a constant open), correlations, independent combinations (the
+    relative changes of the constants by half of the 90 % interval along each), the scatter of the residuals, rad, and
+    the factor by which it enlarges variances where neighbours are alike. ``walks`` has measured and fitted angles, rad.
     """
 
-    constants: Array
-    starts: list[Array]
-    noise: Array
-    alike: Array
-    fitted: list[Array]
-    slopes: Array
+    best: Robot
+    found: dict[str, Any]
+    walks: xr.Dataset
+
+    def as_json(self) -> dict[str, Any]:
+        """What was found, as plain numbers and text."""
+        return self.found
+
+    def lines(self) -> list[str]:
+        """Constants with intervals, and combinations, as lines of text."""
+        rows = [(path, each["text"], each["interval_text"]) for path, each in self.found["constants"].items()]
+        scatter, count = np.rad2deg(self.found["scatter_rad"]), int(self.walks.measured.count())
+        said = [f"{self.best.name}: residuals of {count} joint angles scatter by {scatter:.3g} deg"]
+        said += aligned([("constant", "best", f"{CONFIDENCE:.0%} interval"), *rows])
+        said += [f"the range searched ends the interval of {path}" for path in self.found["cut_by_the_range"]]
+        said.append(f"independent combinations, each by half of its {CONFIDENCE:.0%} interval:")
+        for each in self.found["combinations"]:
+            changes, least = each["changes"], _SMALL * max(map(abs, each["changes"].values()))
+            texts = (f"{path} {100.0 * change:+.2g} %" for path, change in changes.items() if abs(change) > least)
+            said.append(f"  {', '.join(texts)}{' (left open)' if each['open'] else ''}")
+        if (factor := self.found["variance_factor"]) > _ALIKE:
+            widened = f"intervals are {np.sqrt(factor):.1f} times as wide as those of independent ones"
+            said.append(f"neighbouring residuals are alike: the model or the recording is off; {widened}")
+        return said
+
+    _lines = lines
 
 
-def fit_recordings(
-    robot: Robot,
-    ranges: Mapping[str, tuple[float, float]],
-    recordings: Sequence[Recording],
-    progress: Progress = silent,
-) -> Fit:
-    """Fit constants within ranges, SI, by their paths: to each walk alone from several phases, then to all together.
+def identify_recorded(
+    robot: Robot, data: RecordedWalks, folder: Path, progress: Progress = silent
+) -> RecordedIdentification:
+    """Fit the free constants of a robot to recorded walks from files in a folder.
 
-    A direction that the data leave open ends near the constants of the robot.
+    Variances are those of linear residuals with the scatter that is left. Directions that the data leave open end near
+    the constants of the robot. Errors as of :class:`RecordedWalks`.
     """
-    alone = []
-    for at, each in enumerate(recordings):
-        progress(0.8 * at / len(recordings), f"phase of {each.name}")
-        alone.append(_alone(robot, ranges, each))
-    walks, count = _Walks(robot, ranges, recordings), len(ranges)
-    free = np.concatenate([np.median([each[:count] for each in alone], axis=0), *(each[count:] for each in alone)])
-    for part in range(_ROUNDS):
-        progress(0.8 + 0.2 * part / _ROUNDS, "all walks")
-        free, before = walks.fit(free, *_MOST)[1], walks.noise
-        off = walks.residuals(free)
-        numbers = sum(np.isfinite(each).sum() for each in off)
-        spread = [np.sqrt(np.nanmean(each**2) * numbers / (numbers - free.size)) for each in off]
-        walks.noise = before * spread
-        if np.abs(np.array(spread) - 1.0).max() < _SAME:
-            break
-    scaled, starts = walks.split(free)
-    slopes, size = walks.jacobian(free)[:-count], walks.high - walks.low
-    over_starts = slopes[:, count:] / np.maximum(np.linalg.norm(slopes[:, count:], axis=0), np.finfo(float).tiny)
-    own = slopes[:, :count] - over_starts @ np.linalg.lstsq(over_starts, slopes[:, :count], 1e-9)[0]
-    fitted = [each * noise + one.values for each, noise, one in zip(off, before, recordings, strict=True)]
-    alike = np.array([_alike(each) for each in off])
-    return Fit(walks.low + scaled * size, starts, walks.noise, alike, fitted, own / size)
-
-
-def _alone(robot: Robot, ranges: Mapping[str, tuple[float, float]], recording: Recording) -> Array:
-    """Scaled constants, phase and start of one walk: the best of fits to its first cycles goes on with the whole."""
-    count = int(np.searchsorted(recording.times, _CYCLES * robot.gait.period))
-    first = replace(recording, times=recording.times[:count], values=recording.values[:count])
-    short, whole = (_Walks(robot, ranges, [each]) for each in (first, recording))
-    given, start = short.scaled, _first_start(robot, recording)
-    fits = [short.fit(np.concatenate([given, [k / _PHASES], start]), *_ROUGH) for k in range(_PHASES)]
-    tried: list[tuple[float, Array]] = []
-    phases: list[float] = []
-    for _, free in sorted(fits, key=lambda fit: fit[0]):
-        away = [abs((free[given.size] - other + 0.5) % 1.0 - 0.5) for other in phases]
-        if len(tried) < _BEST and min(away, default=1.0) > _APART:
-            phases.append(free[given.size])
-            tried.append(whole.fit(free, *_MOST))
-    return min(tried, key=lambda fit: fit[0])[1]
-
-
-def _first_start(robot: Robot, recording: Recording) -> Array:
-    """Guess of the start of a walk: means over the first half of a cycle, for positions the chain nearest to these."""
-    times, values, period = recording.times, recording.values, robot.gait.period
-
-    def mean(begin: float) -> Array:
-        part = values[(times >= begin * period) & (times <= (begin + 0.5) * period)]
-        known = np.isfinite(part)
-        return np.where(
-            known.any(axis=0), np.where(known, part, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1), np.nan
-        )
-
-    joints, here = robot.body.modules - 1, mean(0.0)
-    if not recording.modules:
-        return np.nan_to_num(here)
-    places, known = here.reshape(-1, 2), np.isfinite(here)
-    ahead = np.nan_to_num(np.nanmean(mean(2.0).reshape(-1, 2) - places, axis=0))
-    guess = np.concatenate([np.zeros(joints), np.nanmean(places, axis=0), [np.arctan2(ahead[1], ahead[0])]])
-
-    def off(start: Array) -> Array:
-        computed = _centres(start[joints:], start[:joints], robot.module_length, recording.modules)
-        return np.append((computed - here)[known], _STEP * start[:joints])
-
-    return np.asarray(least_squares(off, guess).x)
-
-
-def _alike(residuals: Array) -> float:
-    """Sum over the autocorrelation of residuals up to its first zero, on both sides, shape (samples, columns)."""
-    centred, total = np.nan_to_num(residuals), 1.0
-    for lag in range(1, len(centred) // 2):
-        pairs = np.isfinite(residuals[lag:] * residuals[:-lag]).sum()
-        near = float((centred[lag:] * centred[:-lag]).sum()) / max(pairs, 1) / float(np.nanmean(residuals**2))
-        if near <= 0.0:
-            break
-        total += 2.0 * near
-    return total
+    walks = _Walks(robot, data.ranges(robot), data.recordings(robot, folder))
+    free, count = _fit(walks, progress), len(walks.ranges)
+    fitted, measured = walks.fitted(free), [each.angles for each in walks.recordings]
+    factor = max(_alike(one - other) for one, other in zip(fitted, measured, strict=True))
+    wide = float(stdtrit(np.isfinite(np.vstack(measured)).sum() / factor - free.size, 0.5 + 0.5 * CONFIDENCE))
+    covariance = factor * walks.covariance(free)
+    scatter, half = np.sqrt(np.diag(covariance)), wide * np.sqrt(np.diag(covariance))
+    ends = free[:count, None] + half[:, None] * [-1.0, 1.0]
+    spans = walks.low[:, None] + walks.size[:, None] * np.clip(ends, 0.0, 1.0)
+    best, constants = walks.with_constants(free[:count]), {}
+    for at, path in enumerate(walks.ranges):
+        text, *limits = (units.format(x, best.unit_of(path), digits=5) for x in (best.get(path), *spans[at].tolist()))
+        known, words = (spans[at].tolist(), " to ".join(limits)) if half[at] < _OPEN else (None, "left open")
+        constants[path] = {"value_si": best.get(path), "text": text, "interval_si": known, "interval_text": words}
+    sizes = walks.size / np.abs([best.get(path) or size for path, size in zip(walks.ranges, walks.size, strict=True)])
+    values, directions = np.linalg.eigh(covariance * np.outer(sizes, sizes))
+    changes = (wide * np.sqrt(np.abs(values)) * directions * np.where(directions.sum(axis=0) < 0.0, -1.0, 1.0)).T
+    found = {
+        "constants": constants,
+        "cut_by_the_range": [
+            path for path, each in zip(walks.ranges, ends, strict=True) if (np.clip(each, 0, 1) != each).any()
+        ],
+        "correlations": (covariance / np.outer(scatter, scatter)).tolist(),
+        "combinations": [
+            {
+                "changes": dict(zip(walks.ranges, each.tolist(), strict=True)),
+                "open": bool((np.abs(each) > _OPEN * sizes).any()),
+            }
+            for each in changes
+        ],
+        "scatter_rad": walks.scatter,
+        "variance_factor": factor,
+        "phases_of_the_first_samples_cycles": ((walks.starts(free)[:, 0] + _EARLIER) % 1.0).tolist(),
+    }
+    files = ", ".join(each.name for each in walks.recordings)
+    texts = {
+        path: f"identified from {files}; {CONFIDENCE:.0%}: {each['interval_text']}" for path, each in constants.items()
+    }
+    angles = {
+        name: (("sample", "joint"), np.vstack(each), {"units": "rad"})
+        for name, each in (("measured", measured), ("fitted", fitted))
+    }
+    coords = {
+        "time": ("sample", np.concatenate([each.times for each in walks.recordings]), {"units": "s"}),
+        "walk": ("sample", np.repeat(range(len(measured)), [len(each) for each in measured])),
+    }
+    best = best.with_(provenance={**best.provenance, **texts})
+    return RecordedIdentification(best, found, xr.Dataset(angles, coords))
 
 
 class _Walks:
-    """Residuals of recordings and their derivatives; unknowns are constants in units of their ranges, from the least
-    on, then phase and start of each walk."""
+    """Residuals of recorded walks over their scatter, and derivatives.
+
+    Unknown are the constants in units of their ranges, from the least value on, then the phase of the gait at the start
+    of each walk, cycles, and its joint angles there, rad.
+    """
 
     def __init__(
         self, robot: Robot, ranges: Mapping[str, tuple[float, float]], recordings: Sequence[Recording]
     ) -> None:
-        self._robot, self._paths, self._recordings = robot, list(ranges), list(recordings)
-        self.low, self.high = np.array(list(ranges.values())).T
-        given = np.array([robot.get(path) for path in self._paths])
-        self.scaled: Array = np.clip((given - self.low) / (self.high - self.low), 0.0, 1.0)
-        self.noise = np.array([_SCATTER * (robot.module_length if each.modules else 1.0) for each in recordings])
-
-    def split(self, free: Array) -> tuple[Array, list[Array]]:
-        """Scaled constants, and phase and start of each walk."""
-        count, joints = len(self._paths), self._robot.body.modules - 1
-        sizes = [1 + joints + (3 if each.modules else 0) for each in self._recordings]
-        return free[:count], np.split(free[count:], np.cumsum(sizes)[:-1])
+        self.robot, self.ranges, self.recordings, self.scatter = robot, ranges, recordings, _SCATTER
+        self.low, high = np.array(list(ranges.values())).T
+        self.size = high - self.low
+        self.given: Array = np.clip(([robot.get(path) for path in ranges] - self.low) / self.size, 0.0, 1.0)
 
     def with_constants(self, scaled: Array) -> Robot:
-        robot = self._robot
-        for path, value in zip(self._paths, self.low + scaled * (self.high - self.low), strict=True):
+        robot = self.robot
+        for path, value in zip(self.ranges, self.low + scaled * self.size, strict=True):
             robot = robot.with_value(path, float(value))
         return robot
 
-    def residuals(self, free: Array) -> list[Array]:
-        """Residuals of each walk over its noise, NaN in gaps."""
-        scaled, starts = self.split(free)
-        robot, each = self.with_constants(scaled), zip(self._recordings, starts, self.noise, strict=True)
-        return [
-            (_values(one, [robot.set_from_text(one.settings)], start[None])[:, 0] - one.values) / noise
-            for one, start, noise in each
-        ]
+    def starts(self, free: Array) -> Array:
+        """Phase and joint angles at the start of each walk, shape (walks, N)."""
+        return free[self.given.size :].reshape(len(self.recordings), -1)
 
-    def __call__(self, free: Array) -> Array:
+    def fitted(self, free: Array) -> list[Array]:
+        """Computed angles of each walk, rad, shape (samples, N-1)."""
+        robot, walks = (
+            self.with_constants(free[: self.given.size]),
+            zip(self.recordings, self.starts(free), strict=True),
+        )
+        return [_angles(each, [robot], start[None])[:, 0] for each, start in walks]
+
+    def residuals(self, free: Array) -> Array:
         """Residuals in a row, then the constants less those of the robot: a weak prior on what the data leave open."""
-        known = [each[np.isfinite(each)] for each in self.residuals(free)]
-        return np.concatenate([*known, free[: self.scaled.size] - self.scaled])
+        off = [each - one.angles for each, one in zip(self.fitted(free), self.recordings, strict=True)]
+        known = np.concatenate([each[np.isfinite(each)] for each in off])
+        return np.append(known / self.scatter, free[: self.given.size] - self.given)
 
     def jacobian(self, free: Array) -> Array:
         """Forward differences, backward in the upper half of a range, shape (residuals, unknowns)."""
-        scaled, starts = self.split(free)
-        count, column = scaled.size, scaled.size
-        steps = np.where(scaled < 0.5, _STEP, -_STEP)
-        robots = [self.with_constants(scaled + move) for move in np.vstack([np.zeros(count), np.diag(steps)])]
-        rows = []
-        for one, start, noise in zip(self._recordings, starts, self.noise, strict=True):
-            own, size = [robot.set_from_text(one.settings) for robot in robots], start.size
-            moved = np.vstack([np.tile(start, (count + 1, 1)), start + _STEP * np.eye(size)])
-            values = np.moveaxis(_values(one, [*own, *own[:1] * size], moved), 1, 2)[np.isfinite(one.values)]
-            slopes = (values[:, 1:] - values[:, :1]) / np.append(steps, np.full(size, _STEP)) / noise
-            rows.append(np.zeros((len(slopes), free.size)))
-            rows[-1][:, :count], rows[-1][:, column : column + size] = slopes[:, :count], slopes[:, count:]
-            column += size
-        return np.vstack([*rows, np.eye(count, free.size)])
+        count, starts = self.given.size, self.starts(free)
+        steps = np.where(free < 0.5, _STEP, -_STEP)
+        robots = [self.with_constants(free[:count] + move) for move in np.diag(steps[:count])]
+        here, blocks, each = self.with_constants(free[:count]), [], starts.shape[1]
+        for at, one in enumerate(self.recordings):
+            own = slice(count + at * each, count + (at + 1) * each)
+            moved = starts[at] + np.vstack([np.zeros((count + 1, each)), np.diag(steps[own])])
+            angles = _angles(one, [here, *robots, *[here] * each], moved)
+            slopes = np.moveaxis(angles[:, 1:] - angles[:, :1], 1, 2)[np.isfinite(one.angles)] / self.scatter
+            blocks.append(np.zeros((len(slopes), free.size)))
+            blocks[-1][:, :count], blocks[-1][:, own] = (
+                slopes[:, :count] / steps[:count],
+                slopes[:, count:] / steps[own],
+            )
+        return np.vstack([*blocks, np.eye(count, free.size)])
+
+    def covariance(self, free: Array) -> Array:
+        """Covariance of the constants in units of their ranges, with the weak prior."""
+        slopes = self.jacobian(free)
+        sizes = np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
+        spread = np.linalg.pinv(slopes / sizes, 1e-9) / sizes[:, None]
+        return (spread @ spread.T)[: self.given.size, : self.given.size]
 
     def fit(self, free: Array, change: float, most: int) -> tuple[float, Array]:
         """Half the sum of squares, and the unknowns, by least squares from a start."""
-        ends = np.where(np.arange(free.size) < self.scaled.size, [[0.0], [1.0]], [[-np.inf], [np.inf]])
-        start = np.clip(free, ends[0] + 1e-6, ends[1] - 1e-6)
-        found = least_squares(self, start, self.jacobian, ends, x_scale="jac", ftol=change, max_nfev=most)
+        ends = np.where(np.arange(free.size) < self.given.size, [[0.0], [1.0]], [[-np.inf], [np.inf]])
+        start = np.clip(free, ends[0] + _STEP, ends[1] - _STEP)
+        found = least_squares(self.residuals, start, self.jacobian, ends, x_scale="jac", ftol=change, max_nfev=most)
         return float(found.cost), np.asarray(found.x)
 
 
-def _values(recording: Recording, robots: Sequence[Robot], starts: Array) -> Array:
-    """Computed values of a recording, shape (samples, walks, columns), of a robot and a phase and start each."""
-    out = np.empty((recording.times.size, len(robots), recording.values.shape[1]))
-    together: dict[tuple[object, float], list[int]] = {}
-    for at, (robot, start) in enumerate(zip(robots, starts, strict=True)):
-        together.setdefault((robot.gait, float(start[0])), []).append(at)
-    for (_, phase), walks in together.items():
-        own, joints = [robots[at] for at in walks], robots[0].body.modules - 1
-        states = initial_states(own[0], starts[walks, 1 : joints + 1])
-        if recording.modules:
-            states[:, -3:] = starts[walks, joints + 1 :]
-        begin = (phase % 1.0) * own[0].gait.period
-        times = begin + _EARLIER * own[0].gait.period + recording.times
-        walked = states_at([PlanarModel(robot) for robot in own], states, begin, times, _TOLERANCE)
-        angles = walked[..., 3 : joints + 3]
-        lengths = np.array([robot.module_length for robot in own])[:, None, None]
-        out[:, walks] = _centres(walked[..., -3:], angles, lengths, recording.modules) if recording.modules else angles
+def _fit(walks: _Walks, progress: Progress) -> Array:
+    """Unknowns fitted to each walk alone, then to all together, twice, with the scatter that the first fit leaves."""
+    alone, count = [], walks.given.size
+    for at, each in enumerate(walks.recordings):
+        progress(0.8 * at / len(walks.recordings), f"phase of {each.name}")
+        alone.append(_alone(walks, each))
+    free = np.append(np.median(alone, axis=0)[:count], np.array(alone)[:, count:])
+    for part in range(2):
+        progress(0.8 + 0.1 * part, "all walks")
+        free = walks.fit(free, *_FINE)[1]
+        off = walks.residuals(free)[:-count]
+        walks.scatter *= float(np.linalg.norm(off) / np.sqrt(off.size - free.size))
+    return free
+
+
+def _alone(walks: _Walks, recording: Recording) -> Array:
+    """Unknowns of one walk: the best fit to its first cycles from several phases goes on with the whole, and so does
+    the same half a cycle later, where left and right legs have changed places."""
+    period, count = walks.robot.gait.period, walks.given.size
+    end = int(np.searchsorted(recording.times, _CYCLES * period))
+    first = replace(recording, times=recording.times[:end], angles=recording.angles[:end])
+    short, whole = (_Walks(walks.robot, walks.ranges, [each]) for each in (first, recording))
+    early = recording.angles[recording.times <= 0.5 * period]
+    start = np.nan_to_num(early).sum(axis=0) / np.maximum(np.isfinite(early).sum(axis=0), 1)
+    guesses = [np.concatenate([walks.given, [k / _PHASES], start]) for k in range(_PHASES)]
+    _, best = min((short.fit(each, *_ROUGH) for each in guesses), key=lambda fit: fit[0])
+    half_later = best + 0.5 * np.eye(best.size)[count]
+    return min((whole.fit(each, *_FINE) for each in (best, half_later)), key=lambda fit: fit[0])[1]
+
+
+def _alike(residuals: Array) -> float:
+    """Factor by which residuals, shape (samples, N-1), enlarge variances where neighbouring ones are alike: the sum of
+    their autocorrelation up to its first zero, on both sides."""
+    known, off, total = np.isfinite(residuals), np.nan_to_num(residuals), 1.0
+    for lag in range(1, len(off) // 2):
+        near = (off[lag:] * off[:-lag]).sum() / max((known[lag:] & known[:-lag]).sum(), 1)
+        if near <= 0.0:
+            break
+        total += 2.0 * float(near / (off**2).sum() * known.sum())
+    return total
+
+
+def _angles(recording: Recording, robots: Sequence[Robot], starts: Array) -> Array:
+    """Computed angles, rad, shape (samples, walks, N-1), of a robot and a phase and start for each walk."""
+    out = np.empty((recording.times.size, len(robots), starts.shape[1] - 1))
+    models = [PlanarModel(robot.set_from_text(recording.settings)) for robot in robots]
+    for gait, phase in {(model.robot.gait, phase) for model, phase in zip(models, starts[:, 0].tolist(), strict=True)}:
+        at = [k for k, model in enumerate(models) if model.robot.gait == gait and starts[k, 0] == phase]
+        begin, states = phase % 1.0 * gait.period, initial_states(models[at[0]].robot, starts[at, 1:])
+        times = begin + _EARLIER * gait.period + recording.times
+        states = states_at([models[k] for k in at], states, begin, times, _TOLERANCE)
+        out[:, at] = states[..., 3 : starts.shape[1] + 2]
     return np.nan_to_num(out, nan=_FAR)
-
-
-def _centres(poses: Array, angles: Array, length: Array | float, modules: Sequence[int]) -> Array:
-    """Positions x and y of some modules in a row, m, shape (..., 2 * modules), from poses and joint angles."""
-    centres = module_centres(poses[..., :2], module_headings(poses[..., 2], angles), length)
-    return centres[..., np.array(modules) - 1, :].reshape(*poses.shape[:-1], -1)
