@@ -19,7 +19,7 @@ from chilopod.errors import ParameterError
 if TYPE_CHECKING:
     from chilopod.output import Content
     from chilopod.robot import Robot
-    from chilopod.tasks.identify import NextMeasurements, SelfTest
+    from chilopod.tasks.identify import NextMeasurements, RecordedWalks, SelfTest
 
 app = new_app("Find constants of a model from measured or printed numbers.")
 
@@ -53,9 +53,19 @@ def planar(options: _PlanarOptions) -> None:
     data are the numbers that the paper prints, or your own. --next ranks measurements by what they would leave of the
     uncertainty. --check makes up N robots around the answer and counts how often the ranges cover their constants.
 
+    If FILE names recorded walks (joint angles over time, CSV or netCDF), any constants that it calls free are fitted to
+    these, with 90 % intervals and the combinations that the walks leave open. --template shows both kinds of file.
+
     Example: chilopod identify planar --data mine.toml --out identification
     """
-    from chilopod.tasks.identify import TEMPLATE, CriticalMode, identify_planar, next_measurements, self_test
+    from chilopod.tasks.identify import (
+        TEMPLATE,
+        RecordedWalks,
+        identify_planar,
+        load_data,
+        next_measurements,
+        self_test,
+    )
 
     data, out = options.data, options.out
     if options.template:
@@ -69,8 +79,10 @@ def planar(options: _PlanarOptions) -> None:
     from chilopod.show.figures import identification
     from chilopod.show.files import panel_files
 
-    measured, variants = (critical_mode_data(), variant_settings()) if data is None else (CriticalMode.load(data), {})
-
+    measured, variants = (critical_mode_data(), variant_settings()) if data is None else (load_data(data), {})
+    if isinstance(measured, RecordedWalks):
+        _recorded(options, measured)
+        return
     free([*files_of("identification", out), *_identified(out)], options.force)
     with progress_bar("identification") as progress:
         found = identify_planar(described, measured, options.points, variants, partial(progress, "identification"))
@@ -86,6 +98,24 @@ def planar(options: _PlanarOptions) -> None:
     ]
     result = {"robot": described.name, **found.as_json(), **{name: each.as_json() for name, each in more.items()}}
     _deliver(options, out, result, found.best, lines, panel_files(identification.panel(found), out, out))
+
+
+def _recorded(options: _PlanarOptions, data: RecordedWalks) -> None:
+    from chilopod.show import files_of
+    from chilopod.show.figures import identification
+    from chilopod.show.files import panel_files
+    from chilopod.tasks.identify import identify_recorded
+
+    for name, given in (("--next", options.measure), ("--check", options.check)):
+        if given:
+            raise ParameterError("must not be given with recorded walks", field=name)
+    robot, out, folder = options.described, options.out, (options.data or Path()).parent
+    free([*files_of("identification", out), *_identified(out)], options.force)
+    with progress_bar("identification") as progress:
+        found = identify_recorded(robot, data, folder, partial(progress, "identification"))
+    lines = [*found.lines(), f"walks, figure and robot file are in {out}"]
+    files = panel_files(identification.recorded(found), out, out)
+    _deliver(options, out, {"robot": robot.name, **found.as_json()}, found.best, lines, files)
 
 
 @dataclass(frozen=True)

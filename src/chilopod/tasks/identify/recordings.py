@@ -13,6 +13,8 @@ from chilopod import units
 from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
+from chilopod.robot.files import described, parsed
+from chilopod.tasks.identify.data import CriticalMode
 from chilopod.text_file import read_text
 from chilopod.units import Description
 
@@ -49,6 +51,12 @@ class RecordedWalks(Description):
     def recordings(self, robot: Robot, folder: Path) -> list[Recording]:
         """Walks of a robot from files in a folder; RobotFileError, in one line, names file and fault."""
         return [_read(each, robot.set_from_text(each.settings), folder / each.file) for each in self.trajectory]
+
+
+def load_data(path: str | Path) -> CriticalMode | RecordedWalks:
+    """Read a TOML file of data, see :data:`chilopod.tasks.identify.TEMPLATE`; RobotFileError, in one line, names the fault."""
+    table = parsed(read_text(path, "file of data", RobotFileError), str(path))
+    return described(RecordedWalks if {"free", "trajectory"} & {*table} else CriticalMode, table, str(path))
 
 
 @dataclass(frozen=True, eq=False)
