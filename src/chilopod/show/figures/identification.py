@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -71,11 +70,11 @@ def recorded(found: RecordedIdentification) -> Panel:
 def _draw_walk(walks: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(style.Layout("A", 5.0), style.Layout("A", 5.0), narrow)
     first = walks.isel(sample=walks.walk.values == 0)
-    for joint, color in zip(range(first.sizes["joint"]), cycle(style.CURVES)):  # noqa: B905  (colours repeat)
-        measured, fitted = (np.rad2deg(each.values[:, joint]) for each in (first.measured, first.fitted))
-        axes["A"].plot(first.time, measured, ".", markersize=2, color=color)
-        axes["A"].plot(first.time, fitted, color=color, label=f"joint {joint + 1}")
-    axes["A"].set(xlabel="time (s)", ylabel="joint angle (deg), measured and fitted")
+    for joint, angles in enumerate(np.rad2deg([first.fitted, first.measured]).T):
+        color = style.CURVES[joint % len(style.CURVES)]
+        axes["A"].plot(first.time, angles[:, 1], ".", markersize=2, color=color)
+        axes["A"].plot(first.time, angles[:, 0], color=color, label=f"joint {joint + 1}")
+    axes["A"].set(xlabel="time (s)", ylabel="joint angle (deg)")
     figure.legend(loc="outside upper left", ncols=3 if narrow else 6)
     return figure
 

@@ -40,13 +40,15 @@ class RecordedWalks(Description):
 
     def ranges(self, robot: Robot) -> dict[str, tuple[float, float]]:
         """Ranges of the free constants, SI; ParameterError, in one line, names the fault."""
-        read = {path: [robot.override(path, end).get(path) for end in ends] for path, ends in self.free.items()}
-        for path, (low, high) in read.items():
+        if not (self.free and self.trajectory):
+            raise ParameterError("must not be empty", field="trajectory" if self.free else "free")
+        read = {}
+        for path, ends in self.free.items():
+            low, high = (robot.override(path, end).get(path) for end in ends)
             if not low < high:
-                raise ParameterError("must rise", field=f"free.{path}", value=self.free[path])
-        if not (read and self.trajectory):
-            raise ParameterError("must not be empty", field="trajectory" if read else "free")
-        return {path: (low, high) for path, (low, high) in read.items()}
+                raise ParameterError("must rise", field=f"free.{path}", value=ends)
+            read[path] = (low, high)
+        return read
 
     def recordings(self, robot: Robot, folder: Path) -> list[Recording]:
         """Walks of a robot from files in a folder; RobotFileError, in one line, names file and fault."""
@@ -54,9 +56,10 @@ class RecordedWalks(Description):
 
 
 def load_data(path: str | Path) -> CriticalMode | RecordedWalks:
-    """Read a TOML file of data, see :data:`chilopod.tasks.identify.TEMPLATE`; RobotFileError, in one line, names the fault."""
-    table = parsed(read_text(path, "file of data", RobotFileError), str(path))
-    return described(RecordedWalks if {"free", "trajectory"} & {*table} else CriticalMode, table, str(path))
+    """Read a TOML file of data, see ``TEMPLATE``; RobotFileError, in one line, names the fault."""
+    table, source = parsed(read_text(path, "file of data", RobotFileError), str(path)), str(path)
+    recorded = {"free", "trajectory"} & {*table}
+    return described(RecordedWalks, table, source) if recorded else described(CriticalMode, table, source)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +92,8 @@ def _netcdf(path: Path) -> tuple[list[str], Array]:
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         problem = f"must be a netCDF file of one walk, with joint_angle over time and joint ({type(error).__name__})"
         raise RobotFileError(problem) from None
-    units_of = [f"[{each.attrs['units']}]" if "units" in each.attrs else "" for each in (data["time"], angles)]
-    names = [f"time {units_of[0]}", *(f"joint {joint + 1} {units_of[1]}" for joint in range(angles.sizes["joint"]))]
-    return names, np.column_stack([data["time"].values, angles.values])
+    time, joint = (f"{each.name} [{each.attrs.get('units', '')}]" for each in (data["time"], angles))
+    return [time, *[joint] * angles.sizes["joint"]], np.column_stack([data["time"].values, angles.values])
 
 
 def _csv(text: str) -> tuple[list[str], Array]:
@@ -110,7 +112,7 @@ def _sizes(names: list[str], unit: str | None) -> Array:
     """SI sizes of the units of columns, of which the first is time."""
     sizes = []
     for at, name in enumerate(names):
-        named = match[1] if (match := _UNIT.search(name)) else None
+        named = match[1] if (match := _UNIT.search(name)) else ""
         if at and named and unit and units.unit(named) != units.unit(unit):
             raise ParameterError(f"contradicts unit = {unit!r} in the file of data", field="column", value=name)
         used = units.unit(named or (unit if at else "s") or "")
