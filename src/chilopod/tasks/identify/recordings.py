@@ -75,8 +75,8 @@ class Recording:
 
 def _read(given: Trajectory, robot: Robot, path: Path) -> Recording:
     try:
-        is_netcdf = path.is_file() and path.open("rb").read(4).startswith((b"CDF", b"\x89HDF"))
-        names, table = _netcdf(path) if is_netcdf else _csv(read_text(path, "recording", RobotFileError, _LARGEST))
+        is_text = path.suffix.lower() not in (".nc", ".nc4")
+        names, table = _csv(read_text(path, "recording", RobotFileError, _LARGEST)) if is_text else _netcdf(path)
         return Recording(given.file, given.settings, *_checked(robot, table * _sizes(names, given.unit)))
     except ChilopodError as error:
         error.source = str(path)
