@@ -60,6 +60,8 @@ class RecordedIdentification(Shown):
             least = _SMALL * max(map(abs, each["changes"].values()))
             texts = [f"{path} {100.0 * x:+.2g} %" for path, x in each["changes"].items() if abs(x) > least]
             said.append(f"  {', '.join(texts)}{' (left open)' if each['open'] else ''}")
+        if not self.found["converged"]:
+            said.append(f"the search ended after {_FINE[1]} steps, before it converged")
         if (factor := self.found["variance_factor"]) > _ALIKE:
             wide = f"intervals are {np.sqrt(factor):.1f} times as wide as those of independent ones"
             said.append(f"neighbouring residuals are alike: the model or the recording is off; {wide}")
@@ -97,6 +99,7 @@ def identify_recorded(
         "combinations": [{"changes": one, "open": is_open} for one, is_open in zip(named, opens, strict=True)],
         "scatter_rad": scatter,
         "variance_factor": factor,
+        "converged": walks.converged,
     }
     files = ", ".join(each.name for each in walks.recordings)
     texts = {path: f"identified from {files}; 90 %: {each['interval_text']}" for path, each in constants.items()}
@@ -125,7 +128,7 @@ class _Walks:
     def __init__(
         self, robot: Robot, ranges: Mapping[str, tuple[float, float]], recordings: Sequence[Recording]
     ) -> None:
-        self.robot, self.ranges, self.recordings = robot, ranges, recordings
+        self.robot, self.ranges, self.recordings, self.converged = robot, ranges, recordings, False
         self.low, high = np.array(list(ranges.values())).T
         self.size: Array = high - self.low
         self.given: Array = np.clip(([robot.get(path) for path in ranges] - self.low) / self.size, 0.0, 1.0)
@@ -173,6 +176,7 @@ class _Walks:
             lambda here: self.residuals(here[None])[:, 0], start, self.jacobian, ends, x_scale="jac", ftol=change,
             max_nfev=most,
         )  # fmt: skip
+        self.converged = found.status > 0
         return float(found.cost), np.asarray(found.x)
 
 
