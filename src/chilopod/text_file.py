@@ -11,8 +11,8 @@ from chilopod.errors import ChilopodError
 _LARGEST: Final = 1_000_000
 
 
-def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
-    """Read a small text file, with bounded time and memory for any path.
+def read_text(path: str | Path, kind: str, refused: type[ChilopodError], largest: int = _LARGEST) -> str:
+    """Read a text file of at most so many bytes, with bounded time and memory for any path.
 
     Raises ``refused`` if the path is missing or not a regular file, or the file is too large, empty or not text;
     ``kind`` is the expected content, such as ``robot file``.
@@ -25,15 +25,15 @@ def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
             raise refused("is not a regular file", source=source)
         # Some virtual files of the system claim to be regular and block.
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
-            content = file.read(_LARGEST + 1) or b""
+            content = file.read(largest + 1) or b""
     except FileNotFoundError:
         raise refused("no such file", source=source) from None
     except (OSError, ValueError) as error:
         if isinstance(error, ChilopodError):
             raise
         raise refused(f"cannot be read ({getattr(error, 'strerror', None) or error})", source=source) from None
-    if len(content) > _LARGEST:
-        raise refused(f"too large for a {kind}", source=source, allowed=f"up to {_LARGEST} bytes")
+    if len(content) > largest:
+        raise refused(f"too large for a {kind}", source=source, allowed=f"up to {largest} bytes")
     if not content.strip():
         raise refused("the file is empty", source=source)
     try:

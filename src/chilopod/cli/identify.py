@@ -53,15 +53,18 @@ def planar(options: _PlanarOptions) -> None:
     data are the numbers that the paper prints, or your own. --next ranks measurements by what they would leave of the
     uncertainty. --check makes up N robots around the answer and counts how often the ranges cover their constants.
 
+    If FILE names recorded walks (joint angles over time, CSV or netCDF), any constants that it calls free are fitted to
+    these, with 90 % intervals and the combinations that the walks leave open. --template shows both kinds of file.
+
     Example: chilopod identify planar --data mine.toml --out identification
     """
-    from chilopod.tasks.identify import TEMPLATE, CriticalMode, identify_planar, next_measurements, self_test
+    from chilopod.tasks import identify
 
     data, out = options.data, options.out
     if options.template:
         if data is not None:
             raise ParameterError("must not be given with --template", field="--data", value=str(data))
-        typer.echo(TEMPLATE, nl=False)
+        typer.echo(identify.TEMPLATE, nl=False)
         return
     described = options.described
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
@@ -69,23 +72,27 @@ def planar(options: _PlanarOptions) -> None:
     from chilopod.show.figures import identification
     from chilopod.show.files import panel_files
 
-    measured, variants = (critical_mode_data(), variant_settings()) if data is None else (CriticalMode.load(data), {})
-
+    measured, variants = (critical_mode_data(), variant_settings()) if data is None else (identify.load_data(data), {})
     free([*files_of("identification", out), *_identified(out)], options.force)
+    more: dict[str, NextMeasurements | SelfTest] = {}
     with progress_bar("identification") as progress:
-        found = identify_planar(described, measured, options.points, variants, partial(progress, "identification"))
-        more: dict[str, NextMeasurements | SelfTest] = {}
-        if options.measure:
-            more["next"] = next_measurements(found, progress=partial(progress, "next measurements"))
-        if options.check:
-            more["check"] = self_test(found.best, measured, options.check, progress=partial(progress, "self-test"))
-    lines = [
-        *found.lines(),
-        *(line for each in more.values() for line in each.lines()),
-        f"profile, figure and robot file are in {out}",
-    ]
-    result = {"robot": described.name, **found.as_json(), **{name: each.as_json() for name, each in more.items()}}
-    _deliver(options, out, result, found.best, lines, panel_files(identification.panel(found), out, out))
+        step = partial(progress, "identification")
+        if isinstance(measured, identify.RecordedWalks):
+            if options.measure or options.check:
+                raise ParameterError("must not be given with recorded walks", field="--next, --check")
+            walked = identify.identify_recorded(described, measured, (data or Path()).parent, step)
+            lines, numbers, best, panel = walked.lines(), walked.found, walked.best, identification.recorded(walked)
+        else:
+            found = identify.identify_planar(described, measured, options.points, variants, step)
+            lines, numbers, best, panel = found.lines(), found.as_json(), found.best, identification.panel(found)
+            if options.measure:
+                more["next"] = identify.next_measurements(found, progress=partial(progress, "next measurements"))
+            if options.check:
+                step = partial(progress, "self-test")
+                more["check"] = identify.self_test(best, measured, options.check, progress=step)
+    lines += [*(line for each in more.values() for line in each.lines()), f"data, figure and robot file are in {out}"]
+    result = {"robot": described.name, **numbers, **{name: each.as_json() for name, each in more.items()}}
+    _deliver(options, out, result, best, lines, panel_files(panel, out, out))
 
 
 @dataclass(frozen=True)

@@ -322,7 +322,7 @@ def carry(
         numbers = np.repeat(interval, parts.size), sample.ravel()
         pieces = stretch.Pieces(*times, *numbers, first.schedule.contact, first.schedule.stroke)
         stretch.carry(
-            np.arange(count), pieces, _robots(models, count), tolerance, whole, np.zeros(count), status, record
+            np.arange(count), pieces, without_commands(models, count), tolerance, whole, np.zeros(count), status, record
         )
         if (status != stretch.WALKING).any():
             raise _diverged(t0, t1)
@@ -347,7 +347,7 @@ def _numbers(model: PlanarModel, interval: NDArray[np.intp]) -> tuple[Array, Arr
     return model.scalars[0].copy(), model.stiffness.copy(), model.damping.copy(), model.moments(interval)
 
 
-def _robots(models: Sequence[PlanarModel], count: int) -> stretch.Robots:
+def without_commands(models: Sequence[PlanarModel], count: int) -> stretch.Robots:
     """The models' robots without commands, one for all states or one each."""
 
     def each(values: Sequence[ArrayLike]) -> Array:

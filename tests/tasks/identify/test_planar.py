@@ -9,7 +9,7 @@ from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import TEMPLATE, CriticalMode, critical, planar, planar_fit
+from chilopod.tasks.identify import TEMPLATE, CriticalMode, critical, load_data, planar, planar_fit
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
@@ -91,13 +91,13 @@ def test_a_mode_is_a_direction():
 def test_the_template_is_read_as_the_papers_data(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(TEMPLATE)
-    assert CriticalMode.load(file) == DATA
+    assert load_data(file) == DATA
     file.write_text(TEMPLATE.replace("12 N*mm/deg", "50 N*mm/deg"))
     with pytest.raises(RobotFileError, match=r"mine.toml: between = .* two rising springs with k1 = 50 N"):
-        CriticalMode.load(file)
+        load_data(file)
     file.write_text(TEMPLATE.replace("component_tolerance", "component_tolerances"))
     with pytest.raises(RobotFileError, match="unknown key; did you mean 'component_tolerance'"):
-        CriticalMode.load(file)
+        load_data(file)
 
 
 def test_no_direction_changes_the_residuals_less_than_the_valley():

@@ -15,7 +15,7 @@ from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
-from chilopod.tasks.identify import Identification
+from chilopod.tasks.identify import Identification, RecordedIdentification
 
 _WIDE = style.Layout("ABC;DEF", 6.2)
 _NARROW = style.Layout("A;B;C;D;E;F", 17.0)
@@ -53,6 +53,30 @@ def panel(fit: Identification) -> Panel:
         ),
         data=data,
     )
+
+
+def recorded(found: RecordedIdentification) -> Panel:
+    """Measured and fitted joint angles of the first recorded walk."""
+    return Panel(
+        name="identification",
+        title="Recorded and computed walk",
+        draw=lambda narrow: _draw_walk(found.walks, narrow),
+        alt="Joint angles over time, dots as recorded and lines as computed, one colour for each joint.",
+        text=tuple(found.lines()),
+        data=found.walks,
+    )
+
+
+def _draw_walk(walks: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(style.Layout("A", 5.0), style.Layout("A", 5.0), narrow)
+    first = walks.isel(sample=walks.walk.values == 0)
+    for joint, angles in enumerate(np.rad2deg([first.fitted, first.measured]).T):
+        color = style.CURVES[joint % len(style.CURVES)]
+        axes["A"].plot(first.time, angles[:, 1], ".", markersize=2, color=color)
+        axes["A"].plot(first.time, angles[:, 0], color=color, label=f"joint {joint + 1}")
+    axes["A"].set(xlabel="time (s)", ylabel="joint angle (deg)")
+    figure.legend(loc="outside upper left", ncols=3 if narrow else 6)
+    return figure
 
 
 def _valley(fit: Identification) -> str:

@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from chilopod.tasks.identify.data import TEMPLATE, BaseSeries, CriticalMode
     from chilopod.tasks.identify.measurements import Measurement, NextMeasurements, next_measurements
     from chilopod.tasks.identify.planar import Identification, identify_planar
+    from chilopod.tasks.identify.recordings import RecordedWalks, load_data
+    from chilopod.tasks.identify.trajectories import RecordedIdentification, identify_recorded
     from chilopod.tasks.identify.twin import TwinIdentification, identify_twin
 else:
     __getattr__, __dir__ = exports(
@@ -17,6 +19,8 @@ else:
             "data": ("TEMPLATE", "BaseSeries", "CriticalMode"),
             "measurements": ("Measurement", "NextMeasurements", "next_measurements"),
             "planar": ("Identification", "identify_planar"),
+            "recordings": ("RecordedWalks", "load_data"),
+            "trajectories": ("RecordedIdentification", "identify_recorded"),
             "check": ("SelfTest", "self_test"),
             "twin": ("TwinIdentification", "identify_twin"),
         },
@@ -29,10 +33,14 @@ __all__ = [
     "Identification",
     "Measurement",
     "NextMeasurements",
+    "RecordedIdentification",
+    "RecordedWalks",
     "SelfTest",
     "TwinIdentification",
     "identify_planar",
+    "identify_recorded",
     "identify_twin",
+    "load_data",
     "next_measurements",
     "self_test",
 ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Annotated, Final, Self
 
 import numpy as np
@@ -13,7 +12,6 @@ from pydantic import model_validator
 from chilopod import units
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
-from chilopod.robot.files import read_file
 from chilopod.units import Description, Quantity
 
 _STIFFNESS: Final = Quantity("N*m/rad", "N*mm/deg")
@@ -27,8 +25,17 @@ k1_tolerance = "0.5 N*mm/deg"     # largest error of k1
 between = ["4 N*mm/deg", "40 N*mm/deg"]     # interval of k1 in which the walk loses its stability once
 components = [0.64, 0.36, 0.48, 0.46, 0.16]     # joint angles front to rear, of unit norm; the sign is free
 component_tolerance = 0.005     # largest error of each
+
+# Or recorded walks in place of all these: joint angles over time, first column time, gaps empty. Any constants of the
+# robot may be free, each in a range; settings are numbers of the robot in one walk.
+# [free]
+# "ground.friction" = ["100 N*s/m", "500 N*s/m"]
+# "legs.forward_offset" = ["0 mm", "100 mm"]
+# [[trajectory]]
+# file = "walk.csv"     # names of columns such as: time [s], joint 1 [deg], joint 2 [deg]; or .nc of chilopod walk
+# settings = ["springs.stiffness[0]=9 N*mm/deg"]
 """
-"""Template of the file that :meth:`CriticalMode.load` reads."""
+"""Template of the file that :func:`load_data` reads."""
 
 
 class CriticalMode(Description):
@@ -49,11 +56,6 @@ class CriticalMode(Description):
     between: Annotated[tuple[float, ...], replace(_STIFFNESS, each=True)]
     components: Annotated[tuple[float, ...], Quantity("", "", at_least=-10.0, at_most=10.0, each=True)]
     component_tolerance: Annotated[float, Quantity("", "")]
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a TOML file of the data, see :data:`TEMPLATE`; RobotFileError, in one line, names the fault."""
-        return read_file(cls, path, "file of data")
 
     @model_validator(mode="after")
     def _is_a_critical_mode(self) -> Self:

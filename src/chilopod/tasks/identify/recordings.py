@@ -1,0 +1,144 @@
+"""Recorded walks as data for the identification of constants: joint angles over time, with gaps."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from chilopod import units
+from chilopod.errors import ChilopodError, ParameterError, RobotFileError
+from chilopod.frozen import Array
+from chilopod.robot import Robot
+from chilopod.robot.files import described, parsed
+from chilopod.tasks.identify.data import CriticalMode
+from chilopod.text_file import read_text
+from chilopod.units import Description
+
+_LARGEST, _LONGEST = 50_000_000, 3600.0  # bytes, s
+_CYCLES, _NUMBERS = 5, 100  # of the gait, and angles, which a recording must have
+_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
+
+
+class Trajectory(Description):
+    """File with a recorded walk, the unit of its angles where it names none, and numbers of the robot in this walk,
+    such as ``springs.stiffness[0]=8 N*mm/deg``."""
+
+    file: str
+    unit: str | None = None
+    settings: tuple[str, ...] = ()
+
+
+class RecordedWalks(Description):
+    """Data: recorded walks of one robot, and least and largest value of each constant that is free, by its path."""
+
+    free: dict[str, tuple[float | str, float | str]]
+    trajectory: tuple[Trajectory, ...]
+
+    def ranges(self, robot: Robot) -> dict[str, tuple[float, float]]:
+        """Ranges of the free constants, SI; ParameterError, in one line, names the fault."""
+        if not (self.free and self.trajectory):
+            raise ParameterError("must not be empty", field="trajectory" if self.free else "free")
+        read = {}
+        for path, ends in self.free.items():
+            low, high = (robot.override(path, end).get(path) for end in ends)
+            if not low < high:
+                raise ParameterError("must rise", field=f"free.{path}", value=ends)
+            read[path] = (low, high)
+        return read
+
+    def recordings(self, robot: Robot, folder: Path) -> list[Recording]:
+        """Walks of a robot from files in a folder; RobotFileError, in one line, names file and fault."""
+        return [_read(each, robot.set_from_text(each.settings), folder / each.file) for each in self.trajectory]
+
+
+def load_data(path: str | Path) -> CriticalMode | RecordedWalks:
+    """Read a TOML file of data, see ``TEMPLATE``; RobotFileError, in one line, names the fault."""
+    table, source = parsed(read_text(path, "file of data", RobotFileError), str(path)), str(path)
+    recorded = {"free", "trajectory"} & {*table}
+    return described(RecordedWalks, table, source) if recorded else described(CriticalMode, table, source)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Recorded walk: name of the file, numbers of the robot in this walk, times from the first sample on, s, shape
+    (samples,), and joint angles, rad, NaN in gaps, shape (samples, N-1)."""
+
+    name: str
+    settings: tuple[str, ...]
+    times: Array
+    angles: Array
+
+
+def _read(given: Trajectory, robot: Robot, path: Path) -> Recording:
+    try:
+        is_text = path.suffix.lower() not in (".nc", ".nc4")
+        names, table = _csv(read_text(path, "recording", RobotFileError, _LARGEST)) if is_text else _netcdf(path)
+        return Recording(given.file, given.settings, *_checked(robot, table * _sizes(names, given.unit)))
+    except ChilopodError as error:
+        error.source = str(path)
+        raise
+
+
+def _netcdf(path: Path) -> tuple[list[str], Array]:
+    """Names of columns and the columns of a netCDF file of one walk."""
+    try:
+        data = xr.load_dataset(path, decode_times=False)
+        data = data.squeeze("robot") if "robot" in data.dims else data
+        angles = data["joint_angle"].transpose("time", "joint")
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        problem = f"must be a netCDF file of one walk, with joint_angle over time and joint ({type(error).__name__})"
+        raise RobotFileError(problem) from None
+    time, joint = (f"{each.name} [{each.attrs.get('units', '')}]" for each in (data["time"], angles))
+    return [time, *[joint] * angles.sizes["joint"]], np.column_stack([data["time"].values, angles.values])
+
+
+def _csv(text: str) -> tuple[list[str], Array]:
+    """Names of columns in the first line, and the columns."""
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")] or [""]
+    names, *rows = ([cell.strip(' "') for cell in line.split(max(",;\t", key=lines[0].count))] for line in lines)
+    try:
+        table = np.array([[float(cell or "nan") for cell in row] for row in rows]).reshape(len(rows), len(names))
+    except ValueError as error:
+        problem = f"must be a line of names, then lines of as many numbers, empty in gaps ({error})"
+        raise RobotFileError(problem) from None
+    return names, table
+
+
+def _sizes(names: list[str], unit: str | None) -> Array:
+    """SI sizes of the units of columns, of which the first is time."""
+    sizes = []
+    for at, name in enumerate(names):
+        named = match[1] if (match := _UNIT.search(name)) else ""
+        if at and named and unit and units.unit(named) != units.unit(unit):
+            raise ParameterError(f"contradicts unit = {unit!r} in the file of data", field="column", value=name)
+        used = units.unit(named or (unit if at else "s") or "")
+        if used.dimension != units.unit("rad" if at else "s").dimension:
+            allowed = "time and joint angles, with a unit such as [deg] in the name of the column, or the key unit"
+            raise ParameterError("must have a unit of its kind", field="column", value=name, allowed=allowed)
+        sizes.append(float(used.size))
+    return np.array(sizes)
+
+
+def _checked(robot: Robot, table: Array) -> tuple[Array, Array]:
+    """Times from the first sample on, and joint angles."""
+    joints, times, angles = robot.body.modules - 1, table[:, 0], np.where(np.isfinite(table), table, np.nan)[:, 1:]
+    if angles.shape[1] != joints:
+        problem = f"must be {joints} besides time, one for each joint of {robot.name}"
+        raise ParameterError(problem, field="columns", value=angles.shape[1])
+    if not (np.diff(times) > 0.0).all():
+        at = int((np.diff(times) > 0.0).argmin())
+        raise ParameterError("must rise", field="times", value=times[at : at + 2].tolist())
+    known = np.isfinite(angles)
+    if (largest := np.abs(angles[known]).max(initial=0.0)) > 0.5 * np.pi:
+        allowed = "joint angles up to 90 deg; if these are degrees, say so by the unit deg"
+        raise ParameterError("too large", field="angle", value=f"{largest:.4g} rad", allowed=allowed)
+    times, angles = times[known.any(axis=1)], angles[known.any(axis=1)]
+    least, span = _CYCLES * robot.gait.period, float(np.ptp(times)) if times.size else 0.0
+    if not least <= span <= _LONGEST or known.sum() < _NUMBERS:
+        allowed = f"{least:g} s ({_CYCLES} cycles of the gait) to {_LONGEST:g} s, and {_NUMBERS} angles"
+        raise ParameterError("too short or too long", value=f"{known.sum()} angles in {span:.4g} s", allowed=allowed)
+    return times - times[0], angles

@@ -1,0 +1,133 @@
+"""The planar model's constants from recorded walks."""
+
+import json
+
+import numpy as np
+import pytest
+
+from chilopod.cli import main
+from chilopod.errors import ChilopodError
+from chilopod.netcdf import netcdf
+from chilopod.planar import PlanarModel, initial_states, simulate
+from chilopod.planar.sampled import states_at
+from chilopod.robot import load_robot
+from chilopod.tasks.identify import RecordedWalks, identify_recorded, load_data, trajectories
+
+ROBOT = load_robot("aoi2022-planar")
+FREE = {"ground.friction": (100.0, 500.0), "legs.half_width": (0.03, 0.15), "legs.forward_offset": (0.0, 0.1)}
+SPRING = "springs.stiffness[0]=9 N*mm/deg"
+SOFT = ROBOT.set_from_text([SPRING])
+START = initial_states(SOFT, [0.3, 0.15, 0.15, 0.1, 0.05])
+
+
+def walked(robot, seconds, rate=20.0):
+    return simulate(robot, seconds, initial=START, rate=rate, tolerance=1e-9)
+
+
+def as_csv(times, angles, head="time [s]" + ",joint [deg]" * 5):
+    rows = [
+        ",".join("" if np.isnan(x) else f"{x:.4f}" for x in (t, *row)) for t, row in zip(times, angles, strict=True)
+    ]
+    return "\n".join([head, *rows])
+
+
+def data(*files, free=FREE, **more):
+    return RecordedWalks(free=free, trajectory=[{"file": each, "settings": [SPRING], **more} for each in files])
+
+
+def test_states_at_any_times_are_those_of_a_simulation():
+    record = walked(SOFT, 2.0)
+    there = np.array([3, 6, 7, 40])  # 6 and 12 are switches of the gait
+    states = states_at([PlanarModel(SOFT)], np.repeat(START, 2, axis=0), 0.0, record.time.values[there], 1e-9)
+    for each in np.moveaxis(states, 1, 0):
+        np.testing.assert_allclose(each[:, 3:8], record.joint_angle.values[there, 0], atol=1e-8)
+
+
+def test_intervals_cover_the_constants_of_robots_that_are_recorded_from_any_moment(tmp_path):
+    covered = []
+    for seed in (1, 2):
+        rng, robot = np.random.default_rng(seed), SOFT
+        for path in FREE:
+            robot = robot.with_value(path, ROBOT.get(path) * 1.2 ** rng.uniform(-1.0, 1.0))
+        record = walked(robot, 40.0, 100.0).isel(time=slice(int(rng.integers(300)), None, 5))
+        angles = np.rad2deg(record.joint_angle.values[:, 0]) + rng.normal(0.0, 0.5, (record.time.size, 5))
+        angles[rng.uniform(size=angles.shape) < 0.1] = np.nan
+        rows = rng.uniform(size=len(angles)) > 0.1
+        (tmp_path / "walk.csv").write_text(as_csv(record.time.values[rows], angles[rows]))
+        found = identify_recorded(ROBOT, data("walk.csv"), tmp_path)
+        assert found.found["scatter_rad"] == pytest.approx(np.deg2rad(0.5), rel=0.05)
+        for path, each in found.found["constants"].items():
+            assert each["value_si"] == pytest.approx(robot.get(path), rel=0.01)
+            covered.append(each["interval_si"][0] <= robot.get(path) <= each["interval_si"][1])
+    assert sum(covered) >= 4  # by chance fewer of six in one of sixty
+
+
+def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):
+    robot = ROBOT.set_from_text(["springs.stiffness=12 N*mm/deg"])
+    record = walked(robot, 13.0).isel(time=slice(20, None))
+    record["joint_angle"] += np.random.default_rng(1).normal(0.0, 0.01, record.joint_angle.shape)
+    (tmp_path / "walk.nc").write_bytes(netcdf(record))
+    free = {"ground.friction": ("150 N*s/m", "350 N*s/m"), "springs.stiffness": ("8 N*mm/deg", "16 N*mm/deg")}
+    walks = RecordedWalks(free={**free, "body.mass": (2.0, 20.0)}, trajectory=[{"file": "walk.nc"}] * 2)
+    found = identify_recorded(robot, walks, tmp_path).found
+    known, _, wide = found["combinations"]
+    assert max(map(abs, known["changes"].values())) < 0.05
+    assert known["changes"]["ground.friction"] == pytest.approx(-known["changes"]["springs.stiffness"], rel=0.1)
+    assert wide["open"]
+    assert found["constants"]["body.mass"]["interval_text"] == "left open by the walks"
+
+
+def test_residuals_that_are_alike_enlarge_variances():
+    rng = np.random.default_rng(1)
+    off = rng.normal(size=(20000, 5))
+    assert trajectories._alike(off) == pytest.approx(1.0, abs=0.05)
+    for row in range(1, len(off)):
+        off[row] += 0.8 * off[row - 1]
+    off[rng.uniform(size=off.shape) < 0.2] = np.nan
+    assert trajectories._alike(off) == pytest.approx(9.0, rel=0.15)
+
+
+TIMES = 0.05 * np.arange(200)
+ANGLES = np.full((200, 5), 10.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "said"),
+    [
+        (as_csv(TIMES, np.nan * ANGLES), None, r"0 angles in 0 s.*allowed: 3 s \(5 cycles of the gait\)"),
+        (as_csv(TIMES[:30], ANGLES[:30]), None, "150 angles in 1.45 s"),
+        (as_csv(TIMES, ANGLES[:, :4], "time,a [deg],b [deg],c [deg],d [deg]"), None, "columns = 4: must be 5 besides"),
+        (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), "rad", "angle = '10 rad': too large.*degrees"),
+        (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), None, "column = 'a': must have a unit"),
+        (as_csv(TIMES, ANGLES, "time [deg],a,b,c,d,e"), "deg", r"column = 'time \[deg\]': must have a unit"),
+        (as_csv(TIMES, ANGLES), "rad", "contradicts unit = 'rad'"),
+        (as_csv(TIMES[::-1], ANGLES), None, r"times = \[9.95, 9.9\]: must rise"),
+        ('name = "aoi2022"\nstride = 1\n', None, "must be a line of names"),
+        ("\x89HDF and more", None, "is not a text file"),
+    ],
+)
+def test_a_recording_that_is_none_is_refused_in_one_line(tmp_path, text, unit, said):
+    (tmp_path / "walk.csv").write_bytes(text.encode("latin-1"))
+    with pytest.raises(ChilopodError, match=f"walk.csv: .*{said}"):
+        data("walk.csv", unit=unit).recordings(ROBOT, tmp_path)
+
+
+def test_ranges_are_read_with_units_and_must_rise():
+    with pytest.raises(ChilopodError, match=r"free.body.mass = .*: must rise"):
+        data("walk.csv", free={"body.mass": ("9 kg", "8 kg")}).ranges(ROBOT)
+
+
+def test_the_command_writes_walks_and_a_robot_with_its_intervals(capsys, tmp_path):
+    (tmp_path / "walk.nc").write_bytes(netcdf(walked(SOFT, 9.0).isel(time=slice(20, None))))
+    free = '[free]\n"ground.friction" = ["100 N*s/m", "500 N*s/m"]\n'
+    (tmp_path / "mine.toml").write_text(f'{free}[[trajectory]]\nfile = "walk.nc"\nsettings = ["{SPRING}"]\n')
+    assert isinstance(load_data(tmp_path / "mine.toml"), RecordedWalks)
+    arguments = ["identify", "planar", "--data", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out"), "--json"]
+    assert main([*arguments, "--next"]) == 2
+    assert main(arguments) == 0
+    found = json.loads(capsys.readouterr().out)
+    best = load_robot(tmp_path / "out" / "identified.toml")
+    assert best.get("ground.friction") == pytest.approx(246.5, rel=1e-4)
+    interval = found["constants"]["ground.friction"]["interval_text"]
+    assert best.provenance["ground.friction"] == f"identified from walk.nc; 90 %: {interval}"
+    assert (tmp_path / "out" / "identification.nc").exists()
