@@ -101,7 +101,6 @@ class _TwinOptions(RobotOptions):
     ] = 300
     samples: Annotated[int, typer.Option(metavar="N", help="Weighted samples of the valley.", min=1, max=200)] = 100
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.", min=0)] = 1
-    fresh: Annotated[bool, typer.Option("--fresh", help="Begin without the constants that are known.")] = False
 
 
 @app.command("twin", short_help="Constants of the 3-D robot from walks.")
@@ -128,12 +127,11 @@ def twin(options: _TwinOptions) -> None:
     counts = options.evaluations, options.samples
     with progress_bar("identification") as progress:
         kept, step = check_folder(out / "evaluations"), partial(progress, "identification")
-        found = identify_twin(described, measured, *counts, options.seed, kept, options.fresh, step)
+        found = identify_twin(described, measured, *counts, options.seed, kept, step)
     result = {"robot": described.name, **found.as_json()}
     lines = [
         *(
-            f"{name} = {value['text']}  (90 % of the valley: {value['interval_text']}; fits that meet all data: "
-            f"{value['good_fits_text']})"
+            f"{name} = {value['text']}  (90 % of the valley: {value['interval_text']})"
             for name, value in result["constants"].items()
         ),
         *found.words(),

@@ -8,7 +8,7 @@ from chilopod.paper.robot import structures
 from chilopod.paper.robot.figures import trust
 from chilopod.paper.robot.spread import LOWER
 from chilopod.paper.robot.structures import STRUCTURES
-from chilopod.tasks.identify.twin_constants import FREE
+from chilopod.tasks.identify.twin_data import FREE
 
 ROBOT = load_robot("aoi2022")
 STRIDE = "stride 1.8 cm"

@@ -9,7 +9,7 @@ from chilopod.errors import ChilopodError
 from chilopod.paper.fit_data import base_series_data
 from chilopod.tasks.identify import TWIN_TEMPLATE, BaseSeries, twin, twin_series
 from chilopod.tasks.identify.twin import TwinIdentification, known, search
-from chilopod.tasks.identify.twin_constants import FREE
+from chilopod.tasks.identify.twin_data import FREE
 from chilopod.tasks.identify.twin_series import Series, base_series, residuals
 
 ROBOT = load_robot("aoi2022")
@@ -59,7 +59,7 @@ def test_a_series_of_ones_own_is_fitted_as_well(tmp_path, monkeypatch):
     own = tmp_path / "own.toml"
     own.write_text(TWIN_TEMPLATE)
     template = BaseSeries.load(own)
-    assert template.free == FREE
+    assert template.free == DATA.free
     assert template.names == DATA.names
     other = template.model_copy(update={"curved": template.curved[1:], "radii": {stiffness(21.0): (0.9, 0.05)}})
     assert other.names == ("radius at 21", "speed at 21", "onset", "straight at 41", "straight at 75",
@@ -218,10 +218,7 @@ def test_a_valley_has_effective_samples_or_says_that_it_has_few(monkeypatch):
     assert 50.0 < found.samples.effective <= 100.0
     assert "effective samples of 100" in found.words()[1]
     assert "not reliable" not in found.words()[1]
-    ranges = found.ranges()
-    for path, (mean, low, high) in found.intervals().items():
-        assert low < mean < high
-        assert ranges[path][0] < high
+    assert all(low < mean < high for mean, low, high in found.intervals().values())
     fits = [fit for fit in found.fits if not fit.weight] + [fit for fit in found.fits if fit.weight][:10]
     assert "below 20 the intervals are not reliable" in TwinIdentification(ROBOT, found.data, fits).words()[1]
 
@@ -259,9 +256,8 @@ def test_a_fit_is_good_if_it_meets_every_datum_and_without_one_none_is_found():
     assert all((np.abs(fit.residuals) <= 1.0).all() for fit in found.good)
     worse = [fit for fit in fits if fit.largest > 1.0]
     none = TwinIdentification(ROBOT, DATA, worse)
-    assert none.ranges() == none.intervals() == {}
-    constant = none.as_json()["constants"]["legs.half_width"]
-    assert constant["good_fits_text"] == constant["interval_text"] == "none found"
+    assert none.intervals() == {}
+    assert none.as_json()["constants"]["legs.half_width"]["interval_text"] == "none found"
     (said,) = none.words()
     assert f"no evaluation of {len(worse)} meets every datum; the nearest misses the" in said
     assert f"by {min(fit.largest for fit in worse):.2f} standard errors" in said

@@ -25,7 +25,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks.identify.twin import known, samples_of
-from chilopod.tasks.identify.twin_constants import FREE
+from chilopod.tasks.identify.twin_data import FREE
 from chilopod.trials import NONE
 
 SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)

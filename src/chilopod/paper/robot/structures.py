@@ -31,8 +31,7 @@ from chilopod.paper.turning.trials import turning_task
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.twin import PRIOR
-from chilopod.tasks.identify.twin_constants import FREE
-from chilopod.tasks.identify.twin_data import BaseSeries
+from chilopod.tasks.identify.twin_data import FREE, BaseSeries
 from chilopod.tasks.identify.twin_series import DURATION, base_series, residuals
 
 PHASE, UNIFORM = "module phase 180 deg", "all springs alike"

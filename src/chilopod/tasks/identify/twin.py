@@ -31,8 +31,7 @@ from chilopod.frozen import Array, Short
 from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.tasks.identify.twin_constants import FREE
-from chilopod.tasks.identify.twin_data import BaseSeries
+from chilopod.tasks.identify.twin_data import FREE, BaseSeries
 from chilopod.tasks.identify.twin_series import DURATION, LOST, Series, base_series, residuals
 from chilopod.tasks.identify.valley import LEAST, Samples, Surrogate
 from chilopod.tasks.radius_law import DURATION as LONG
@@ -61,11 +60,6 @@ class Fit:
     parts: Array
     residuals: Array
     weight: float = 0.0
-
-    @property
-    def misfit(self) -> float:
-        """Root mean square of the residuals; below 1 some data may be off by more than their standard error."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
 
     @property
     def largest(self) -> float:
@@ -110,14 +104,6 @@ class TwinIdentification(Short):
         """The weighted samples of the valley."""
         return samples_of(self.fits)
 
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        """Smallest and largest value of each constant among the good fits, SI; empty if there is none."""
-        if not self.good:
-            return {}
-        values = np.array([self.data.free.values_at(fit.parts) for fit in self.good])
-        ends = zip(values.min(axis=0).tolist(), values.max(axis=0).tolist(), strict=True)
-        return dict(zip(self.data.free.paths, ends, strict=True))
-
     def intervals(self) -> dict[str, tuple[float, float, float]]:
         """Weighted mean of each constant and ends of its 90 % interval, SI; empty without a good fit or a sample."""
         samples = self.samples
@@ -129,36 +115,35 @@ class TwinIdentification(Short):
     def words(self) -> list[str]:
         """How many fits meet all data, or how near the nearest comes and which datum it misses; and how many effective
         samples the valley has."""
-        best, nearest, samples = self.fits[0], self.nearest, self.samples
-        said = f"largest residual {best.largest:.2f} (1: every datum within its error), misfit {best.misfit:.2f}; "
+        nearest, samples = self.nearest, self.samples
         if not self.good:
             missed = self.data.names[int(np.abs(nearest.residuals).argmax())]
             return [
-                f"{said}no evaluation of {len(self.fits)} meets every datum; the nearest misses the {missed} by "
+                f"no evaluation of {len(self.fits)} meets every datum; the nearest misses the {missed} by "
                 f"{nearest.largest:.2f} standard errors"
             ]
         valley = f"valley: {samples.effective:.0f} effective samples of {len(samples.weights)}"
         valley += f"; squared errors of the surrogate there are {self.misjudged:.2g} times those that it expected"
         if samples.effective < LEAST:
             valley += f"; below {LEAST:.0f} the intervals are not reliable: more --evaluations or --samples are needed"
-        return [f"{said}{len(self.good)} of {len(self.fits)} evaluations meet every datum", valley]
+        best = f"largest residual {self.fits[0].largest:.2f} (1: every datum within its error)"
+        return [f"{best}; {len(self.good)} of {len(self.fits)} evaluations meet every datum", valley]
 
     def as_json(self) -> dict[str, Any]:
-        """Constants with their intervals and the ranges of the good fits, and the good fits and samples of the valley,
-        as plain numbers and text."""
-        free, ranges, intervals = self.data.free, self.ranges(), self.intervals()
-        constants = {}
+        """Constants with their intervals, and the good fits and samples of the valley, as plain numbers and text."""
+        free, intervals, constants = self.data.free, self.intervals(), {}
         for path, value in zip(free.paths, free.values_at(self.fits[0].parts).tolist(), strict=True):
-            unit, span, interval = self.given.unit_of(path), ranges.get(path, ()), intervals.get(path, ())
-            constants[path] = {"value_si": value, "text": units.format(value, unit, digits=3)}
-            for name, ends in (("good_fits", span), ("interval", interval[1:])):
-                words = " to ".join(units.format(end, unit, digits=2) for end in ends)
-                constants[path] |= {f"{name}_si": list(ends) or None, f"{name}_text": words or "none found"}
-            constants[path]["mean_si"] = interval[0] if interval else None
+            unit, (mean, *ends) = self.given.unit_of(path), intervals.get(path, (None,))
+            constants[path] = {
+                "value_si": value,
+                "text": units.format(value, unit, digits=3),
+                "mean_si": mean,
+                "interval_si": ends or None,
+                "interval_text": " to ".join(units.format(end, unit, digits=2) for end in ends) or "none found",
+            }
         kept = [fit for fit in self.fits if fit.weight or fit.largest <= GOOD] or self.fits[:1]
         return {
             "constants": constants,
-            "misfit": self.fits[0].misfit,
             "largest_residual": self.fits[0].largest,
             "smallest_largest_residual": self.nearest.largest,
             "residuals": dict(zip(self.data.names, self.fits[0].residuals.tolist(), strict=True)),
@@ -169,7 +154,7 @@ class TwinIdentification(Short):
             "surrogate_squared_error": self.misjudged,
             "fits": [
                 {
-                    "constants": dict(zip(free.paths, free.values_at(fit.parts).tolist(), strict=True)),
+                    "constants": free.values_at(fit.parts).tolist(),
                     "residuals": fit.residuals.tolist(),
                     "weight": fit.weight,
                 }
@@ -218,8 +203,7 @@ def known() -> list[Fit]:
     their weights."""
     shipped = json.loads(files("chilopod.tasks.identify").joinpath("twin_fits.json").read_text(encoding="utf-8"))
     return [
-        Fit(FREE.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"])
-        for each in shipped["fits"]
+        Fit(FREE.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in shipped["fits"]
     ]
 
 
@@ -249,29 +233,10 @@ def search(
     """Evaluate constants in rounds, each drawn from what a surrogate of all before expects; then draw samples from the
     last surrogate and weight them.
 
-    Parameters
-    ----------
-    robot, data
-        Robot with the constants that are not fitted, and data of its walks.
-    starts
-        Constants that are evaluated first, in parts of their ranges; some spread evenly are added if there are few.
-    counts
-        Number of evaluations after these, and of samples of the valley.
-    seed
-        Seed of all draws.
-    folder
-        Folder of the evaluations; a stopped search resumes, because it repeats the same ones.
-    progress
-        Function that receives the progress.
-
-    Returns
-    -------
-    All evaluations, and the mean square error of the surrogate at the samples over that which it expected.
-
-    Raises
-    ------
-    AnalysisError
-        If the robot walks with none of the constants that are evaluated first.
+    ``starts`` are evaluated first, in parts of the ranges, and some that are spread evenly if there are few; ``counts``
+    are the numbers of evaluations after these and of samples. Evaluations are kept in ``folder``; a stopped search
+    resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the surrogate at
+    the samples over that which it expected. AnalysisError if the robot walks with none of the first constants.
     """
     rng = np.random.default_rng(seed)
     few = max(_FIRST - len(starts), 0)
@@ -289,35 +254,26 @@ def search(
         return found
 
     fits += evaluated([*starts, *spread])
-    surrogate, excess = _surrogate(fits), 1.0
+    if all(fit.largest >= LOST for fit in fits):
+        raise AnalysisError("must walk with some constants in their ranges", field="robot")
+    surrogate, excess = Surrogate(*_walked(fits)), 1.0
     while (missing := trained - len(fits)) > 0:
         found = evaluated(surrogate.draws(min(_ROUND, missing), rng))
-        excess *= float(np.clip(_misjudged(surrogate, found), 0.5, 2.0))
+        excess *= float(np.clip(surrogate.misjudged(*_walked(found)), 0.5, 2.0))
         fits += found
-        surrogate = _surrogate(fits, surrogate, excess)
+        surrogate = Surrogate(*_walked(fits), excess)
     found = evaluated(surrogate.draws(counts[1], rng))
     heights = surrogate.log_likelihood(np.array([fit.parts for fit in found]))
     logs = -0.5 * np.array([np.sum(fit.residuals**2) for fit in found]) - heights
     weights = np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum()
     fits += [replace(fit, weight=weight) for fit, weight in zip(found, weights.tolist(), strict=True)]
-    return fits, _misjudged(surrogate, found)
+    return fits, surrogate.misjudged(*_walked(found))
 
 
 def _walked(fits: Sequence[Fit]) -> tuple[Array, Array]:
     """Constants with which the robot walks, in parts of their ranges, and residuals."""
     walked = [fit for fit in fits if fit.largest < LOST]
     return np.array([fit.parts for fit in walked]), np.array([fit.residuals for fit in walked])
-
-
-def _surrogate(fits: Sequence[Fit], earlier: Surrogate | None = None, excess: float = 1.0) -> Surrogate:
-    parts, off = _walked(fits)
-    if not len(parts):
-        raise AnalysisError("must walk with some constants in their ranges", field="robot")
-    return Surrogate(parts, off, earlier, excess)
-
-
-def _misjudged(surrogate: Surrogate, fits: Sequence[Fit]) -> float:
-    return surrogate.misjudged(*_walked(fits))
 
 
 def identify_twin(
@@ -327,21 +283,19 @@ def identify_twin(
     samples: int = 100,
     seed: int = 1,
     folder: str | Path | None = None,
-    fresh: bool = False,
     progress: Progress = silent,
 ) -> TwinIdentification:
     """Identify the constants: a :func:`search` from the known sets, then the best of the good fits that reach the curve
     from a straight start, like the robot.
 
     ``evaluations`` and ``samples`` are the numbers of evaluations that train the surrogate and of samples of the
-    valley; ``fresh`` ignores the known sets; for the other arguments see :func:`search`.
+    valley; for the other arguments see :func:`search`.
     """
     engine_named("twin").common(robot)  # refuses a robot without a twin
     free = data.free
     for ends in (np.zeros(len(free.each)), np.ones(len(free.each))):
         free.robot_with(robot, free.values_at(ends))  # refuses numbers that the robot does not have
-    same = not fresh and free.paths == FREE.paths
-    places = [free.parts_of(FREE.values_at(fit.parts)) for fit in known()] if same else []
+    places = [free.parts_of(FREE.values_at(fit.parts)) for fit in known()] if free.paths == FREE.paths else []
     starts = [parts for parts in places if ((parts >= 0.0) & (parts <= 1.0)).all()]
     kept = None if folder is None else check_folder(folder)
     counts = evaluations, samples

@@ -105,22 +105,6 @@ class FreeConstants:
         return np.array([robot.get(path) for path in self.paths])
 
 
-FREE = FreeConstants(
-    (
-        Constant("legs.forward_offset", 0.02, 0.07),
-        Constant("legs.half_width", 0.05, 0.10),
-        Constant("springs.damping", 0.005, 0.1),
-        Constant("twin.sliding_friction", 0.3, 1.0),
-        Constant("twin.servo_stiffness", 3.0, 20.0),
-        Constant("twin.clearance", 0.003, 0.015),
-        Constant("twin.joint_inertia", 5e-4, 4e-3),
-        Constant("twin.impedance_ratio", 1.0, 30.0),
-        Constant("twin.servo_damping", 0.02, 0.15, per="twin.servo_stiffness"),  # a time, s
-    )
-)
-"""The constants that are fitted unless the data name others."""
-
-
 def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
     """Constant of an entry in a table of ranges, after others with some paths."""
     path, slash, per = (text.strip() for text in name.partition("/"))

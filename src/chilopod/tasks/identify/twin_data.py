@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.robot.files import read_file
-from chilopod.tasks.identify.twin_constants import FREE, FreeConstants
+from chilopod.tasks.identify.twin_constants import FreeConstants
 from chilopod.units import Description, Quantity
 
 _STIFFNESS: Final = Quantity("N*m/rad", PAPER_UNIT)
@@ -49,6 +50,9 @@ onset = ["34 N*mm/deg", "1.7 N*mm/deg"]     # by a square-root fit to the bend o
 "twin.servo_damping/twin.servo_stiffness" = ["0.02 s", "0.15 s"]
 """
 """Template of the file that :meth:`BaseSeries.load` reads."""
+
+FREE: Final = FreeConstants.read(tomllib.loads(TWIN_TEMPLATE)["free"])
+"""The constants that are fitted unless the data name others, and their ranges."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,14 +60,13 @@ class _Process:
     """Gaussian process of one number over parts of the constants' ranges: linear trend, smooth deviation with a length
     for each constant, noise (Rasmussen and Williams 2006, equations 2.25 and 5.9)."""
 
-    def __init__(self, parts: Array, values: Array, scales: Array) -> None:
+    def __init__(self, parts: Array, values: Array) -> None:
         self._parts, self._values = parts, values
         likely = np.r_[_SCALES, np.full(parts.shape[1], _LENGTH)]
         bounds = [(-5.0, 4.0), (-5.0, 2.0), *[(-2.5, 4.0)] * parts.shape[1]]
-        start = scales if len(scales) else likely
         # Logarithms of deviation, noise and lengths that the values make most likely, with a weak prior.
         self.scales = np.asarray(
-            minimize(self._unlikely, start, (likely,), jac=True, bounds=bounds, options={"maxiter": _MOST_STEPS}).x
+            minimize(self._unlikely, likely, (likely,), jac=True, bounds=bounds, options={"maxiter": _MOST_STEPS}).x
         )
         lower = cho_factor(self._covariance(parts, self.scales) + self._noise(self.scales), lower=True)[0]
         self._inverse = np.asarray(solve_triangular(lower, np.eye(len(parts)), lower=True))
@@ -106,20 +105,17 @@ class _Process:
 class Surrogate:
     """Gaussian processes of squashed residuals, shape (evaluations, residuals), over parts of the constants' ranges,
     shape (evaluations, constants). Residuals that are the same in all evaluations are left out. Variances are
-    multiplied by ``excess``. The search for scales begins at those of an earlier surrogate."""
+    multiplied by ``excess``."""
 
-    def __init__(self, parts: Array, residuals: Array, earlier: Surrogate | None = None, excess: float = 1.0) -> None:
+    def __init__(self, parts: Array, residuals: Array, excess: float = 1.0) -> None:
         self._parts, self._excess = parts, excess
         self._vary = np.flatnonzero(np.ptp(residuals, axis=0) > 0.0)
-        begin = {} if earlier is None else dict(zip(earlier._vary.tolist(), earlier._processes, strict=True))
-        self._processes = [
-            _Process(parts, _squashed(residuals[:, i]), begin[i].scales if i in begin else np.empty(0))
-            for i in self._vary.tolist()
-        ]
+        self._processes = [_Process(parts, _squashed(residuals[:, i])) for i in self._vary.tolist()]
 
     def __call__(self, parts: Array) -> tuple[Array, Array]:
         """Means and variances of the residuals that vary, shape (points, residuals) each."""
-        means, variances = np.array([each(parts) for each in self._processes]).transpose(1, 2, 0)
+        found = np.array([each(parts) for each in self._processes]).reshape(-1, 2, len(parts))
+        means, variances = found.transpose(1, 2, 0)
         return means, self._excess * variances
 
     def log_likelihood(self, parts: Array) -> Array:
@@ -151,7 +147,7 @@ class Surrogate:
 
     def misjudged(self, parts: Array, residuals: Array) -> float:
         """Mean square error at other evaluations, over that which the surrogate expects; 1 without any."""
-        if not len(parts):
+        if not (len(parts) and len(self._vary)):
             return 1.0
         means, variances = self(parts)
         return float(np.mean((_squashed(residuals[:, self._vary]) - means) ** 2 / variances))

@@ -21,7 +21,7 @@ from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
-from chilopod.tasks.identify.twin_constants import FREE
+from chilopod.tasks.identify.twin_data import FREE
 from chilopod.tasks.identify.valley import LEVEL, Samples
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
@@ -117,18 +117,15 @@ def spread(data: xr.Dataset) -> Panel:
     """Predictions over the valley."""
     ranges = []
     for path, unit in zip(data.constant.values, data.unit.values, strict=True):
-        low, high = (
-            units.format(each, str(unit), digits=2) for each in _over_valley(data.constants.sel(constant=path))
-        )
+        ends = _over_valley(data.constants.sel(constant=path))
+        low, high = (units.format(each, str(unit), digits=2) for each in ends)
         ranges.append(f"{path} {low} to {high}".replace("*", "·"))
     points = {str(name): data.onset.sel(variant=name) for name in data.variant.values}
     predicted = []
     for name, values in (points | {"all springs alike": data.uniform}).items():
-        if np.isfinite(found := values.values[1:] if values.size > 1 else values.values).any():
-            low, high = (number(each, 3) for each in _over_valley(values))
-            none = int(np.isnan(found).sum())
-            said = f" ({none} of {found.size} without one)" if none else ""
-            predicted.append(f"{name} {number(float(np.nanmean(found)), 3)}, {low} to {high}{said}")
+        if count := int(np.isfinite(values[1:]).sum()):
+            mean, low, high = (number(float(each), 3) for each in (values[1:].mean(), *_over_valley(values)))
+            predicted.append(f"{name} {mean} ({low} to {high}, {count} of {values.size - 1} sets have one)")
     tasks = listing(
         f"task {task} with {listing(sorted({f'{float(each):g}' for each in data.best.sel(task=task)}))}"
         for task in data.task.values
@@ -154,7 +151,7 @@ def spread(data: xr.Dataset) -> Panel:
 
 def _over_valley(values: xr.DataArray) -> tuple[float, float]:
     """Ends of the interval of a prediction over the sets that have one, without the preset unless it is alone."""
-    found = values.values[1:] if values.size > 1 else values.values
+    found = values.values[min(1, values.size - 1) :]
     found = found[np.isfinite(found)]
     return Samples(found[:, None], np.full(found.size, 1.0 / found.size)).interval(found)[1:]
 
