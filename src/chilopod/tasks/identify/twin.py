@@ -44,6 +44,9 @@ VERSION = 3
 GOOD = 1.0
 """Largest residual of a good set of constants: each datum is then within its standard error."""
 
+FAR = 3.0
+"""Largest residual of the nearest fit beyond which the data have no valley: no constants explain them."""
+
 PRIOR = 0.25
 """Standard deviation of a constant about the middle of its range, in parts of the range, in the choice of the best."""
 
@@ -105,29 +108,31 @@ class TwinIdentification(Short):
         return samples_of(self.fits)
 
     def intervals(self) -> dict[str, tuple[float, float, float]]:
-        """Weighted mean of each constant and ends of its 90 % interval, SI; empty without a good fit or a sample."""
+        """Weighted mean of each constant and ends of its 90 % interval, SI; empty if no fit comes within three standard
+        errors of every datum, or without a sample."""
         samples = self.samples
-        if not (self.good and len(samples.weights)):
+        if self.nearest.largest > FAR or not len(samples.weights):
             return {}
         values = np.array([self.data.free.values_at(parts) for parts in samples.parts])
         return {path: samples.interval(each) for path, each in zip(self.data.free.paths, values.T, strict=True)}
 
     def words(self) -> list[str]:
         """How many fits meet all data, or how near the nearest comes and which datum it misses; and how many effective
-        samples the valley has."""
+        samples the valley has, if there is one."""
         nearest, samples = self.nearest, self.samples
+        said = [f"largest residual {self.fits[0].largest:.2f} (1: every datum within its error); {len(self.good)} of "]
+        said[0] += f"{len(self.fits)} evaluations meet every datum"
         if not self.good:
             missed = self.data.names[int(np.abs(nearest.residuals).argmax())]
-            return [
-                f"no evaluation of {len(self.fits)} meets every datum; the nearest misses the {missed} by "
-                f"{nearest.largest:.2f} standard errors"
-            ]
-        valley = f"valley: {samples.effective:.0f} effective samples of {len(samples.weights)}"
-        valley += f"; squared errors of the surrogate there are {self.misjudged:.2g} times those that it expected"
-        if samples.effective < LEAST:
-            valley += f"; below {LEAST:.0f} the intervals are not reliable: more --evaluations or --samples are needed"
-        best = f"largest residual {self.fits[0].largest:.2f} (1: every datum within its error)"
-        return [f"{best}; {len(self.good)} of {len(self.fits)} evaluations meet every datum", valley]
+            said[0] += f"; the nearest misses the {missed} by {nearest.largest:.2f} standard errors"
+        if self.intervals():
+            said.append(
+                f"valley: {samples.effective:.3g} effective samples of {len(samples.weights)}; squared errors of the "
+            )
+            said[1] += f"surrogate there are {self.misjudged:.2g} times those that it expected"
+            if samples.effective < LEAST:
+                said[1] += f"; below {LEAST:.0f} intervals are not reliable: more --evaluations or --samples are needed"
+        return said
 
     def as_json(self) -> dict[str, Any]:
         """Constants with their intervals, and the good fits and samples of the valley, as plain numbers and text."""

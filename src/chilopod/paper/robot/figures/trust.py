@@ -22,7 +22,7 @@ from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
 from chilopod.tasks.identify.twin_data import FREE
-from chilopod.tasks.identify.valley import LEVEL, Samples
+from chilopod.tasks.identify.valley import LEAST, LEVEL, Samples
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
@@ -138,8 +138,10 @@ def spread(data: xr.Dataset) -> Panel:
         text=(
             f"{data.attrs['numbers']} printed numbers and {data.attrs['answers']} yes-or-no answers do not determine "
             f"{data.sizes['constant']} constants: they leave a valley. Weighted samples of it are known, as many as "
-            f"{number(data.attrs['effective'], 2)} of equal weight. Shown are the preset (filled) and sets drawn by "
-            f"these weights. {100.0 * LEVEL:g} % of the sets have (A) {listing(ranges)}.",
+            f"{number(data.attrs['effective'], 2)} of equal weight"
+            + (", too few for reliable intervals" if data.attrs["effective"] < LEAST else "")
+            + ". Shown are the preset (filled) and sets drawn by these weights. "
+            f"{100.0 * LEVEL:g} % of the sets have (A) {listing(ranges)}.",
             f"Onsets that they predict (B), mean and {100.0 * LEVEL:g} % interval, in {SPRING_UNIT}: "
             f"{listing(predicted) or 'no point'}. They come nearest to the target in {tasks}\u00a0{SPRING_UNIT}. These "
             "walks are undisturbed: the intervals are those of the valley alone. The standard errors in the table of "
