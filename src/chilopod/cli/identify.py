@@ -61,10 +61,7 @@ def planar(options: _PlanarOptions) -> None:
     from chilopod.tasks import identify
 
     data, out = options.data, options.out
-    if options.template:
-        if data is not None:
-            raise ParameterError("must not be given with --template", field="--data", value=str(data))
-        typer.echo(identify.TEMPLATE, nl=False)
+    if _template(options.template, data, identify.TEMPLATE):
         return
     described = options.described
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
@@ -101,46 +98,62 @@ class _TwinOptions(RobotOptions):
 
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset with a [twin].")] = "aoi2022"
     out: OutOption = Path("identification-twin")
-    starts: Annotated[int, typer.Option(metavar="N", help="Number of searches.", min=1, max=100)] = 3
-    generations: Annotated[
-        int, typer.Option(metavar="N", help="Generations in a search, of ten evaluations each.", min=1, max=1000)
-    ] = 14
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
+    ] = None
+    template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False
+    evaluations: Annotated[
+        int, typer.Option(metavar="N", help="Evaluations that find the valley of good constants.", min=1, max=100000)
+    ] = 300
+    samples: Annotated[int, typer.Option(metavar="N", help="Weighted samples of the valley.", min=1, max=200)] = 100
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.", min=0)] = 1
-    fresh: Annotated[bool, typer.Option("--fresh", help="Begin without the constants that are known.")] = False
 
 
-@app.command("twin", short_help="Constants of the 3-D robot from the paper's walks.")
+@app.command("twin", short_help="Constants of the 3-D robot from walks.")
 @with_options
 def twin(options: _TwinOptions) -> None:
-    """Constants of the three-dimensional robot from the paper's base series of walks, with their uncertainty.
+    """Constants of the three-dimensional robot from a base series of walks, with their uncertainty.
 
-    Half an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
-    was, and with --force one that has ended goes on with more. The preset aoi2022 is what this finds by default.
+    The data are the paper's, or your own. Half an hour on two cores; evaluations are kept in the folder, so a search
+    that was stopped goes on where it was, and with --force one that has ended goes on with more samples.
 
-    Example: chilopod identify twin aoi2022 --starts 1 --out fit
+    Example: chilopod identify twin my.toml --data mine.toml --out fit
     """
     from chilopod.output import check_folder
+    from chilopod.tasks.identify import TWIN_TEMPLATE, BaseSeries, identify_twin
 
-    described, out = options.described, options.out
-    free(_identified(out), options.force)
+    data, out = options.data, options.out
+    if _template(options.template, data, TWIN_TEMPLATE):
+        return
+    described = options.described
     from chilopod.paper.fit_data import base_series_data
-    from chilopod.tasks.identify import identify_twin
 
-    search = options.starts, options.generations, options.seed
+    measured = base_series_data() if data is None else BaseSeries.load(data)
+    free(_identified(out), options.force)
+    counts = options.evaluations, options.samples
     with progress_bar("identification") as progress:
         kept, step = check_folder(out / "evaluations"), partial(progress, "identification")
-        found = identify_twin(described, base_series_data(), *search, kept, options.fresh, step)
+        found = identify_twin(described, measured, *counts, options.seed, kept, step)
     result = {"robot": described.name, **found.as_json()}
-    constants = result["constants"].items()
     lines = [
         *(
-            f"{name} = {value['text']}  (fits that meet all data: {value['good_fits_text']})"
-            for name, value in constants
+            f"{name} = {value['text']}  (90 % of the valley: {value['interval_text']})"
+            for name, value in result["constants"].items()
         ),
-        found.words(),
+        *found.words(),
         f"fits and robot file are in {out}",
     ]
     _deliver(options, out, result, found.best, lines)
+
+
+def _template(wanted: bool, data: Path | None, text: str) -> bool:
+    """Print the template of a file of data if it is wanted."""
+    if wanted and data is not None:
+        raise ParameterError("must not be given with --template", field="--data", value=str(data))
+    if wanted:
+        typer.echo(text, nl=False)
+    return wanted
 
 
 def _identified(folder: Path) -> tuple[Path, Path]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from chilopod.analysis.parameters import stiffness
 from chilopod.paper import printed
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks.identify import BaseSeries, CriticalMode
+
+TOLERANCE = 0.05
+"""Standard error of the base series' numbers, relative."""
 
 
 def critical_mode_data() -> CriticalMode:
@@ -32,16 +36,20 @@ def base_series_data() -> BaseSeries:
     They are straight at k1 = 75 and 41, curved at 28, 21, 17 and 15; curves set in at 34, with a radius
     of 1.2 m at 26 and 0.88 m at 21, at a speed of 0.056 m/s (:func:`walking_speed`).
 
-    The tolerances are half of those in the report's verdicts.
+    The standard errors are half of the tolerances in the report's verdicts.
     """
+
+    def within(number: float) -> tuple[float, float]:
+        return number, TOLERANCE * number
+
     return BaseSeries(
-        curved=printed.CURVED,
-        straight=printed.STRAIGHT,
-        radii={spring: radius.value for spring, radius in printed.RADII.items()},
-        onset=printed.ONSET.value,
-        law=(9.7, 0.030),  # meets both printed radii
-        shape=tuple(each.value / 2.10 for each in printed.MODE),
-        speeds={printed.TASKS["A"].k_hat.value: walking_speed()},
+        curved=[stiffness(spring) for spring in printed.CURVED],
+        straight=[stiffness(spring) for spring in printed.STRAIGHT],
+        onset=within(stiffness(printed.ONSET.value)),
+        radii={stiffness(spring): within(radius.value) for spring, radius in printed.RADII.items()},
+        speeds={stiffness(printed.TASKS["A"].k_hat.value): within(walking_speed())},
+        law=(9.7 * math.sqrt(stiffness(1.0)), 0.030 / stiffness(1.0)),  # meets both printed radii
+        shape=[each.value / 2.10 for each in printed.MODE],
     )
 
 

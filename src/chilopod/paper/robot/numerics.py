@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.measures import fitted, over_springs, point_of
 from chilopod.paper.section import Context, Size
@@ -37,7 +37,9 @@ def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
     for index, (name, (step, tolerance)) in enumerate(cases.items()):
         progress(index / len(cases), name)
         finer = robot.with_value("twin.timestep", step)
-        found = base_series(finer, base_series_data(), springs, tolerance=tolerance, duration=duration)
+        found = base_series(
+            finer, base_series_data(), [*map(stiffness, springs)], tolerance=tolerance, duration=duration
+        )
         speeds.append(found.speeds)
         radii.append(robot.axis_radius(found.bends))
         onsets.append(point_of(fitted(1.0 / np.array(springs), np.abs(found.bends[:, 0]))).value)

@@ -1,8 +1,7 @@
-"""Spread of the twin's predictions: the same predictions by other sets of constants that fit about as well.
+"""Predictions of the twin over the valley of constants that its data leave open.
 
-``twin_fits.json`` holds results of ``chilopod identify twin``: sets of constants whose misfit to the base series, a
-root mean square, is 1 or less; not all of them meet every datum within its tolerance. The most different ones predict
-the printed results of other experiments, each with few undisturbed walks.
+``twin_fits.json`` holds weighted samples of the valley, results of ``chilopod identify twin``. Sets of constants that
+are drawn by these weights predict the printed results of other experiments, each with few undisturbed walks.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ from chilopod.paper.turning.trials import to_target
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
-from chilopod.tasks.identify.twin import known, unlike
-from chilopod.tasks.identify.twin_constants import FREE, with_constants
+from chilopod.tasks.identify.twin import known, samples_of
+from chilopod.tasks.identify.twin_data import FREE
 from chilopod.trials import NONE
 
 SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
@@ -34,7 +33,7 @@ SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
 
 TASK_SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0)
 UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0)
-COUNT = 6
+COUNT = 12
 """Number of sets of constants that predict, with the preset's."""
 
 LOWER = ", lower steps"
@@ -45,34 +44,35 @@ _BENT = 0.8  # rad in all, that walks begin with
 
 
 def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
-    """Predictions by several sets of constants; if not full, by two sets, or one.
+    """Predictions by the preset and by sets of constants drawn from the valley; if not full, by one, or none.
 
     Returns
     -------
     Dataset over set (0 the preset's): the constants (SI; ``unit`` is the unit of the robot file) by path over
-    ``constant``, ``misfit``, and predictions: over variant ``onset`` (N*mm/deg, NaN where walks determine none;
-    ``paper`` as printed) and ``radius`` (over that as built, at an equal distance from each one's own onset),
-    ``uniform`` (N*mm/deg), and over task ``best``, the spring that comes nearest to the target (N*mm/deg), and
-    ``arrives``, True if its walk arrives.
+    ``constant``, and predictions: over variant ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` as
+    printed) and ``radius`` (over that as built, at an equal distance from each one's own onset), ``uniform``
+    (N*mm/deg), and over task ``best``, the spring that comes nearest to the target (N*mm/deg), and ``arrives``, True if
+    its walk arrives. The walks are undisturbed, so sets differ by their constants alone.
     """
     robot, folder, size = context.whole, context.folder, context.size
-    fits = unlike(known(), size.of(COUNT, 2, 1))
+    preset, valley = known()[0], samples_of(known())
+    places = [preset.parts, *valley.drawn(size.of(COUNT, 2, 1) - 1)]
+    constants = np.array([FREE.values_at(parts) for parts in places])
     rows: list[dict[str, Any]] = []
-    for index, fit in enumerate(fits):
-        progress(index / len(fits), f"set {index + 1} of {len(fits)}")
-        other = with_constants(robot, fit.constants)
+    for index, values in enumerate(constants):
+        progress(index / len(places), f"set {index + 1} of {len(places)}")
+        other = FREE.robot_with(robot, values)
         rows.append({**predictions(other, folder, size=size), **nearest_springs(other, folder, size)})
     series = base_series_data()
-    names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), [each.path for each in FREE]
+    names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), FREE.paths
 
     def table(name: str, over: str, keys: list[str]) -> tuple[tuple[str, str], np.ndarray]:
         return ("set", over), np.array([[row[name][key] for key in keys] for row in rows])
 
     return xr.Dataset(
         {
-            "constants": (("set", "constant"), np.array([fit.constants for fit in fits])),
+            "constants": (("set", "constant"), constants),
             "unit": ("constant", [robot.unit_of(path) for path in paths]),
-            "misfit": ("set", np.array([fit.misfit for fit in fits])),
             "uniform": ("set", np.array([row["uniform"] for row in rows]), {"units": PAPER_UNIT}),
             "onset": table("onset", "variant", names),
             "radius": table("radius", "variant", names),
@@ -80,10 +80,10 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
             "paper": ("variant", [printed_number(name).value for name in names], {"units": PAPER_UNIT}),
             "arrives": table("arrives", "task", tasks),
         },
-        coords={"set": np.arange(len(fits)), "constant": paths, "variant": names, "task": tasks},
+        coords={"set": np.arange(len(places)), "constant": paths, "variant": names, "task": tasks},
         attrs={
             "robot": robot.name,
-            "known": len(known()),
+            "effective": valley.effective,
             "numbers": len(series.radii) + len(series.speeds) + 1,
             "answers": len(series.curved) + len(series.straight),
         },

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Annotated, Final, Self
 
 import numpy as np
@@ -11,7 +10,6 @@ from pydantic import model_validator
 
 from chilopod import units
 from chilopod.errors import ParameterError
-from chilopod.frozen import Array
 from chilopod.units import Description, Quantity
 
 _STIFFNESS: Final = Quantity("N*m/rad", "N*mm/deg")
@@ -71,57 +69,3 @@ class CriticalMode(Description):
         # A mode is a direction: both signs are the same mode.
         object.__setattr__(self, "components", tuple((mode * np.sign(mode.sum() or 1.0)).tolist()))
         return self
-
-
-@dataclass(frozen=True)
-class BaseSeries:
-    """Walks of a robot with several first springs, to which the constants are fitted.
-
-    All springs are in N*mm/deg.
-
-    Attributes
-    ----------
-    curved, straight
-        Springs at which the robot curves, and at which it walks straight.
-    radii, speeds
-        Radius of the curve (m), and speed of module 1 along its way (m/s), at some springs.
-    onset
-        Spring at the onset of curves, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
-    law, shape
-        Bends at the start of evaluations, roughly those of the data: all joints together ``law[0] * sqrt(1/k1 -
-        law[1])`` rad, of which each joint has the share ``shape``, front to rear, (N-1,).
-    tolerance
-        Tolerance of radii, speeds and onset, relative.
-    """
-
-    curved: tuple[float, ...]
-    straight: tuple[float, ...]
-    radii: Mapping[float, float]
-    onset: float
-    law: tuple[float, float]
-    shape: tuple[float, ...]
-    speeds: Mapping[float, float] = field(default_factory=dict)
-    tolerance: float = 0.05
-
-    @property
-    def springs(self) -> tuple[float, ...]:
-        """Springs of all walks that an evaluation runs, rising."""
-        return tuple(sorted({*self.curved, *self.straight, *self.radii, *self.speeds}))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each of the :func:`residuals`."""
-        return (
-            *(f"radius at {spring:g}" for spring in self.radii),
-            *(f"speed at {spring:g}" for spring in self.speeds),
-            "onset",
-            *(f"straight at {spring:g}" for spring in self.straight),
-            f"curved at {max(self.curved):g}",
-            "steady",
-        )
-
-    def start(self, springs: Sequence[float]) -> Array:
-        """Joint angles at the start of the walks, rad, shape (springs, N-1)."""
-        bend = self.law[0] * np.sqrt(np.maximum(1.0 / np.array(springs) - self.law[1], 0.0))
-        angles: Array = np.maximum(bend, 0.1)[:, None] * np.array(self.shape)
-        return angles

@@ -2,74 +2,121 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from chilopod import units
+from chilopod.analysis.parameters import ALL, K1
+from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
+from chilopod.robot.parameters import place_of
+from chilopod.units.quantity import is_list
+
+_LOGARITHMIC = 4.0  # ratio of the ends of a range from which its scale is logarithmic
 
 
 @dataclass(frozen=True)
 class Constant:
-    """Fitted constant: its path in the robot's description and the ends of its range, SI, on a logarithmic scale if
-    ``logarithmic``; with ``per``, the range is that of its ratio to an earlier constant of :data:`FREE`."""
+    """Fitted constant: its path in the robot's description and the ends of its range, SI; with ``per``, the range is
+    that of its ratio to an earlier constant."""
 
     path: str
     low: float
     high: float
-    logarithmic: bool = False
     per: str | None = None
 
-
-FREE = (
-    Constant("legs.forward_offset", 0.02, 0.07),
-    Constant("legs.half_width", 0.05, 0.10),
-    Constant("springs.damping", 0.005, 0.1, True),
-    Constant("twin.sliding_friction", 0.3, 1.0),
-    Constant("twin.servo_stiffness", 3.0, 20.0, True),
-    Constant("twin.clearance", 0.003, 0.015, True),
-    Constant("twin.joint_inertia", 5e-4, 4e-3, True),
-    Constant("twin.impedance_ratio", 1.0, 30.0, True),
-    Constant("twin.servo_damping", 0.02, 0.15, True, per="twin.servo_stiffness"),  # a time, s
-)
-"""The constants that are fitted."""
-
-_PATHS = [each.path for each in FREE]
-_LOW, _HIGH = (np.array([getattr(each, end) for each in FREE]) for end in ("low", "high"))
-_LOGARITHMIC = np.array([each.logarithmic for each in FREE])
+    @property
+    def logarithmic(self) -> bool:
+        """True if the parts of the range are even in the logarithm: the range is wide and positive."""
+        return 0.0 < _LOGARITHMIC * self.low <= self.high
 
 
-def values_at(parts: Sequence[float] | Array) -> Array:
-    """Constants (SI, in the order of :data:`FREE`) at parts (0 to 1) of their ranges."""
-    part = np.asarray(parts, dtype=np.float64)
-    values: Array = np.where(_LOGARITHMIC, _LOW * (_HIGH / _LOW) ** part, _LOW + part * (_HIGH - _LOW))
-    for index, each in enumerate(FREE):
-        if each.per is not None:
-            values[index] *= values[_PATHS.index(each.per)]
-    return values
+@dataclass(frozen=True)
+class FreeConstants:
+    """The constants that are fitted, in an order, with their ranges.
+
+    Parts of the ranges are numbers from 0 to 1, shape (constants,); values are in SI units.
+    """
+
+    each: tuple[Constant, ...]
+
+    @classmethod
+    def read(cls, given: object) -> Self:
+        """Read a table of ranges by path, ``"path" = [low, high]``, or by the ratio of two paths, ``"path/other"``.
+
+        ParameterError or UnitError names a wrong one."""
+        if isinstance(given, cls):
+            return given
+        if not isinstance(given, Mapping) or not given:
+            raise ParameterError("must be a table of paths of a robot's numbers, each with a range", value=given)
+        found: list[Constant] = []
+        for name, ends in given.items():
+            try:
+                found.append(_constant(str(name), ends, [each.path for each in found]))
+            except ChilopodError as error:
+                error.field = f"[{name}]"
+                raise
+        return cls(tuple(found))
+
+    @property
+    def paths(self) -> list[str]:
+        """Paths of the constants."""
+        return [each.path for each in self.each]
+
+    def _ratios(self) -> list[tuple[int, int]]:
+        """Indices of the constants that are ratios, and of what they are ratios to."""
+        return [(i, self.paths.index(each.per)) for i, each in enumerate(self.each) if each.per is not None]
+
+    def values_at(self, parts: Sequence[float] | Array) -> Array:
+        """Values at parts of the ranges."""
+        pairs = zip(self.each, parts, strict=True)
+        values = np.array(
+            [c.low * (c.high / c.low) ** x if c.logarithmic else c.low + x * (c.high - c.low) for c, x in pairs]
+        )
+        for index, other in self._ratios():
+            values[index] *= values[other]
+        return values
+
+    def parts_of(self, values: Sequence[float] | Array) -> Array:
+        """The inverse of :meth:`values_at`."""
+        ratios = np.array(values, dtype=np.float64)
+        for index, other in reversed(self._ratios()):
+            ratios[index] /= ratios[other]
+        pairs = zip(self.each, ratios.tolist(), strict=True)
+        return np.array(
+            [
+                np.log(x / c.low) / np.log(c.high / c.low) if c.logarithmic else (x - c.low) / (c.high - c.low)
+                for c, x in pairs
+            ]
+        )
+
+    def robot_with(self, robot: Robot, values: Sequence[float] | Array) -> Robot:
+        """The robot with other values."""
+        for path, value in zip(self.paths, values, strict=True):
+            robot = robot.with_value(path, float(value))
+        return robot
+
+    def of(self, robot: Robot) -> Array:
+        """Values of a robot."""
+        return np.array([robot.get(path) for path in self.paths])
 
 
-def parts_of(values: Sequence[float] | Array) -> Array:
-    """The inverse of :func:`values_at`."""
-    ratios = np.array(values, dtype=np.float64)
-    for index, each in reversed(list(enumerate(FREE))):
-        if each.per is not None:
-            ratios[index] /= ratios[_PATHS.index(each.per)]
-    parts: Array = np.where(
-        _LOGARITHMIC, np.log(ratios / _LOW) / np.log(_HIGH / _LOW), (ratios - _LOW) / (_HIGH - _LOW)
-    )
-    return parts
-
-
-def with_constants(robot: Robot, constants: Sequence[float] | Array) -> Robot:
-    """The robot with other values of :data:`FREE`."""
-    for each, value in zip(FREE, constants, strict=True):
-        robot = robot.with_value(each.path, float(value))
-    return robot
-
-
-def constants_of(robot: Robot) -> Array:
-    """Values of :data:`FREE` of a robot."""
-    return np.array([robot.get(path) for path in _PATHS])
+def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
+    """Constant of an entry in a table of ranges, after others with some paths."""
+    path, slash, per = (text.strip() for text in name.partition("/"))
+    if path in (K1, ALL, *before):
+        raise ParameterError("must be given once, and not be k1, which the walks change")
+    if slash and per not in before:
+        raise ParameterError("must be the ratio to a constant above it", value=per)
+    if not is_list(ends) or len(ends) != 2:
+        raise ParameterError("must be two ends of a range", value=ends)
+    quantity = place_of(path).quantity
+    unit = f"{quantity.si or '1'}/({place_of(per).quantity.si or '1'})" if slash else quantity.si
+    low, high = (units.parse(end, unit) if slash else quantity.read(end) for end in ends)
+    if not low < high or (slash and low <= 0.0):
+        raise ParameterError("must be a rising range", value=ends)
+    return Constant(path, low, high, per if slash else None)

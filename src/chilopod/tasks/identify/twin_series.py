@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.parameters import K1
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.engine import Walk, engine_named
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.record import Recording
 from chilopod.robot import Robot
-from chilopod.tasks.identify.data import BaseSeries
+from chilopod.tasks.identify.twin_data import BaseSeries
 from chilopod.twin.walk import TOLERANCE
 
 DURATION = 60.0
@@ -52,13 +52,13 @@ def base_series(
     duration: float = DURATION,
 ) -> Series:
     """Walk a series for a duration, s, from starts near the bends of its data, with a tolerance of the contact solver.
-    ``springs`` replace the values of k1, N*mm/deg; ``engine`` is the twin or a :class:`chilopod.twin.Edited`.
+    ``springs`` replace the values of k1, N*m/rad; ``engine`` is the twin or a :class:`chilopod.twin.Edited`.
 
     Walks of all springs of the data stop after 36 s if they are far off by then.
     """
     walks: Any = engine_named(engine)  # with arguments that only the twin has
-    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs or data.springs]
-    initial = walks.initial_states(robot, data.start(springs or data.springs))
+    robots = [robot.with_value(K1, spring) for spring in springs or data.springs]
+    initial = walks.initial_states(robot, data.start(robot, springs or data.springs))
     record = Recording(rate=_PER_CYCLE / robot.gait.period)
     walk: Walk = walks.start(robots, initial=initial, record=record, tolerance=tolerance, expected=duration)
     if springs is None:
@@ -84,7 +84,7 @@ def _series(walk: Walk, robot: Robot) -> Series:
 def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
     """Residuals of a series: computed less the data, one number for each of ``data.names``.
 
-    These are radii, speeds and onset (each over the tolerance of it); bend where the robot is straight beyond 0.1 rad
+    These are radii, speeds and onset (each over its standard error); bend where the robot is straight beyond 0.1 rad
     in all (over 0.05 rad); the deficit from 0.3 rad at the stiffest curved spring (over the same); motion between the
     averages beyond 0.1 rad (over 0.1 rad).
     """
@@ -95,14 +95,14 @@ def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
         return np.full(len(data.names), LOST)
     length = (robot.body.modules - 1) * robot.module_length
     # Of curvatures, which are finite where a walk is straight.
-    off = [(at[k] * r / length - 1.0) / data.tolerance for k, r in data.radii.items()]
-    off += [(found.speeds[springs.index(k)] / v - 1.0) / data.tolerance for k, v in data.speeds.items()]
+    off = [(at[k] * r / length - 1.0) * r / error for k, (r, error) in data.radii.items()]
+    off += [(found.speeds[springs.index(k)] - v) / error for k, (v, error) in data.speeds.items()]
     curved = [springs.index(k) for k in data.curved]
     try:
         fitted = square_root_fit(1.0 / np.array(data.curved), np.abs(found.bends[curved, 0])).critical
     except AnalysisError:
-        fitted = 0.5 * data.onset
-    off.append((fitted / data.onset - 1.0) / data.tolerance)
+        fitted = 0.5 * data.onset[0]
+    off.append((fitted - data.onset[0]) / data.onset[1])
     off += [max(at[k] - 0.1, 0.0) / 0.05 for k in data.straight]
     off.append(max(0.3 - at[max(data.curved)], 0.0) / 0.05)
     moved = np.abs(np.abs(found.bends).sum(-1) - np.abs(found.before).sum(-1))

@@ -21,7 +21,8 @@ from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
-from chilopod.tasks.identify.twin_constants import FREE, parts_of
+from chilopod.tasks.identify.twin_data import FREE
+from chilopod.tasks.identify.valley import LEAST, LEVEL, Samples
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
@@ -113,45 +114,56 @@ def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], h
 
 
 def spread(data: xr.Dataset) -> Panel:
-    """Predictions by sets of constants that fit as well."""
+    """Predictions over the valley."""
     ranges = []
     for path, unit in zip(data.constant.values, data.unit.values, strict=True):
-        values = data.constants.sel(constant=path)
-        low, high = (units.format(float(each), str(unit), digits=2) for each in (values.min(), values.max()))
+        ends = _over_valley(data.constants.sel(constant=path))
+        low, high = (units.format(each, str(unit), digits=2) for each in ends)
         ranges.append(f"{path} {low} to {high}".replace("*", "·"))
-    points = {str(name): data.onset.sel(variant=name).values for name in data.variant.values}
-    predicted = [
-        f"{name} {number(float(np.nanmin(values)), 3)} to {number(float(np.nanmax(values)), 3)}"
-        for name, values in (points | {"all springs alike": data.uniform.values}).items()
-        if np.isfinite(values).any()
-    ]
+    points = {str(name): data.onset.sel(variant=name) for name in data.variant.values}
+    predicted = []
+    for name, values in (points | {"all springs alike": data.uniform}).items():
+        if count := int(np.isfinite(values[1:]).sum()):
+            mean, low, high = (number(float(each), 3) for each in (values[1:].mean(), *_over_valley(values)))
+            predicted.append(f"{name} {mean} ({low} to {high}, {count} of {values.size - 1} sets have one)")
     tasks = listing(
         f"task {task} with {listing(sorted({f'{float(each):g}' for each in data.best.sel(task=task)}))}"
         for task in data.task.values
     )
     return Panel(
         name="robot-spread",
-        title="How far to trust the predictions: other constants that fit as well",
+        title="How far to trust the predictions: the valley of constants that the data leave open",
         draw=lambda narrow: _draw_spread(data, narrow),
-        alt="A: the constants of several fits, in parts of their ranges. B: what each predicts, beside the robot.",
+        alt="A: the constants of several sets, in parts of their ranges. B: what each predicts, beside the robot.",
         text=(
             f"{data.attrs['numbers']} printed numbers and {data.attrs['answers']} yes-or-no answers do not determine "
-            f"{data.sizes['constant']} constants. {data.attrs['known']} sets that the search found meet them within "
-            "5 %; shown are the preset (filled) and "
-            f"those that are most unlike it and each other. What the data leave open (A): {listing(ranges)}.",
-            f"What they predict (B), with few and undisturbed walks, in {SPRING_UNIT}: "
-            f"{listing(predicted) or 'no point'}. They come nearest to the target in {tasks}\u00a0{SPRING_UNIT}.",
+            f"{data.sizes['constant']} constants: they leave a valley. Weighted samples of it are known, as many as "
+            f"{number(data.attrs['effective'], 2)} of equal weight"
+            + (", too few for reliable intervals" if data.attrs["effective"] < LEAST else "")
+            + ". Shown are the preset (filled) and sets drawn by these weights. "
+            f"{100.0 * LEVEL:g} % of the sets have (A) {listing(ranges)}.",
+            f"Onsets that they predict (B), mean and {100.0 * LEVEL:g} % interval, in {SPRING_UNIT}: "
+            f"{listing(predicted) or 'no point'}. They come nearest to the target in {tasks}\u00a0{SPRING_UNIT}. These "
+            "walks are undisturbed: the intervals are those of the valley alone. The standard errors in the table of "
+            "the robot are those of its trials alone, all with the preset.",
         ),
         data=data,
     )
 
 
+def _over_valley(values: xr.DataArray) -> tuple[float, float]:
+    """Ends of the interval of a prediction over the sets that have one, without the preset unless it is alone."""
+    found = values.values[min(1, values.size - 1) :]
+    found = found[np.isfinite(found)]
+    return Samples(found[:, None], np.full(found.size, 1.0 / found.size)).interval(found)[1:]
+
+
 def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_SPREAD, narrow)
     for index in data.set.values[::-1]:
-        parts = parts_of(data.constants.values[index])
-        axes["A"].plot(parts, np.arange(len(FREE)), "o", **_marked(int(index)))
-    axes["A"].set_yticks(range(len(FREE)), [each.path.partition(".")[2].replace("_", " ") for each in FREE])
+        parts = FREE.parts_of(data.constants.values[index])
+        axes["A"].plot(parts, np.arange(len(parts)), "o", **_marked(int(index)))
+    axes["A"].set_yticks(range(len(FREE.paths)), [path.partition(".")[2].replace("_", " ") for path in FREE.paths])
     axes["A"].invert_yaxis()
     finish(axes["A"], xlim=(-0.03, 1.03), xlabel="part of the range searched", title="A  Constants")
 
@@ -197,8 +209,8 @@ def structures(data: xr.Dataset) -> Panel:
         draw=lambda narrow: _draw_structures(data, narrow),
         alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
         text=(
-            f"Each of these structures was given to the preset, and its {len(FREE)} constants moved until it meets the "
-            "base series again, from few and undisturbed walks: "
+            f"Each of these structures was given to the preset, and its {len(FREE.paths)} constants moved until it "
+            "meets the base series again, from few and undisturbed walks: "
             + "; ".join(
                 f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)
             )
