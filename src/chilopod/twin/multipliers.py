@@ -1,0 +1,432 @@
+"""Floquet multipliers of a walk in MuJoCo: of the cycle map's derivative, and of bends of a given size.
+
+A foot that just touches makes the cycle map jump. A derivative exists only if the walk closes, and it holds for bends
+that change no contact. Bends of a given size are therefore followed besides: opposite ones along the leading modes,
+brought back to their size after every cycle. The mean over the cycles of the matrix that maps them has the multipliers
+of that size, with an interval from its scatter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod import statistics
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.notebook import Summary, axes_for
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.stability.krylov import whole_pairs
+from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
+from chilopod.stability.spectrum.errors import VERDICTS, stable_within
+from chilopod.twin.cycle_map import CycleMap
+from chilopod.twin.legs import servo_targets, twin_of
+from chilopod.twin.model import Edit, TwinModel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+AMPLITUDE = math.radians(1.0)
+"""Default size of a bend, rad: the standard deviation of the trials' disturbance."""
+
+_LEADING = 3
+_SETTLING, _NEWTON = 30, 40  # cycles
+_CLOSED = 1e-11  # m, rad, per second
+_STEPS = (1e-6, 1e-7, 1e-8)  # of the differences; the first that changes no contact
+_SHORTER = 0.25  # second step over the first
+_REACHES = 10.0 ** np.arange(-6.0, -1.9, 0.5)  # rad
+_FORGOTTEN, _BLOCK = 2, 4  # cycles
+_LARGER = 4.0  # times the first bends, beyond which they begin anew
+_COMPARED = 6  # cycles whose contacts are compared
+_WHOLE = 1e-9  # of a cycle
+
+
+@dataclass(frozen=True)
+class CycleMode(ReadOnlyArrays):
+    """A mode of a walk.
+
+    Attributes
+    ----------
+    multiplier, error
+        Multiplier over one gait cycle, and a bound on its absolute error or half its interval of 95 %.
+    angles
+        Yaw joints of the mode, front to rear, (N-1,); the largest is 1.
+    period
+        Period of the gait, s.
+    """
+
+    multiplier: complex
+    error: float
+    angles: ComplexArray
+    period: float
+
+    @property
+    def shape(self) -> str:
+        """``bend`` if all yaw joints turn to one side at a time, ``undulation`` otherwise."""
+        turned = self.angles * np.conj(self.angles.sum())
+        return "bend" if (turned.real > 0.0).all() else "undulation"
+
+    @property
+    def frequency(self) -> float:
+        """Angular frequency, rad/s."""
+        return abs(float(np.angle(self.multiplier))) / self.period
+
+    def as_json(self) -> dict[str, Any]:
+        """The mode as plain numbers."""
+        return {
+            "multiplier": [self.multiplier.real, self.multiplier.imag],
+            "error": self.error if math.isfinite(self.error) else None,
+            "shape": self.shape,
+            "frequency_rad_s": self.frequency,
+            "joint_components": [[angle.real, angle.imag] for angle in self.angles.tolist()],
+        }
+
+    def cells(self, which: str) -> Sequence[str]:
+        """A row of the table."""
+        value, turns = self.multiplier, abs(float(np.angle(self.multiplier))) / (2.0 * math.pi)
+        shown = f"{value.real:.6f}" + (f" ± {abs(value.imag):.6f}i" if value.imag else "")
+        shape = f"{self.shape} of {1.0 / turns:.3g} cycles" if turns else self.shape
+        angles = "  ".join(f"{a.real:.2f}" + (f"{a.imag:+.2f}i" if value.imag else "") for a in self.angles)
+        return which, shown, f"{self.error:.1e}", f"{abs(value):.6f}", shape, angles
+
+
+@dataclass(frozen=True)
+class CycleMultipliers(Summary, ReadOnlyArrays):
+    """Leading multipliers and modes of a walk in MuJoCo.
+
+    Attributes
+    ----------
+    name
+        Name of the robot.
+    state, mismatch
+        Coordinates at the start of the cycle, see :class:`CycleMap`, and their largest change over one.
+    exact
+        Leading modes of the derivative, by falling modulus; empty if the walk does not close.
+    reach
+        Largest bend along them that changes no contact, rad; NaN if the walk does not close.
+    amplitude, finite
+        Size of bends, rad, and their modes.
+    spread
+        Range of each yaw joint at the start of consecutive cycles, rad, (N-1,).
+    contacts
+        Contacts that such bends change, or that change from cycle to cycle, a phrase each.
+    """
+
+    name: str
+    state: Array
+    mismatch: float
+    exact: tuple[CycleMode, ...]
+    reach: float
+    amplitude: float
+    finite: tuple[CycleMode, ...]
+    spread: Array
+    contacts: tuple[str, ...]
+
+    @property
+    def stable(self) -> bool | None:
+        """Stability by the derivative, or without one by bends of finite size; None where errors leave it undecided."""
+        modes = self.exact or self.finite
+        errors = np.array([mode.error for mode in modes])
+        return stable_within(np.array([mode.multiplier for mode in modes]), float(errors.max()), errors)
+
+    @property
+    def title(self) -> str:
+        """Verdict in words."""
+        return f"{self.name}: the straight walk of the twin is {VERDICTS[self.stable]}"
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain numbers; complex ones as [real, imaginary]."""
+        return {
+            "robot": self.name,
+            "engine": "twin",
+            "period_s": self.finite[0].period,
+            "stable": self.stable,
+            "verdict": VERDICTS[self.stable],
+            "closes": bool(self.exact),
+            "mismatch": self.mismatch,
+            "multipliers": [mode.as_json() for mode in self.exact],
+            "reach_rad": self.reach if self.exact else None,
+            "amplitude_rad": self.amplitude,
+            "multipliers_of_amplitude": [mode.as_json() for mode in self.finite],
+            "spread_rad": self.spread.tolist(),
+            "contacts": list(self.contacts),
+        }
+
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        size = f"{math.degrees(self.amplitude):.3g}°"
+        rows: list[Sequence[str]] = [("bends", "multiplier", "error", "modulus", "shape", "yaw joints, front to rear")]
+        rows += [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
+        changed = ", ".join(self.contacts) or "none found"
+        if self.exact:
+            below = [
+                f"The walk closes to {self.mismatch:.0e} in a cycle. The derivative holds for bends up to about "
+                f"{math.degrees(self.reach):.1g}°, beyond which contacts change: {changed}."
+            ]
+        else:
+            below = [
+                f"The walk does not close: a cycle changes it by {self.mismatch:.0e}, yaw joints scatter over "
+                f"{math.degrees(self.spread.max()):.2g}°, and it has no derivative.",
+                f"Contacts that change from cycle to cycle: {changed}.",
+            ]
+        return [], rows, below
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the multipliers beside the unit circle: of smallest bends as discs, of finite ones as crosses."""
+        axes, around = axes_for(axes), np.linspace(0.0, 2.0 * np.pi, 361)
+        axes.plot(np.cos(around), np.sin(around), color="grey", linewidth=1.0)
+        for style, modes in (("C0o", self.exact), ("C3x", self.finite)):
+            values = np.array([mode.multiplier for mode in modes])
+            axes.plot(values.real, values.imag, style)
+        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal", title=self.title)
+        return axes
+
+
+def walk_multipliers(
+    robot: Robot,
+    *,
+    amplitude: float = AMPLITUDE,
+    cycles: int = 20,
+    edit: Edit | None = None,
+    warm_start: bool = True,
+    threads: int = 0,
+    progress: Progress = silent,
+) -> CycleMultipliers:
+    """Leading Floquet multipliers and modes of the straight walk of the robot in three dimensions.
+
+    Parameters
+    ----------
+    robot
+        Robot with a table [twin].
+    amplitude
+        Size of the finite bends, rad.
+    cycles
+        Number of cycles that they are followed, at least 12.
+    edit
+        See :class:`chilopod.twin.Edited`.
+    warm_start, threads
+        See :class:`CycleMap`.
+    progress
+        Function that shows progress.
+
+    Raises
+    ------
+    ParameterError
+        If a gait cycle is no whole number of control intervals, or steps are too coarse for the servos.
+    AnalysisError
+        If the walk falls.
+    """
+    cycle, plan = cycle_map(robot, edit=edit, warm_start=warm_start, threads=threads)
+    names = [f"yaw{i}" for i in range(1, robot.body.modules)]
+    standing = cycle.reduced(plan.initial_positions(), np.zeros(plan.model.nv))
+    period = robot.gait.period
+    return cycle_multipliers(robot.name, cycle, standing, names, period, amplitude, cycles, progress)
+
+
+def cycle_map(
+    robot: Robot, *, edit: Edit | None = None, warm_start: bool = True, threads: int = 0
+) -> tuple[CycleMap, TwinModel]:
+    """Cycle map of the robot in three dimensions, and its model; errors see :func:`walk_multipliers`."""
+    twin = twin_of(robot)
+    count = robot.gait.period / twin.control_interval
+    if abs(count - round(count)) > _WHOLE * count:
+        allowed = "a whole part of a gait cycle"
+        raise ParameterError(
+            "must repeat with the gait",
+            field="twin.control_interval",
+            value=f"{twin.control_interval:g} s",
+            allowed=allowed,
+        )
+    coarse = 2.0 * twin.joint_inertia / max(twin.servo_damping, 1e-300)
+    if twin.timestep > coarse:
+        said, value = "must be shorter for the damping of the servos", f"{1e3 * twin.timestep:g} ms"
+        raise ParameterError(said, field="twin.timestep", value=value, allowed=f"at most {1e3 * coarse:.3g} ms")
+    plan = TwinModel(robot, edit=edit)
+    control = np.zeros((round(count), plan.model.nu))
+    targets = servo_targets(robot, np.arange(len(control)) * twin.control_interval)
+    control[:, plan.leg_controls.ravel()] = targets.reshape(len(control), -1)
+    control = np.repeat(control, plan.steps_per_control, axis=0)
+    return CycleMap(plan.model, control, warm_start=warm_start, threads=threads), plan
+
+
+def cycle_multipliers(
+    name: str,
+    cycle: CycleMap,
+    start: Array,
+    bends: Sequence[str],
+    period: float,
+    amplitude: float = AMPLITUDE,
+    cycles: int = 20,
+    progress: Progress = silent,
+) -> CycleMultipliers:
+    """Leading multipliers of any periodic gait in MuJoCo, near the motion that settles from a start.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    cycle, start
+        Map of a cycle, and coordinates from which it settles, (dimension,).
+    bends
+        Names of the coordinates by which modes are scaled and named.
+    period
+        Period of the gait, s.
+    amplitude, cycles, progress
+        See :func:`walk_multipliers`.
+    """
+    if not 0.0 < amplitude < 1.0 or cycles < 3 * _BLOCK:
+        allowed = f"above 0 and below 1 rad; {3 * _BLOCK} or more"
+        raise ParameterError("must be in range", field="amplitude, cycles", value=(amplitude, cycles), allowed=allowed)
+    at = np.array([cycle.names.index(each) for each in bends])
+    x = start[None]
+    for i in range(_SETTLING):
+        progress(0.2 * i / _SETTLING, "walks")
+        x = cycle(x)
+    progress(0.2, "derivative")
+    jacobian = _differences(cycle, x, _STEPS[-1])[0]
+    progress(0.4, "closes the cycle")
+    closed = _closed(cycle, x, jacobian)
+    exact: tuple[CycleMode, ...] = ()
+    error = np.full_like(jacobian, np.nan)
+    if closed is not None:
+        progress(0.5, "derivative")
+        found = _derivative(cycle, closed)
+        if found is not None:
+            x, (jacobian, error) = closed, found
+    known = bool(np.isfinite(error).all())
+    spec = spectrum(ReturnMap(x[0], jacobian, error if known else 0.0, 1, period))
+    count = whole_pairs(spec.values, _LEADING)
+    basis, dual = _real_basis(spec, count, at)
+    reach, contacts = math.nan, ()
+    if known:
+        exact = tuple(
+            CycleMode(complex(spec.values[i]), float(spec.error[i]), _scaled(spec.right[at, i]), period)
+            for i in range(count)
+            if spec.values[i].imag >= 0.0
+        )
+        reach, contacts = _reach(cycle, x, basis)
+    progress(0.8, "bends")
+    matrices, seen = _followed(cycle, x, amplitude * basis, dual / amplitude, cycles)
+    finite = _mean_modes(matrices, basis[at], period)
+    if not known:
+        contacts = _changing(cycle, [cycle.contacts(each) for each in seen[-_COMPARED:]])
+    mismatch = float(np.abs(cycle(seen[-1:])[0] - seen[-1]).max())
+    return CycleMultipliers(
+        name, x[0], mismatch, exact, reach, amplitude, finite, np.ptp(seen[:, at], axis=0), contacts
+    )
+
+
+def _differences(cycle: CycleMap, x: Array, step: float) -> tuple[Array, bool]:
+    """Derivative of the map at a state (1, n) by central differences, and True if none of them changes a contact."""
+    shifts = step * np.eye(x.size)
+    images, counts = cycle.with_contacts(np.concatenate([x, x + shifts, x - shifts]))
+    ahead, behind = images[1 : 1 + x.size], images[1 + x.size :]
+    return (ahead - behind).T / (2.0 * step), bool((counts == counts[0]).all())
+
+
+def _derivative(cycle: CycleMap, x: Array) -> tuple[Array, Array] | None:
+    """Derivative at a fixed point and the errors of its entries from a second step; None if contacts change in any."""
+    for step in _STEPS:
+        derivative, same = _differences(cycle, x, step)
+        if same:
+            other, _ = _differences(cycle, x, _SHORTER * step)
+            return derivative, np.abs(derivative - other)
+    return None
+
+
+def _closed(cycle: CycleMap, x: Array, jacobian: Array) -> Array | None:
+    """Fixed point near a state (1, n) by Newton's method with one derivative; None if it does not converge."""
+    inverse = np.linalg.inv(np.eye(x.size) - jacobian)
+    try:
+        for _ in range(_NEWTON):
+            off = cycle(x) - x
+            if np.abs(off).max() < _CLOSED:
+                return x
+            x = x + off @ inverse.T
+    except AnalysisError:  # it falls
+        pass
+    return None
+
+
+def _real_basis(spec: Spectrum, count: int, at: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Real basis of the leading modes, (n, count), whose largest entry among the bends is 1, and its dual."""
+    columns, rows = [], []
+    for i in range(count):
+        if spec.values[i].imag >= 0.0:
+            mode = spec.right[:, i] / spec.right[at[np.abs(spec.right[at, i]).argmax()], i]
+            paired = spec.values[i].imag > 0.0
+            columns += [mode.real, mode.imag][: 1 + paired]
+            rows += [spec.left[:, i].real, spec.left[:, i].imag][: 1 + paired]
+    basis, left = np.array(columns).T, np.array(rows)
+    return basis, np.linalg.solve(left @ basis, left)
+
+
+def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int) -> tuple[Array, Array]:
+    """Matrices that map bends (n, r) in each of some cycles, (cycles, r, r), and the states between, (cycles, n)."""
+    count, first = bends.shape[1], bends
+    matrices, seen = [], []
+    for _ in range(_FORGOTTEN + cycles):
+        images = cycle(np.concatenate([x + bends.T, x - bends.T, x]))
+        after = 0.5 * (images[:count] - images[count:-1]).T
+        matrices.append(dual @ after)
+        bends = after @ np.linalg.pinv(matrices[-1])
+        if np.abs(bends).max() > _LARGER * np.abs(first).max():  # a jump has turned them all to one side
+            bends = first
+        seen.append(x[0])
+        x = images[-1:]
+    return np.array(matrices[_FORGOTTEN:]), np.array(seen[_FORGOTTEN:])
+
+
+def _mean_modes(matrices: Array, angles: Array, period: float) -> tuple[CycleMode, ...]:
+    """Modes of the mean of matrices (cycles, r, r), with intervals; rows of ``angles`` (joints, r) are yaw joints."""
+    spec = spectrum(ReturnMap(np.zeros(len(matrices[0])), matrices.mean(axis=0), 0.0, 1, period))
+    # To first order, a cycle changes an eigenvalue by left^H (M - mean) right.
+    each = np.einsum("ji,kjl,li->ki", spec.left.conj(), matrices, spec.right)
+    whole = len(each) // _BLOCK * _BLOCK
+    blocks = each[-whole:].reshape(-1, _BLOCK, each.shape[1]).mean(axis=1)
+    modes = []
+    for i, value in enumerate(spec.values):
+        if value.imag >= 0.0:
+            parts = [statistics.mean(part).interval for part in (blocks[:, i].real, blocks[:, i].imag)]
+            error = math.hypot(*(0.5 * (part.high - part.low) for part in parts[: 1 + (value.imag > 0.0)]))
+            modes.append(CycleMode(complex(value), error, _scaled(angles @ spec.right[:, i]), period))
+    return tuple(modes)
+
+
+def _scaled(angles: ComplexArray) -> ComplexArray:
+    """Angles of a mode, (N-1,), the largest of which becomes 1."""
+    return np.asarray(phased(angles) / np.abs(angles).max())
+
+
+def _reach(cycle: CycleMap, x: Array, basis: Array) -> tuple[float, tuple[str, ...]]:
+    """Largest bend along modes that changes no contact, rad, and the contacts that the next larger one changes."""
+    sides = np.concatenate([basis.T, -basis.T])
+    states = (x + _REACHES[:, None, None] * sides).reshape(-1, x.size)
+    counts = cycle.with_contacts(np.concatenate([x, states]))[1]
+    changed = (counts[1:] != counts[0]).any(axis=1)
+    if not changed.any():
+        return float(_REACHES[-1]), ()
+    first = int(changed.argmax())
+    size = first // len(sides)
+    states = [x[0], states[first]]
+    return float(_REACHES[max(size - 1, 0)]), _changing(cycle, [cycle.contacts(each) for each in states])
+
+
+def _changing(cycle: CycleMap, touching: list[dict[str, NDArray[np.bool_]]]) -> tuple[str, ...]:
+    """Geoms whose contacts differ between cycles, and when, in words."""
+    found, never = [], np.zeros(len(cycle.control), dtype=np.bool_)
+    timestep = float(cycle.model.opt.timestep)
+    for name in sorted(set().union(*touching)):
+        steps = np.array([each.get(name, never) for each in touching])
+        differs = np.flatnonzero((steps != steps[0]).any(axis=0))
+        if differs.size:
+            first, last = differs[0] * timestep, (differs[-1] + 1) * timestep
+            found.append((differs.size, f"{name} at {first:.3f} to {last:.3f} s"))
+    return tuple(words for _, words in sorted(found, key=lambda each: -each[0]))
