@@ -115,7 +115,7 @@ class CycleMap:
         return np.concatenate([body, positions[..., 7 + self._kept], ahead, rates[..., 2:]], axis=-1)
 
     def full(self, x: Array) -> tuple[Array, Array]:
-        """``qpos`` (..., nq) and ``qvel`` (..., nv) at the origin, heading along x, from coordinates (..., dimension)."""
+        """``qpos`` (..., nq) and ``qvel`` (..., nv) at the origin along x, from coordinates (..., dimension)."""
         shape = x.shape[:-1]
         split = self.dimension - self.model.nv
         positions = np.zeros((*shape, self.model.nq))
@@ -148,8 +148,9 @@ class CycleMap:
         return image, counts.reshape(len(x), -1)
 
     def contacts(self, x: Array) -> dict[str, NDArray[np.bool_]]:
-        """Steps of a cycle in which each geom of a moving body touches, (steps,), by name; from a state (dimension,)."""
-        data, touching = mujoco.MjData(self.model), {}
+        """Steps of a cycle in which geoms of moving bodies touch, (steps,), by name; from a state (dimension,)."""
+        data = mujoco.MjData(self.model)
+        touching: dict[str, NDArray[np.bool_]] = {}
         data.qpos[:], data.qvel[:] = self.full(x)
         for step, inputs in enumerate(self.control):
             data.ctrl[:] = inputs

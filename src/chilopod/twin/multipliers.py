@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -304,7 +303,8 @@ def cycle_multipliers(
     spec = spectrum(ReturnMap(x[0], jacobian, error if known else 0.0, 1, period))
     count = whole_pairs(spec.values, _LEADING)
     basis, dual = _real_basis(spec, count, at)
-    reach, contacts = math.nan, ()
+    reach = math.nan
+    contacts: tuple[str, ...] = ()
     if known:
         exact = tuple(
             CycleMode(complex(spec.values[i]), float(spec.error[i]), _scaled(spec.right[at, i]), period)
