@@ -15,7 +15,7 @@ from chilopod.frozen import Array
 from chilopod.twin.model import silence
 
 _TOLERANCE = 1e-15
-"""Tolerance of the contact solver: the image then does not depend on the solver's first guess (its warm start)."""
+"""Tolerance of the contact solver: its first guess (the warm start) then changes an image by some 1e-8 or less."""
 
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the body has fallen
 
@@ -43,7 +43,7 @@ class CycleMap:
     travel
         Names of joints along which the floor looks the same, such as the slide ahead of a planar walker.
     warm_start
-        False to let the solver start every step from zero. Images differ by its tolerance, 1e-15.
+        False to let the solver start every step from zero. Images differ by less than 1e-6.
     threads
         Largest number of threads; 0 for all cores.
 

@@ -45,6 +45,7 @@ _REACHES = 10.0 ** np.arange(-6.0, -1.9, 0.5)  # rad
 _FORGOTTEN, _BLOCK = 2, 4  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
 _COMPARED = 6  # cycles whose contacts are compared
+_NOT_BENT = 1e-9  # part of a mode of length 1
 _WHOLE = 1e-9  # of a cycle
 
 
@@ -69,7 +70,9 @@ class CycleMode(ReadOnlyArrays):
 
     @property
     def shape(self) -> str:
-        """``bend`` if all yaw joints turn to one side at a time, ``undulation`` otherwise."""
+        """``bend`` if all yaw joints turn to one side at a time, ``undulation`` if not, ``other`` if none turns."""
+        if not self.angles.any():
+            return "other"
         turned = self.angles * np.conj(self.angles.sum())
         return "bend" if (turned.real > 0.0).all() else "undulation"
 
@@ -163,7 +166,8 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         size = f"{math.degrees(self.amplitude):.3g}°"
         rows: list[Sequence[str]] = [("bends", "multiplier", "error", "modulus", "shape", "yaw joints, front to rear")]
         rows += [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
-        changed = ", ".join(self.contacts) or "none found"
+        nothing = "none found" if self.exact else "none found, so it may not have settled"
+        changed = ", ".join(self.contacts) or nothing
         if self.exact:
             below = [
                 f"The walk closes to {self.mismatch:.0e} in a cycle. The derivative holds for bends up to about "
@@ -280,9 +284,12 @@ def cycle_multipliers(
     amplitude, cycles, progress
         See :func:`walk_multipliers`.
     """
-    if not 0.0 < amplitude < 1.0 or cycles < 3 * _BLOCK:
-        allowed = f"above 0 and below 1 rad; {3 * _BLOCK} or more"
-        raise ParameterError("must be in range", field="amplitude, cycles", value=(amplitude, cycles), allowed=allowed)
+    if not 0.0 < amplitude < 1.0:
+        raise ParameterError(
+            "must be a small angle", field="amplitude", value=amplitude, allowed="above 0, below 1 rad"
+        )
+    if cycles < 3 * _BLOCK:
+        raise ParameterError("must be more", field="cycles", value=cycles, allowed=f"{3 * _BLOCK} or more")
     at = np.array([cycle.names.index(each) for each in bends])
     x = start[None]
     for i in range(_SETTLING):
@@ -356,11 +363,14 @@ def _closed(cycle: CycleMap, x: Array, jacobian: Array) -> Array | None:
 
 
 def _real_basis(spec: Spectrum, count: int, at: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Real basis of the leading modes, (n, count), whose largest entry among the bends is 1, and its dual."""
+    """Real basis of the leading modes, (n, count), and its dual. The largest bend of a mode is 1, or, if it has none,
+    its largest entry."""
     columns, rows = [], []
     for i in range(count):
         if spec.values[i].imag >= 0.0:
-            mode = spec.right[:, i] / spec.right[at[np.abs(spec.right[at, i]).argmax()], i]
+            mode = spec.right[:, i]
+            bent = mode[at[np.abs(mode[at]).argmax()]]
+            mode = mode / (bent if abs(bent) > _NOT_BENT else mode[np.abs(mode).argmax()])
             paired = spec.values[i].imag > 0.0
             columns += [mode.real, mode.imag][: 1 + paired]
             rows += [spec.left[:, i].real, spec.left[:, i].imag][: 1 + paired]
@@ -401,8 +411,9 @@ def _mean_modes(matrices: Array, angles: Array, period: float) -> tuple[CycleMod
 
 
 def _scaled(angles: ComplexArray) -> ComplexArray:
-    """Angles of a mode, (N-1,), the largest of which becomes 1."""
-    return np.asarray(phased(angles) / np.abs(angles).max())
+    """Angles of a mode, (N-1,), the largest of which becomes 1; zero if none turns."""
+    largest = np.abs(angles).max()
+    return np.asarray(phased(angles) / largest) if largest > _NOT_BENT else np.zeros_like(angles)
 
 
 def _reach(cycle: CycleMap, x: Array, basis: Array) -> tuple[float, tuple[str, ...]]:
