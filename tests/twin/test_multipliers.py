@@ -8,12 +8,15 @@ from chilopod import load_robot
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, cycle_multipliers, start, walk_multipliers
 from chilopod.twin.multipliers import cycle_map
+from helpers.command_line import printed, run
 
 STIFF = load_robot("aoi2022").set_from_text(["springs.stiffness[0]=75 N*mm/deg"])
 PERIOD = STIFF.gait.period
 CART = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody>
-  <body><joint name="x" type="slide" axis="1 0 0" damping="0.3"/><geom size="0.1" mass="1" contype="0"/></body>
-  <body><joint name="y" type="slide" axis="0 1 0" stiffness="2" damping="0.1"/><geom size="0.1" mass="1" pos="0 9 0"/></body>
+  <body><joint name="x" type="slide" axis="1 0 0" damping="0.3"/>
+  <geom size="0.1" mass="1" contype="0" conaffinity="0"/></body>
+  <body><joint name="y" type="slide" axis="0 1 0" stiffness="2" damping="0.1"/>
+  <geom size="0.1" mass="1" contype="0" conaffinity="0"/></body>
 </worldbody><actuator><motor joint="x"/><motor joint="y"/></actuator></mujoco>"""
 
 
@@ -94,6 +97,15 @@ def test_modes_and_the_grazing_foot_have_names(straight):
     assert printed["closes"] is True
     assert len(printed["multipliers"][0]["joint_components"]) == 5
     assert "beyond which contacts change: leg" in "\n".join(straight.lines())
+
+
+def test_the_command_line_prints_them(straight, monkeypatch):
+    asked = []
+    monkeypatch.setattr("chilopod.twin.walk_multipliers", lambda robot, **given: asked.append(given) or straight)
+    arguments = ["stability", "aoi2022", "--engine", "twin", "--amplitude", "2 deg"]
+    assert printed(*arguments, "--json") == straight.as_json()
+    assert run(*arguments)[1].splitlines() == straight.lines()
+    assert asked[0]["amplitude"] == pytest.approx(np.radians(2.0))
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ _SHORTER = 0.25  # second step over the first
 _REACHES = 10.0 ** np.arange(-6.0, -1.9, 0.5)  # rad
 _FORGOTTEN, _BLOCK = 2, 4  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
-_COMPARED = 6  # cycles whose contacts are compared
+_COMPARED = 6  # most cycles whose contacts are named
 _NOT_BENT = 1e-9  # part of a mode of length 1
 _WHOLE = 1e-9  # of a cycle
 
@@ -166,8 +166,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         size = f"{math.degrees(self.amplitude):.3g}°"
         rows: list[Sequence[str]] = [("bends", "multiplier", "error", "modulus", "shape", "yaw joints, front to rear")]
         rows += [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
-        nothing = "none found" if self.exact else "none found, so it may not have settled"
-        changed = ", ".join(self.contacts) or nothing
+        changed = ", ".join(self.contacts) or "none found"
         if self.exact:
             below = [
                 f"The walk closes to {self.mismatch:.0e} in a cycle. The derivative holds for bends up to about "
@@ -322,9 +321,11 @@ def cycle_multipliers(
     progress(0.8, "bends")
     matrices, seen = _followed(cycle, x, amplitude * basis, dual / amplitude, cycles)
     finite = _mean_modes(matrices, basis[at], period)
+    images, counts = cycle.with_contacts(seen)
     if not known:
-        contacts = _changing(cycle, [cycle.contacts(each) for each in seen[-_COMPARED:]])
-    mismatch = float(np.abs(cycle(seen[-1:])[0] - seen[-1]).max())
+        different = np.sort(np.unique(counts, axis=0, return_index=True)[1])[:_COMPARED]
+        contacts = _changing(cycle, [cycle.contacts(each) for each in seen[different]])
+    mismatch = float(np.abs(images - seen).max(axis=1)[-1])
     return CycleMultipliers(
         name, x[0], mismatch, exact, reach, amplitude, finite, np.ptp(seen[:, at], axis=0), contacts
     )
