@@ -9,7 +9,8 @@ from chilopod.twin.creep import Creep, foot_creep  # noqa: E402
 from chilopod.twin.cycle_map import CycleMap  # noqa: E402
 from chilopod.twin.edited import Edited  # noqa: E402
 from chilopod.twin.model import TwinModel  # noqa: E402
-from chilopod.twin.multipliers import CycleMultipliers, cycle_multipliers, walk_multipliers  # noqa: E402
+from chilopod.twin.modes import CycleMultipliers  # noqa: E402
+from chilopod.twin.multipliers import cycle_multipliers, walk_multipliers  # noqa: E402
 from chilopod.twin.simulate import simulate  # noqa: E402
 from chilopod.twin.start import common, initial_states, resume, start, traits  # noqa: E402
 from chilopod.twin.walk import TwinWalk  # noqa: E402

@@ -10,7 +10,8 @@ from typing import Any
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.twin.model import Edit
-from chilopod.twin.multipliers import CycleMultipliers, walk_multipliers
+from chilopod.twin.modes import CycleMultipliers
+from chilopod.twin.multipliers import walk_multipliers
 from chilopod.twin.start import common, initial_states, resume, start, traits
 from chilopod.twin.walk import TwinWalk
 
