@@ -54,16 +54,18 @@ def stability(
 
     with reading("amplitude"):
         size = units.parse(amplitude, "rad")
-    with progress_bar("stability") as show, own_code(show):
-        found = _straight_walk(described, engine, size, partial(show, "stability"))
+    with progress_bar("stability") as show:
+        if engine == "planar":
+            from chilopod.analysis import straight_walk
+
+            found: StraightWalk | CycleMultipliers = straight_walk(described)
+        else:
+            with own_code(show):
+                found = _multipliers(described, engine, size, partial(show, "stability"))
     options.deliver_json(files, found.as_json(), found.lines())
 
 
-def _straight_walk(robot: Robot, engine: str, amplitude: float, progress: Progress) -> StraightWalk | CycleMultipliers:
-    if engine == "planar":
-        from chilopod.analysis import straight_walk
-
-        return straight_walk(robot)
+def _multipliers(robot: Robot, engine: str, amplitude: float, progress: Progress) -> CycleMultipliers:
     from chilopod.engine.named import engine_named
 
     known: Any = engine_named(engine)
@@ -71,7 +73,8 @@ def _straight_walk(robot: Robot, engine: str, amplitude: float, progress: Progre
     if multipliers is None:
         said, allowed = "has no state that can be divided by its place", "planar, twin, or a chilopod.twin.Edited"
         raise ParameterError(said, field="engine", value=engine, allowed=allowed)
-    return multipliers(robot, amplitude=amplitude, progress=progress)
+    found: CycleMultipliers = multipliers(robot, amplitude=amplitude, progress=progress)
+    return found
 
 
 @with_options

@@ -151,21 +151,20 @@ def cycle_multipliers(
     progress(0.4, "closes the cycle")
     closed = _closed(cycle, x, jacobian)
     exact: tuple[CycleMode, ...] = ()
-    error = np.full_like(jacobian, np.nan)
+    found = None
     if closed is not None:
         progress(0.5, "derivative")
         found = _derivative(cycle, closed)
-        if found is not None:
-            x, (jacobian, error) = closed, found
-    known = bool(np.isfinite(error).all())
-    spec = spectrum(ReturnMap(x[0], jacobian, error if known else 0.0, 1, period))
+        x, jacobian = (closed, found[0]) if found else (x, jacobian)
+    spec = spectrum(ReturnMap(x[0], jacobian, 0.0, 1, period))
     count = whole_pairs(spec.values, _LEADING)
     basis, dual = _real_basis(spec, count, at)
     reach = math.nan
     contacts: tuple[str, ...] = ()
-    if known:
+    if found:
+        errors = spec.error[:count] + _errors(cycle, x, spec, count, _SHORTER * found[1])
         exact = tuple(
-            CycleMode(complex(spec.values[i]), float(spec.error[i]), _scaled(spec.right[at, i]), period)
+            CycleMode(complex(spec.values[i]), float(errors[i]), _scaled(spec.right[at, i]), period)
             for i in range(count)
             if spec.values[i].imag >= 0.0
         )
@@ -174,7 +173,7 @@ def cycle_multipliers(
     matrices, seen = _followed(cycle, x, amplitude * basis, dual / amplitude, cycles)
     finite = _mean_modes(matrices, basis[at], period)
     images, counts = cycle.with_contacts(seen)
-    if not known:
+    if not found:
         different = np.sort(np.unique(counts, axis=0, return_index=True)[1])[:_COMPARED]
         contacts = _changing(cycle, [cycle.contacts(each) for each in seen[different]])
     mismatch = float(np.abs(images - seen).max(axis=1)[-1])
@@ -191,14 +190,25 @@ def _differences(cycle: CycleMap, x: Array, step: float) -> tuple[Array, bool]:
     return (ahead - behind).T / (2.0 * step), bool((counts == counts[0]).all())
 
 
-def _derivative(cycle: CycleMap, x: Array) -> tuple[Array, Array] | None:
-    """Derivative at a fixed point and the errors of its entries from a second step; None if contacts change in any."""
+def _derivative(cycle: CycleMap, x: Array) -> tuple[Array, float] | None:
+    """Derivative at a fixed point, and the step of its differences; None if every step changes contacts."""
     for step in _STEPS:
         derivative, same = _differences(cycle, x, step)
         if same:
-            other, _ = _differences(cycle, x, _SHORTER * step)
-            return derivative, np.abs(derivative - other)
+            return derivative, step
     return None
+
+
+def _errors(cycle: CycleMap, x: Array, spec: Spectrum, count: int, step: float) -> Array:
+    """Errors of leading multipliers, (count,), to first order |left^H| |M right - value right|, where M right is a
+    difference along the mode with another step."""
+    modes = spec.right[:, :count]
+    shifts = step * np.concatenate([modes.real, modes.imag], axis=1).T
+    images = cycle(np.concatenate([x + shifts, x - shifts]))
+    ahead, behind = np.split(images, 2)
+    real, imaginary = np.split((ahead - behind).T / (2.0 * step), 2, axis=1)
+    off = real + 1j * imaginary - modes * spec.values[:count]
+    return np.asarray((np.abs(spec.left[:, :count]) * np.abs(off)).sum(axis=0))
 
 
 def _closed(cycle: CycleMap, x: Array, jacobian: Array) -> Array | None:
