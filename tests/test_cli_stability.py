@@ -1,11 +1,14 @@
 """`chilopod stability` and `chilopod bifurcation` as a user and as a hostile user meet them."""
 
 import json
+import sys
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from chilopod import planar
 from chilopod.cli import main
 from helpers.command_line import printed, run
 
@@ -127,6 +130,23 @@ def test_bad_input_is_one_line_that_names_it(parameter, between, expected):
     assert len(err.splitlines()) == 1
     assert expected in err
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ((PRESET, "--engine", "twin"), "the table [twin] must be given"),
+        ((PRESET, "--engine", "twn"), "did you mean 'twin'?"),
+        (("aoi2022", "--engine", "mine:engine"), "has no state that can be divided by its place"),
+        (("aoi2022", "--engine", "twin", "--amplitude", "3 deg/s"), "--amplitude"),
+        (("aoi2022", "--engine", "twin", "--amplitude", "3 rad"), "must be a small angle"),
+    ],
+)
+def test_an_engine_without_multipliers_is_one_line_that_names_it(arguments, expected, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mine", SimpleNamespace(engine=planar))
+    code, out, err = run("stability", *arguments)
+    assert (code, out) == (2, "")
+    assert expected in err.splitlines()[-1]
 
 
 def test_an_unwritable_folder_is_refused_before_any_work(tmp_path):

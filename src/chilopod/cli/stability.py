@@ -2,31 +2,79 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import BetweenOption, OutOption, ParameterOption, RobotOptions, interval, with_options
+from chilopod.cli.options import (
+    BetweenOption,
+    EngineOption,
+    OutOption,
+    ParameterOption,
+    RobotOptions,
+    interval,
+    reading,
+    with_options,
+)
 from chilopod.cli.progress import progress_bar
+from chilopod.cli.user_code import own_code
+from chilopod.errors import ParameterError
+
+if TYPE_CHECKING:
+    from chilopod.analysis import StraightWalk
+    from chilopod.progress import Progress
+    from chilopod.robot import Robot
+    from chilopod.twin import CycleMultipliers
 
 
 @with_options
-def stability(options: RobotOptions, out: OutOption = None) -> None:
-    """Floquet multipliers, exponents and modes of the straight walk in the planar model: is it stable?
+def stability(
+    options: RobotOptions,
+    engine: EngineOption = "planar",
+    amplitude: Annotated[
+        str, typer.Option(metavar="ANGLE", help='Size of the bends that the twin is given, such as "1 deg".')
+    ] = "1 deg",
+    out: OutOption = None,
+) -> None:
+    """Floquet multipliers, exponents and modes of the straight walk: is it stable?
 
     A small disturbance is a sum of modes. A mode grows with its exponent, and by its multiplier from one period T of
     the gait to the next: the walk is stable if every |multiplier| is below 1, every exponent's real part below 0.
     Exponents are the principal logarithms of the multipliers over T: their imaginary parts lie in (-pi/T, pi/T].
 
-    Example: chilopod stability aoi2022-planar --set "springs.stiffness[0]=10 N*mm/deg"
+    The twin has leading multipliers of its smallest bends, if its walk repeats from cycle to cycle, and of bends of a
+    given size, whose contacts with the floor may differ.
+
+    Example: chilopod stability aoi2022 --engine twin --set "springs.stiffness[0]=41 N*mm/deg"
     """
     described = options.described
     files = options.free_in(out, "stability.json")
-    from chilopod.analysis import straight_walk
+    from chilopod import units
 
-    with progress_bar("stability"):
-        found = straight_walk(described)
+    with reading("amplitude"):
+        size = units.parse(amplitude, "rad")
+    with progress_bar("stability") as show:
+        if engine == "planar":
+            from chilopod.analysis import straight_walk
+
+            found: StraightWalk | CycleMultipliers = straight_walk(described)
+        else:
+            with own_code(show):
+                found = _multipliers(described, engine, size, partial(show, "stability"))
     options.deliver_json(files, found.as_json(), found.lines())
+
+
+def _multipliers(robot: Robot, engine: str, amplitude: float, progress: Progress) -> CycleMultipliers:
+    from chilopod.engine.named import engine_named
+
+    known: Any = engine_named(engine)
+    multipliers = getattr(known, "walk_multipliers", None)
+    if multipliers is None:
+        said, allowed = "has no state that can be divided by its place", "planar, twin, or a chilopod.twin.Edited"
+        raise ParameterError(said, field="engine", value=engine, allowed=allowed)
+    found: CycleMultipliers = multipliers(robot, amplitude=amplitude, progress=progress)
+    return found
 
 
 @with_options

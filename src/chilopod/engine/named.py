@@ -63,6 +63,12 @@ class _Own:
         self._name, self._engine = f"engine {name}", engine
         self.traits: Traits = engine.traits
 
+    def __getattr__(self, name: str) -> Any:
+        if name != "walk_multipliers":  # the only optional part
+            raise AttributeError(name)
+        found = getattr(self._engine, name)
+        return partial(_theirs, self._name, name, found) if callable(found) else found
+
     def common(self, robot: Robot) -> Hashable:
         shared = _theirs(self._name, "common", self._engine.common, robot)
         try:

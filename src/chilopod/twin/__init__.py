@@ -6,22 +6,29 @@ from chilopod.twin import gl
 gl.import_mujoco()
 
 from chilopod.twin.creep import Creep, foot_creep  # noqa: E402
+from chilopod.twin.cycle_map import CycleMap  # noqa: E402
 from chilopod.twin.edited import Edited  # noqa: E402
 from chilopod.twin.model import TwinModel  # noqa: E402
+from chilopod.twin.modes import CycleMultipliers  # noqa: E402
+from chilopod.twin.multipliers import cycle_multipliers, walk_multipliers  # noqa: E402
 from chilopod.twin.simulate import simulate  # noqa: E402
 from chilopod.twin.start import common, initial_states, resume, start, traits  # noqa: E402
 from chilopod.twin.walk import TwinWalk  # noqa: E402
 
 __all__ = [
     "Creep",
+    "CycleMap",
+    "CycleMultipliers",
     "Edited",
     "TwinModel",
     "TwinWalk",
     "common",
+    "cycle_multipliers",
     "foot_creep",
     "initial_states",
     "resume",
     "simulate",
     "start",
     "traits",
+    "walk_multipliers",
 ]

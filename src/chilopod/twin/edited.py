@@ -10,6 +10,8 @@ from typing import Any
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.twin.model import Edit
+from chilopod.twin.modes import CycleMultipliers
+from chilopod.twin.multipliers import walk_multipliers
 from chilopod.twin.start import common, initial_states, resume, start, traits
 from chilopod.twin.walk import TwinWalk
 
@@ -54,6 +56,10 @@ class Edited:
     def start(self, *arguments: Any, **named: Any) -> TwinWalk:
         """See :func:`chilopod.twin.start`."""
         return start(*arguments, **named, edit=self._edit, traits=self.traits)
+
+    def walk_multipliers(self, *arguments: Any, **named: Any) -> CycleMultipliers:
+        """See :func:`chilopod.twin.walk_multipliers`."""
+        return walk_multipliers(*arguments, **named, edit=self._edit)
 
     def resume(self, saved: bytes, threads: int = 0) -> TwinWalk:
         """See :func:`chilopod.twin.resume`."""

@@ -1,0 +1,131 @@
+"""Multipliers of walks in MuJoCo: against solutions by hand, walks that decay, and other paths to the same state."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from chilopod import load_robot
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.twin import CycleMap, cycle_multipliers, start, walk_multipliers
+from chilopod.twin.multipliers import cycle_map
+from helpers.command_line import printed, run
+
+STIFF = load_robot("aoi2022").set_from_text(["springs.stiffness[0]=75 N*mm/deg"])
+PERIOD = STIFF.gait.period
+CART = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody>
+  <body><joint name="x" type="slide" axis="1 0 0" damping="0.3"/>
+  <geom size="0.1" mass="1" contype="0" conaffinity="0"/></body>
+  <body><joint name="y" type="slide" axis="0 1 0" stiffness="2" damping="0.1"/>
+  <geom size="0.1" mass="1" contype="0" conaffinity="0"/></body>
+</worldbody><actuator><motor joint="x"/><motor joint="y"/></actuator></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def straight():
+    return walk_multipliers(STIFF)
+
+
+def test_a_cart_and_a_spring_have_the_multipliers_of_their_steps():
+    steps = 100
+    control = np.sin(2.0 * np.pi * np.arange(steps) / steps)[:, None] * [1.0, 0.5]
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), control, travel=("x",))
+    assert cycle.names == ("y", "rate of x", "rate of y")
+    found = cycle_multipliers("cart", cycle, np.zeros(3), ["y"], 1.0)
+    # Euler's step with the damper at its end: v' = (v - h k x / m) / (1 + h d / m), x' = x + h v'.
+    step = np.array([[1.0 - 2e-4 / 1.001, 0.01 / 1.001], [-0.02 / 1.001, 1.0 / 1.001]])
+    pair = np.linalg.eigvals(step)[0] ** steps
+    expected = {"other": 1.003**-steps, "bend": complex(pair.real, abs(pair.imag))}
+    for modes in (found.exact, found.finite):
+        assert {mode.shape: mode.multiplier for mode in modes} == pytest.approx(expected, abs=1e-7)
+    assert found.stable is True
+    assert found.mismatch < 1e-11
+
+
+def test_coordinates_lead_to_the_state_and_back_wherever_it_stands():
+    cycle, plan = cycle_map(STIFF)
+    random = np.random.default_rng(0)
+    x = cycle.reduced(plan.initial_positions(), np.zeros(plan.model.nv)) + random.uniform(-0.02, 0.02, (3, 71))
+    positions, rates = cycle.full(x)
+    np.testing.assert_allclose(cycle.reduced(positions, rates), x, rtol=0, atol=1e-12)
+    cos, sin = np.cos(0.7), np.sin(0.7)
+    turned = np.array([[cos, -sin], [sin, cos]])
+    moved, rotated = positions.copy(), rates.copy()
+    moved[:, :2] = [3.0, -2.0]
+    half = np.array([np.cos(0.35), 0.0, 0.0, np.sin(0.35)])
+    for row in moved:
+        mujoco.mju_mulQuat(row[3:7], half, row[3:7].copy())
+    rotated[:, :2] = rates[:, :2] @ turned.T
+    np.testing.assert_allclose(cycle.reduced(moved, rotated), x, rtol=0, atol=1e-12)
+    walk = start([STIFF] * 3, initial=np.hstack([moved, rotated]), record=None, tolerance=1e-15)
+    walk.advance(PERIOD)
+    states = walk.states()
+    reached = cycle.reduced(states[:, : plan.model.nq], states[:, plan.model.nq :])
+    np.testing.assert_allclose(cycle(x), reached, rtol=0, atol=1e-9)
+    cold, _ = cycle_map(STIFF, warm_start=False)
+    np.testing.assert_allclose(cold(x), reached, rtol=0, atol=1e-6)
+
+
+def test_small_bends_of_independent_walks_decay_by_the_multipliers(straight):
+    assert straight.stable
+    assert straight.mismatch < 1e-9
+    assert max(mode.error for mode in straight.exact) < 1e-4
+    cycle, plan = cycle_map(STIFF)
+    state = np.hstack(cycle.full(straight.state))
+    states = np.tile(state, (2, 1))
+    states[:, plan.yaw_positions] += 1e-6 * np.array([[1.0], [-1.0]]) * [0.3, 0.5, 0.2, 1.0, 0.6]
+    walk = start([STIFF] * 2, initial=states, record=None, tolerance=1e-15)
+    angles = []
+    for i in range(1, 31):
+        walk.advance(i * PERIOD)
+        angles.append(walk.observe().joint_angles)
+    bends = np.array([0.5 * (each[0] - each[1]) for each in angles])[4:]
+    # The angles of every joint obey one linear recurrence, whose roots are the multipliers.
+    order = 4
+    rows = np.concatenate([[bends[i : i + order, j] for i in range(len(bends) - order)] for j in range(5)])
+    ahead = np.concatenate([bends[order:, j] for j in range(5)])
+    roots = np.roots([1.0, *-np.linalg.lstsq(rows, ahead, rcond=None)[0][::-1]])
+    for mode in straight.exact:
+        assert np.abs(roots - mode.multiplier).min() < 1e-3
+
+
+def test_modes_and_the_grazing_foot_have_names(straight):
+    assert [mode.shape for mode in straight.exact] == ["undulation", "bend"]
+    assert straight.exact[0].frequency * PERIOD == pytest.approx(2.0 * np.pi / 36.0, rel=0.05)
+    assert 1e-6 < straight.reach < 1e-3
+    assert any(words.startswith("leg6_left_foot at 0.004") for words in straight.contacts)
+    printed = straight.as_json()
+    assert printed["closes"] is True
+    assert len(printed["multipliers"][0]["joint_components"]) == 5
+    assert "beyond which contacts change: leg" in "\n".join(straight.lines())
+
+
+def test_the_command_line_prints_them(straight, monkeypatch):
+    asked = []
+    monkeypatch.setattr("chilopod.twin.walk_multipliers", lambda robot, **given: asked.append(given) or straight)
+    arguments = ["stability", "aoi2022", "--engine", "twin", "--amplitude", "2 deg"]
+    assert printed(*arguments, "--json") == straight.as_json()
+    assert run(*arguments)[1].splitlines() == straight.lines()
+    assert asked[0]["amplitude"] == pytest.approx(np.radians(2.0))
+
+
+@pytest.mark.parametrize(
+    ("overrides", "complaint"),
+    [
+        (["gait.swing=0.2913 s"], "twin.control_interval = '0.002 s': must repeat with the gait"),
+        (["twin.joint_inertia=0.0001 kg*m^2"], "twin.timestep = '2 ms': must be shorter for the damping of the servos"),
+    ],
+)
+def test_what_has_no_cycle_map_is_refused(overrides, complaint):
+    with pytest.raises(ParameterError, match=complaint):
+        walk_multipliers(STIFF.set_from_text(overrides))
+
+
+def test_a_model_without_such_a_state_and_a_walk_that_falls_are_refused():
+    ball = '<mujoco><worldbody><body><joint type="ball"/><geom size="0.1"/></body></worldbody></mujoco>'
+    with pytest.raises(ParameterError, match="must have a state that can be put back"):
+        CycleMap(mujoco.MjModel.from_xml_string(ball), np.zeros((5, 0)))
+    cycle, plan = cycle_map(STIFF)
+    lying = cycle.reduced(plan.initial_positions(), np.zeros(plan.model.nv))
+    lying[1] = 1.5
+    with pytest.raises(AnalysisError, match="the walk falls"):
+        cycle(lying[None])
