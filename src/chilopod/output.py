@@ -241,5 +241,8 @@ def _free(path: Path) -> Path:
 def _refused(path: Path, error: Exception) -> OutputError:
     if isinstance(error, OutputError):
         return error
+    file = next((each for each in path.parents if each.is_file()), None)
+    if file:
+        return OutputError("must be a folder, and is a file", source=str(file))
     reason = error.strerror if isinstance(error, OSError) else str(error)
     return OutputError(f"cannot be written ({reason or error})", source=str(path))
