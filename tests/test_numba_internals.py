@@ -21,7 +21,7 @@ INTERNALS = {
     "numba.core.typing": {"numba_internals.py": ("signature",)},
     "numba.core": {"numba_internals.py": ("cgutils", "event")},
     "llvmlite": {"numba_internals.py": ("binding", "ir"), "processor.py": ("binding",)},
-    "mujoco.batch": {"twin/scanner.py": ("Batch",), "twin/walk.py": ("Batch",)},
+    "mujoco.batch": {"twin/cycle_map.py": ("Batch",), "twin/scanner.py": ("Batch",), "twin/walk.py": ("Batch",)},
     "typer.core": {"cli/commands.py": ("TyperCommand", "TyperGroup", "TyperOption")},
 }
 """Of each module of others, the files of ours that may import from it, and what."""

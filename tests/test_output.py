@@ -92,7 +92,7 @@ def test_folders_are_looked_at_and_not_made(tmp_path):
     assert check_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
     (tmp_path / "file").touch()
     for path in (tmp_path / "file", tmp_path / "file" / "x", "/proc/nowhere", tmp_path / "new" / ("x" * 300) / "y"):
-        with pytest.raises(OutputError, match="file: must be a folder|cannot be written"):
+        with pytest.raises(OutputError, match=r"file: must be a folder|cannot be written"):
             check_folder(path)
     assert os.listdir(tmp_path) == ["file"]
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from types import CodeType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.twin.model import Edit
-from chilopod.twin.modes import CycleMultipliers
-from chilopod.twin.multipliers import walk_multipliers
 from chilopod.twin.start import common, initial_states, resume, start, traits
 from chilopod.twin.walk import TwinWalk
+
+if TYPE_CHECKING:
+    from chilopod.twin.modes import CycleMultipliers
 
 
 class Edited:
@@ -59,6 +60,8 @@ class Edited:
 
     def walk_multipliers(self, *arguments: Any, **named: Any) -> CycleMultipliers:
         """See :func:`chilopod.twin.walk_multipliers`."""
+        from chilopod.twin.multipliers import walk_multipliers  # with chilopod.stability, which walks do not need
+
         return walk_multipliers(*arguments, **named, edit=self._edit)
 
     def resume(self, saved: bytes, threads: int = 0) -> TwinWalk:

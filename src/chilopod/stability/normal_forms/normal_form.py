@@ -17,7 +17,7 @@ from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fit
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, Term, images
 from chilopod.stability.spectrum.eigenvalues import spectrum
 
-_START = 0.05  # first amplitude of the search, relative to the scale of the states
+_START = 0.1  # first amplitude of the search, relative to the scale of the states
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ Laub, *SIAM J. Sci. Comput.* 15, 36, 1994); all of ``DRAWS`` are so small in one
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ def disturbed(matrix: Array, error: Array, draws: int = DRAWS) -> Array:
     return np.asarray(matrix + error * _signs((draws, *matrix.shape)))
 
 
-@cache
+@lru_cache(maxsize=4)  # a search asks for one or two shapes
 def _signs(shape: tuple[int, ...]) -> Array:
     return np.random.default_rng(0).choice(np.array([-1.0, 1.0]), shape)
 
