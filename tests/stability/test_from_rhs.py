@@ -6,6 +6,7 @@ from math import cos, exp, fabs, pi, sin
 import numba
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, locate, multipliers
@@ -216,6 +217,29 @@ def test_a_traced_pulse_and_a_traced_jump_with_the_state():
     system = from_rhs(lambda t, x: [np.where(x[0] > 1.0, 3.0, 1.0)], 1, 2.0)
     _, derivative, error = system.flow_with_error(np.zeros(1), 0.0, 2.0)
     assert abs(derivative[0, 0] - 3.0) <= error < 1e-13
+
+
+SHARP = {
+    "friction": lambda t, x: np.tanh(50.0 * x),
+    "friction at once": lambda t, x: np.tanh(1000.0 * x),
+    "bump": lambda t, x: np.exp(-((200.0 * x) ** 2)),
+    "gate": lambda t, x: 1.0 / (1.0 + np.exp(-200.0 * x)),
+    "well": lambda t, x: np.cosh(50.0 * x) ** -2,
+    "pulse": lambda t, x: 50.0 * np.exp(-((2500.0 * (t - 3.1)) ** 2)),
+}
+
+
+@pytest.mark.parametrize("term", SHARP.values(), ids=SHARP)
+def test_a_function_that_saturates_is_not_stepped_over(term):
+    def rhs(t, x):
+        return [x[1], -0.2 * x[1] - x[0] ** 3 - 0.5 * term(t, x[0]) + np.cos(t)]
+
+    start, period = np.array([1.0, 0.3]), 2.0 * pi
+    state, derivative = from_rhs(rhs, 2, period).flow(start, 0.0, period)
+    steps = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-13, "max_step": 2e-3 if term is not SHARP["pulse"] else 1e-4}
+    np.testing.assert_allclose(state, solve_ivp(rhs, (0.0, period), start, **steps).y[:, -1], rtol=0.0, atol=1e-11)
+    # Liouville: the determinant is that of the damping alone.
+    assert np.linalg.det(derivative) == pytest.approx(exp(-0.2 * period), rel=1e-9)
 
 
 @pytest.mark.parametrize("called", [False, True])

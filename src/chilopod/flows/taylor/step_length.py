@@ -6,7 +6,11 @@ import math
 from typing import Any
 
 from chilopod.compiled import fused_njit
+from chilopod.flows.tracing import tape as ops
 
+_FAR, _FAR_TANH = 36.0, 9.0
+"""Sizes of arguments beyond which exp, sinh and cosh, and tanh, may be constant to round-off beside other terms."""
+_CHANGE = 0.25  # largest relative change of such an argument in a step
 _UNDERFLOW = 1e-290  # limit below which numbers lose precision: their round-off would look like a singularity
 _SAME = 3e-13
 """Round-off in a pulse of a thousandth of the period; a narrower one costs a step at each of its grid points."""
@@ -49,9 +53,29 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
     return h
 
 
+@fused_njit(error_model="numpy")
+def _unsaturated(tape: Any, values: Any, order: int, h: float) -> float:
+    """The largest step up to h at which no function jumps from one saturated end over its transition: where tanh is 1
+    to round-off, its series does not tell that it changes farther on."""
+    program = tape.program
+    for i in range(tape.layout[3], tape.layout[4]):
+        code = program[0, i]
+        if code == ops.EXP or code == ops.SINH or code == ops.COSH or code == ops.TANH:
+            argument = values[program[1, i]]
+            size = abs(argument[0])
+            if size > (_FAR_TANH if code == ops.TANH else _FAR):
+                change = 0.0
+                for k in range(order, 0, -1):
+                    change = (change + abs(argument[k])) * h
+                if change > _CHANGE * size:
+                    h *= _CHANGE * size / change
+    return h
+
+
 @fused_njit(error_model="numpy", inline="always")
 def step_size(tape: Any, series: Any, columns: int, order: int, h: float, epsilon: float) -> float:
-    """The largest step up to h at which states, switching functions and tangents are exact to epsilon."""
+    """The largest step up to h at which states, switching functions and tangents are exact to epsilon, and no function
+    leaves saturation unseen."""
     values, tangents = series.values, series.tangents
     for i in range(tape.layout[0]):
         h = _allowed(values[i], order, h, epsilon)
@@ -60,7 +84,7 @@ def step_size(tape: Any, series: Any, columns: int, order: int, h: float, epsilo
     for i in range(tape.layout[0]):
         for j in range(columns):
             h = _allowed(tangents[i, :, j], order, h, epsilon)
-    return h
+    return _unsaturated(tape, values, order, h)
 
 
 @fused_njit(error_model="numpy", inline="always")
