@@ -44,12 +44,13 @@ class _Options(RobotOptions):
     ] = None
     template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False
 
-    def printed(self, template: str) -> bool:
-        """Print the template if it is wanted."""
+    def printed(self, command: str) -> bool:
+        """Print the template of a command if it is wanted."""
+        from chilopod.tasks.identify import TEMPLATES
+
         if self.template and self.data is not None:
             raise ParameterError("must not be given with --template", field="--data", value=str(self.data))
-        if self.template:
-            typer.echo(template, nl=False)
+        typer.echo(TEMPLATES[command] if self.template else "", nl=False)
         return self.template
 
     def identify(self, solve: Callable[[Callable[[str], Progress]], tuple[Found, More]]) -> None:
@@ -103,7 +104,7 @@ def planar(options: _PlanarOptions) -> None:
     """
     from chilopod.tasks import identify
 
-    if options.printed(identify.TEMPLATE):
+    if options.printed("planar"):
         return
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
 
@@ -156,7 +157,7 @@ def twin(options: _TwinOptions) -> None:
     """
     from chilopod.tasks import identify
 
-    if options.printed(identify.TWIN_TEMPLATE):
+    if options.printed("twin"):
         return
     from chilopod.paper.fit_data import base_series_data
 

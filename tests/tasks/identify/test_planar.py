@@ -9,7 +9,7 @@ from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import TEMPLATE, CriticalMode, RecordedWalks, critical, load_data, planar, planar_fit
+from chilopod.tasks.identify import TEMPLATES, CriticalMode, RecordedWalks, critical, load_data, planar, planar_fit
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
@@ -89,12 +89,12 @@ def test_a_mode_is_a_direction():
 
 def test_the_template_is_read_as_the_papers_data(tmp_path):
     file = tmp_path / "mine.toml"
-    file.write_text(TEMPLATE)
+    file.write_text(TEMPLATES["planar"])
     assert load_data(file, CriticalMode, RecordedWalks) == DATA
-    file.write_text(TEMPLATE.replace("12 N*mm/deg", "50 N*mm/deg"))
+    file.write_text(TEMPLATES["planar"].replace("12 N*mm/deg", "50 N*mm/deg"))
     with pytest.raises(RobotFileError, match=r"mine.toml: between = .* two rising springs with k1 = 50 N"):
         load_data(file, CriticalMode, RecordedWalks)
-    file.write_text(TEMPLATE.replace("component_tolerance", "component_tolerances"))
+    file.write_text(TEMPLATES["planar"].replace("component_tolerance", "component_tolerances"))
     with pytest.raises(RobotFileError, match="unknown key; did you mean 'component_tolerance'"):
         load_data(file, CriticalMode, RecordedWalks)
 

@@ -7,7 +7,7 @@ from chilopod import load_robot
 from chilopod.analysis.parameters import stiffness
 from chilopod.errors import ChilopodError
 from chilopod.paper.fit_data import base_series_data
-from chilopod.tasks.identify import TWIN_TEMPLATE, BaseSeries, load_data, twin, twin_series
+from chilopod.tasks.identify import TEMPLATES, BaseSeries, load_data, twin, twin_series
 from chilopod.tasks.identify.data import FITTED
 from chilopod.tasks.identify.twin import TwinIdentification, known, search
 from chilopod.tasks.identify.twin_series import Series, base_series, residuals
@@ -57,7 +57,7 @@ def test_the_speed_follows_from_the_printed_time_distance_and_angle():
 
 def test_a_series_of_ones_own_is_fitted_as_well(tmp_path, monkeypatch):
     own = tmp_path / "own.toml"
-    own.write_text(TWIN_TEMPLATE)
+    own.write_text(TEMPLATES["twin"])
     template = load_data(own, BaseSeries)
     assert template.free == DATA.free
     assert template.names == DATA.names
@@ -98,8 +98,8 @@ def test_a_series_of_ones_own_is_fitted_as_well(tmp_path, monkeypatch):
     ],
 )
 def test_wrong_data_are_refused_in_one_line(tmp_path, old, new, complaint):
-    assert old in TWIN_TEMPLATE
-    (tmp_path / "own.toml").write_text(TWIN_TEMPLATE.replace(old, new))
+    assert old in TEMPLATES["twin"]
+    (tmp_path / "own.toml").write_text(TEMPLATES["twin"].replace(old, new))
     with pytest.raises(ChilopodError) as error:
         load_data(tmp_path / "own.toml", BaseSeries)
     assert complaint in str(error.value)
@@ -183,7 +183,7 @@ def test_a_search_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
     asked = []
     monkeypatch.setattr(twin, "base_series", lambda *given: (asked.append(given), stand_in_series(*given))[1])
     data = scattered_data(np.full(4, 0.4), np.random.default_rng(0))
-    whole, _ = search(ROBOT, data, [], (10, 10), folder=tmp_path / "a")
+    whole, _ = search(ROBOT, data, [], (50, 10), folder=tmp_path / "a")
     assert len(asked) == len(whole) == 60
 
     class Stop(Exception):
@@ -194,9 +194,9 @@ def test_a_search_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
             raise Stop
 
     with pytest.raises(Stop):
-        search(ROBOT, data, [], (10, 10), folder=tmp_path / "b", progress=stop)
+        search(ROBOT, data, [], (50, 10), folder=tmp_path / "b", progress=stop)
     before = len(asked)
-    again, _ = search(ROBOT, data, [], (10, 10), folder=tmp_path / "b")
+    again, _ = search(ROBOT, data, [], (50, 10), folder=tmp_path / "b")
     assert len(asked) == 120
     assert before == 109
     for one, other in zip(whole, again, strict=True):
@@ -210,7 +210,7 @@ def covered(seed, monkeypatch):
     truth = rng.uniform(size=4)
     data = scattered_data(truth, rng)
     monkeypatch.setattr(twin, "base_series", stand_in_series)
-    found = TwinIdentification(ROBOT, data, *search(ROBOT, data, [], (60, 100), seed))
+    found = TwinIdentification(ROBOT, data, *search(ROBOT, data, [], (100, 100), seed))
     ends = found.estimates.ends
     true = data.free.values_at(truth)
     return (ends[:, 0] <= true) & (true <= ends[:, 1]), found

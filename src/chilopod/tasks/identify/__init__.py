@@ -6,14 +6,7 @@ from chilopod.lazy import exports
 
 if TYPE_CHECKING:
     from chilopod.tasks.identify.check import SelfTest, self_test
-    from chilopod.tasks.identify.data import (
-        TEMPLATE,
-        TWIN_TEMPLATE,
-        BaseSeries,
-        CriticalMode,
-        RecordedWalks,
-        load_data,
-    )
+    from chilopod.tasks.identify.data import TEMPLATES, BaseSeries, CriticalMode, RecordedWalks, load_data
     from chilopod.tasks.identify.measurements import Measurement, NextMeasurements, next_measurements
     from chilopod.tasks.identify.planar import Identification, identify_planar
     from chilopod.tasks.identify.trajectories import RecordedIdentification, identify_recorded
@@ -22,14 +15,7 @@ else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "data": (
-                "TEMPLATE",
-                "TWIN_TEMPLATE",
-                "BaseSeries",
-                "CriticalMode",
-                "RecordedWalks",
-                "load_data",
-            ),
+            "data": ("TEMPLATES", "BaseSeries", "CriticalMode", "RecordedWalks", "load_data"),
             "measurements": ("Measurement", "NextMeasurements", "next_measurements"),
             "planar": ("Identification", "identify_planar"),
             "trajectories": ("RecordedIdentification", "identify_recorded"),
@@ -39,8 +25,7 @@ else:
     )
 
 __all__ = [
-    "TEMPLATE",
-    "TWIN_TEMPLATE",
+    "TEMPLATES",
     "BaseSeries",
     "CriticalMode",
     "Identification",

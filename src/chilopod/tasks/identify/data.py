@@ -28,27 +28,17 @@ _UNIT: Final = 0.1  # that rounding may leave of the norm of a mode
 _LEAST_BEND: Final = 0.1  # rad in all, at the start of a walk
 
 
-TEMPLATE, TWIN_TEMPLATE = (
-    files("chilopod.tasks.identify").joinpath(f"{name}.toml").read_text(encoding="utf-8") for name in ("planar", "twin")
-)
-"""Templates of the files that :func:`load_data` reads."""
+_HERE: Final = files("chilopod.tasks.identify")
+TEMPLATES: Final = {name: _HERE.joinpath(f"{name}.toml").read_text(encoding="utf-8") for name in ("planar", "twin")}
+"""Templates of the files that :func:`load_data` reads, by the command that fits their data."""
 
-FITTED: Final = FreeConstants.read(tomllib.loads(TWIN_TEMPLATE)["free"])
+FITTED: Final = FreeConstants.read(tomllib.loads(TEMPLATES["twin"])["free"])
 """The constants that are fitted unless the data name others, and their ranges."""
 
 
 class CriticalMode(Description):
-    """Pitchfork in k1 of a robot: the data that the constants are fitted to.
-
-    Attributes
-    ----------
-    k1, k1_tolerance
-        Critical spring and its tolerance, N*m/rad.
-    between
-        Interval in which it is located, N*m/rad.
-    components, component_tolerance
-        Joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,), and tolerance.
-    """
+    """Pitchfork of a robot: critical spring k1, the interval ``between`` two springs in which it is located, N*m/rad,
+    joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,), and tolerances."""
 
     k1: Annotated[float, _STIFFNESS]
     k1_tolerance: Annotated[float, _STIFFNESS]
@@ -115,22 +105,11 @@ class RecordedWalks(Description):
 class BaseSeries(Description):
     """Walks of a robot with several first springs, to which the constants are fitted.
 
-    Springs are in N*m/rad. A measured number is a pair: the number and its standard error.
-
-    Attributes
-    ----------
-    curved, straight
-        Springs at which the robot curves, and at which it walks straight.
-    onset
-        Spring at the onset of curves, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
-    radii, speeds
-        Radius of the curve (m), and speed of module 1 along its way (m/s), by spring.
-    free
-        Constants that are fitted, and their ranges.
-    law, shape
-        Bends at the start of evaluations, roughly those of the data: all joints together ``law[0] * sqrt(1/k1 -
-        law[1])`` rad, by default through the onset and the first radius, of which each joint has the share ``shape``,
-        front to rear, (N-1,), by default the same.
+    Springs are in N*m/rad. A measured number is a pair: the number and its standard error. The ``onset`` of curves is
+    that of a square-root fit to the bend of joint 1 at the springs of ``curved``; ``radii`` are those of the curves, m,
+    and ``speeds`` those of module 1 along its way, m/s, by spring. Evaluations begin with bends that are roughly those
+    of the data: all joints together ``law[0] * sqrt(1/k1 - law[1])`` rad, by default through the onset and the first
+    radius, of which each joint has the share ``shape``, front to rear, shape (N-1,), by default the same.
     """
 
     curved: Annotated[tuple[float, ...], _SPRINGS]
@@ -192,8 +171,8 @@ class BaseSeries(Description):
 
 
 def load_data(path: str | Path, *kinds: type[Description]) -> Any:
-    """Read a TOML file of data of one of some kinds, see :data:`TEMPLATE` and :data:`TWIN_TEMPLATE`; RobotFileError, in
-    one line, names the fault."""
+    """Read a TOML file of data of one of some kinds, see :data:`TEMPLATES`; RobotFileError, in one line,
+    names the fault."""
     table, source = parsed(read_text(path, "file of data", RobotFileError), str(path)), str(path)
     known: list[type[Description]] = [*kinds, CriticalMode, RecordedWalks, BaseSeries]  # of kinds alike, the first
     kind = max(known, key=lambda kind: len({*kind.model_fields} & {*table}))

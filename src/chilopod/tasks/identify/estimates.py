@@ -75,14 +75,9 @@ class Estimates:
         return found
 
     def _constant(self, at: int, ends: Array) -> dict[str, Any]:
-        between, known = self.between(at, ends), ends.tolist() if np.isfinite(ends).all() else None
-        text = self._text(at, float(self.values[at]), ends)
-        return {
-            "value_si": float(self.values[at]),
-            "text": text,
-            "interval_si": known,
-            "interval_text": between or "none found",
-        }
+        value, known = float(self.values[at]), ends.tolist() if np.isfinite(ends).all() else None
+        found = {"value_si": value, "text": self._text(at, value, ends), "interval_si": known}
+        return {**found, "interval_text": self.between(at, ends) or "none found"}
 
     def between(self, at: int, ends: Array) -> str:
         """Range of a constant in words, and whether the data or the search end it; nothing if it is NaN."""

@@ -133,6 +133,8 @@ def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
     if not is_list(ends) or len(ends) != 2:
         raise ParameterError("must be two ends of a range", value=ends)
     quantity = place_of(path).quantity
+    if quantity.integer:
+        raise ParameterError("must not be a whole number")
     unit = f"{quantity.si or '1'}/({place_of(per).quantity.si or '1'})" if slash else quantity.si
     low, high = (units.parse(end, unit) if slash else quantity.read(end) for end in ends)
     if not low < high or (slash and low <= 0.0):

@@ -162,8 +162,8 @@ def usual(found: Identification) -> Iterator[Measurement]:
         changes += [(said(path, factor * present), path, factor * present, 1.0) for factor in factors]
     for words, path, value, part in changes:
         of = _critical(path, value, data.between)
-        yield Measurement(f"critical k1, {words}", lambda robot, of=of: of(robot)[:1], part * rough)
-        yield Measurement(f"mode, {words}", lambda robot, of=of: of(robot)[1:], part * fine, relative=False)
+        yield Measurement(f"critical k1, {words}", partial(_part, of, slice(1)), part * rough)
+        yield Measurement(f"mode, {words}", partial(_part, of, slice(1, None)), part * fine, relative=False)
     for name, words in (("value", "critical spring"), ("frequency", "frequency of undulation")):
         yield Measurement(f"{words}, all springs alike", partial(_undulation, data.between, name), rough)
     for words, spring in (("decay", 4.0 * critical), ("decay", 2.0 * critical), ("growth", 0.8 * critical)):
@@ -171,7 +171,7 @@ def usual(found: Identification) -> Iterator[Measurement]:
     for spring in critical * np.array([0.95, 0.8, 0.6]):
         yield Measurement(f"radius, {said(K1, spring)}", _radius(spring, 1.1 * critical), rough)
     for path in FREE:
-        yield Measurement(f"{path} itself", lambda robot, path=path: np.array([robot.get(path)]), rough)
+        yield Measurement(f"{path} itself", partial(_own, path), rough)
 
 
 def _critical(path: str, value: float, between: Sequence[float]) -> Callable[[Robot], Array]:
@@ -185,6 +185,14 @@ def _critical(path: str, value: float, between: Sequence[float]) -> Callable[[Ro
         return np.append(*point)
 
     return of
+
+
+def _part(of: Callable[[Robot], Array], part: slice, robot: Robot) -> Array:
+    return of(robot)[part]
+
+
+def _own(path: str, robot: Robot) -> Array:
+    return np.array([robot.get(path)])
 
 
 def _undulation(between: Sequence[float], name: str, robot: Robot) -> Array:

@@ -55,6 +55,8 @@ def _read(given: Trajectory, robot: Robot, path: Path) -> Recording:
 
 def _netcdf(path: Path) -> tuple[list[str], Array]:
     """Names of columns and the columns of a netCDF file of one walk."""
+    if not path.exists():
+        raise RobotFileError("no such file")
     try:
         data = xr.load_dataset(path, decode_times=False)
         data = data.squeeze("robot") if "robot" in data.dims else data

@@ -232,14 +232,14 @@ def search(
     last surrogate and weight them.
 
     ``starts`` are evaluated first, in parts of the ranges, and some that are spread evenly if there are few; ``counts``
-    are the numbers of evaluations after these and of samples. Evaluations are kept in ``folder``; a stopped search
+    are the numbers of evaluations, these among them, and of samples. Evaluations are kept in ``folder``; a stopped search
     resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the surrogate at
     the samples over that which it expected. AnalysisError if the robot walks with none of the first constants.
     """
     rng = np.random.default_rng(seed)
-    few = max(_FIRST - len(starts), 0)
+    trained = counts[0]
+    few = max(min(_FIRST, trained) - len(starts), 0)
     spread = LatinHypercube(len(data.free.each), rng=rng).random(few)
-    trained = len(starts) + few + counts[0]
     fits: list[Fit] = []
 
     def evaluated(places: Sequence[Array] | Array) -> list[Fit]:
@@ -251,7 +251,7 @@ def search(
             progress(count / (trained + counts[1]), f"evaluation {count}: best has a largest residual of {largest:.2f}")
         return found
 
-    fits += evaluated([*starts, *spread])
+    fits += evaluated([*starts[:trained], *spread])
     if all(fit.largest >= LOST for fit in fits):
         raise AnalysisError("must walk with some constants in their ranges", field="robot")
     surrogate, excess = Surrogate(*_walked(fits)), 1.0
