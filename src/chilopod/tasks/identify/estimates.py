@@ -129,6 +129,6 @@ class Identified(Summary):
         said = [f"independent combinations, by half of their {CONFIDENCE:.0%} interval:"] * bool(found["combinations"])
         for each in found["combinations"]:
             least = _SMALL * max(map(abs, each["changes"].values()))
-            texts = [f"{path} {100.0 * x:+.2g} %" for path, x in each["changes"].items() if abs(x) > least]
+            texts = [f"{path} {100.0 * x:+.2g} %" for path, x in each["changes"].items() if abs(x) >= least]
             said.append(f"  {', '.join(texts)}{' (left open)' if each['open'] else ''}")
         return [], cells, [*said, *self._remarks()]

@@ -41,19 +41,9 @@ _ALIKE = 2.0  # factor of variances that is said
 
 @dataclass(frozen=True)
 class RecordedIdentification(Identified):
-    """Result of an identification from recorded walks.
-
-    Attributes
-    ----------
-    estimates
-        The constants, with intervals of linear residuals.
-    walks
-        Dataset of measured and fitted joint angles, rad.
-    scatter, variance_factor
-        Scatter of the residuals, rad, and the factor by which variances grow where neighbouring residuals are alike.
-    converged
-        False if the search was ended before.
-    """
+    """Result of an identification from recorded walks: the constants, with intervals of linear residuals; measured and
+    fitted joint angles, rad; the scatter of the residuals, rad, and the factor by which variances grow where
+    neighbouring residuals are alike; and whether the search converged."""
 
     estimates: Estimates
     walks: xr.Dataset
@@ -100,10 +90,8 @@ def identify_recorded(
     """
     walks = _Walks(robot, data.free, read_recordings(robot, data, folder))
     unknown, count = _fit(walks, progress), len(data.free.each)
-    fitted, measured = (
-        [each[:, 0] for each in walks.computed(unknown[None])],
-        [each.angles for each in walks.recordings],
-    )
+    measured = [each.angles for each in walks.recordings]
+    fitted = [each[:, 0] for each in walks.computed(unknown[None])]
     off = np.concatenate([(one - other)[np.isfinite(other)] for one, other in zip(fitted, measured, strict=True)])
     factor = max(_alike(one - other) for one, other in zip(fitted, measured, strict=True))
     scatter = float(np.linalg.norm(off) / np.sqrt(off.size - unknown.size))

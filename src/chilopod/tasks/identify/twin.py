@@ -232,9 +232,10 @@ def search(
     last surrogate and weight them.
 
     ``starts`` are evaluated first, in parts of the ranges, and some that are spread evenly if there are few; ``counts``
-    are the numbers of evaluations, these among them, and of samples. Evaluations are kept in ``folder``; a stopped search
-    resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the surrogate at
-    the samples over that which it expected. AnalysisError if the robot walks with none of the first constants.
+    are the numbers of evaluations, these among them, and of samples. Evaluations are kept in ``folder``; a stopped
+    search resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the
+    surrogate at the samples over that which it expected. AnalysisError if the robot walks with none of the first
+    constants.
     """
     rng = np.random.default_rng(seed)
     trained = counts[0]
