@@ -8,8 +8,7 @@ from chilopod.analysis.parameters import stiffness
 from chilopod.errors import ChilopodError
 from chilopod.paper.fit_data import base_series_data
 from chilopod.tasks.identify import TEMPLATES, BaseSeries, load_data, twin, twin_series
-from chilopod.tasks.identify.data import FITTED
-from chilopod.tasks.identify.twin import TwinIdentification, known, search
+from chilopod.tasks.identify.twin import FITTED, TwinIdentification, known, search
 from chilopod.tasks.identify.twin_series import Series, base_series, residuals
 
 ROBOT = load_robot("aoi2022")
