@@ -69,7 +69,7 @@ class RecordedIdentification(Identified):
             axes.plot(first.time, angles[:, 0], color=f"C{joint}", label=f"joint {joint + 1}")
             axes.plot(first.time, angles[:, 1], ".", markersize=2, color=f"C{joint}")
         axes.set(xlabel="time (s)", ylabel="joint angle (deg)")
-        axes.legend(loc="upper right")
+        axes.legend()
         return axes
 
     def _remarks(self) -> list[str]:
