@@ -55,10 +55,10 @@ def main(robots: int, k1: float, alike: float) -> None:
         for seed in range(robots):
             file = Path(folder) / f"{seed}.csv"
             robot, begin, clock = recorded(seed, k1, alike, file), time.process_time(), time.perf_counter()
-            constants = identified(k1, file).found["constants"]
+            constants = identified(k1, file).as_json()["constants"]
             took.append((time.perf_counter() - clock, time.process_time() - begin))
             true = {path: robot.get(path) for path in RANGES}
-            ends = {path: constants[path]["interval_si"] or (-np.inf, np.inf) for path in RANGES}
+            ends = {path: constants[path]["interval_si"] for path in RANGES}
             covered.append([ends[path][0] <= true[path] <= ends[path][1] for path in RANGES])
             off.append([constants[path]["value_si"] / true[path] - 1.0 for path in RANGES])
             print(

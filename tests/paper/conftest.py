@@ -12,6 +12,7 @@ from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MO
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.paper.turning.sections import MOVIES
 from chilopod.tasks.identify import Identification
+from chilopod.tasks.identify.planar_fit import FREE
 from helpers.walks import walk as WALK
 
 
@@ -60,7 +61,6 @@ def fit() -> Identification:
                 ("critical_k1", np.linspace(11.3, 12.6, 7), "N*mm/deg"),
                 ("k2-5 = 28 N*mm/deg", np.linspace(8.3, 9.5, 7), "N*mm/deg"),
                 ("uniform", np.linspace(3.7, 9.6, 7), "N*mm/deg"),
-                ("uniform_frequency", np.linspace(0.76, 0.42, 7), "rad/s"),
                 ("coefficient", np.linspace(0.017, -0.024, 7), "1/rad^2"),
                 ("verdict", np.array(["subcritical"] * 3 + ["supercritical"] * 4), ""),
             )
@@ -71,10 +71,9 @@ def fit() -> Identification:
     ranges = np.array([[231.0, 250.0], [0.06, 0.085], [0.04, 0.06]])
     off, given = np.full(6, 0.5), np.full(6, -1.02)
     return Identification(
-        given=robot, data=critical_mode_data(), best=robot, residuals=off, starts=np.zeros((1, 3)),
-        preset_residuals=given, ranges=ranges, cut=np.zeros((3, 2), dtype=bool),
-        intervals=np.full((3, 2), np.nan),
-        valley=(np.ones(3), 3.0), profile=profile,
+        given=robot, data=critical_mode_data(), constants=np.array([robot.get(path) for path in FREE]), residuals=off,
+        starts=np.zeros((1, 3)), preset_residuals=given, ranges=ranges, intervals=np.full((3, 2), np.nan),
+        spread=np.eye(3), profile=profile,
     )  # fmt: skip
 
 

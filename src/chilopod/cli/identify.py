@@ -1,13 +1,13 @@
-"""``chilopod identify``: the constants that the paper does not print."""
+"""``chilopod identify``: the constants that the paper does not print, and those of a robot of your own."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,33 +18,77 @@ from chilopod.errors import ParameterError
 
 if TYPE_CHECKING:
     from chilopod.output import Content
-    from chilopod.robot import Robot
-    from chilopod.tasks.identify import NextMeasurements, SelfTest
+    from chilopod.progress import Progress
+    from chilopod.tasks.identify import (
+        Identification,
+        NextMeasurements,
+        RecordedIdentification,
+        SelfTest,
+        TwinIdentification,
+    )
+
+    Found = Identification | RecordedIdentification | TwinIdentification
+    More = dict[str, NextMeasurements | SelfTest]
 
 app = new_app("Find constants of a model from measured or printed numbers.")
 
-OutOption = Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")]
-
 
 @dataclass(frozen=True)
-class _PlanarOptions(RobotOptions):
-    """Argument and options of ``identify planar``, as they were typed."""
+class _Options(RobotOptions):
+    """Argument and options of both commands, as they were typed."""
 
-    robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = "aoi2022-planar"
-    out: OutOption = Path("identification")
-    points: Annotated[int, typer.Option(metavar="N", help="Number of points of the profile.", min=3, max=200)] = 25
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path("identification")
     data: Annotated[
         Path | None,
         typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
     ] = None
     template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False
+
+    def printed(self, command: str) -> bool:
+        """Print the template of a command if it is wanted."""
+        from chilopod.tasks.identify import TEMPLATES
+
+        if self.template and self.data is not None:
+            raise ParameterError("must not be given with --template", field="--data", value=str(self.data))
+        typer.echo(TEMPLATES[command] if self.template else "", nl=False)
+        return self.template
+
+    def identify(self, solve: Callable[[Callable[[str], Progress]], tuple[Found, More]]) -> None:
+        """Solve with a progress bar; write the result, the robot with the best constants and the figure, and print."""
+        from chilopod.output import write_all
+        from chilopod.show import files_of
+        from chilopod.show.figures import identification
+        from chilopod.show.files import panel_files
+
+        written = self.out / "identification.json", self.out / "identified.toml"
+        free([*files_of("identification", self.out), *written], self.force)
+        with progress_bar("identification") as progress:
+            found, more = solve(lambda title: partial(progress, title))
+        result = {"robot": self.described.name, **found.as_json()}
+        result |= {name: each.as_json() for name, each in more.items()}
+        lines = [*found.lines(), *(line for each in more.values() for line in each.lines())]
+        lines.append(f"data, figure and robot file are in {self.out}")
+        source = "numbers of Aoi et al. (2022)" if self.data is None else self.data.name
+        texts = json_text(result) + "\n", found.estimates.identified(source).to_toml()
+        figure = panel_files(identification.panel(found), self.out, self.out)
+        files: Iterable[tuple[Path, Content]] = chain(zip(written, texts, strict=True), figure)
+        show = partial(print_json, result) if self.as_json else partial(typer.echo, "\n".join(lines))
+        deliver(lambda: write_all(files, replace=self.force), show)
+
+
+@dataclass(frozen=True)
+class _PlanarOptions(_Options):
+    """Argument and options of ``identify planar``, as they were typed."""
+
+    robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = "aoi2022-planar"
+    points: Annotated[int, typer.Option(metavar="N", help="Number of points of the profile.", min=3, max=200)] = 25
     measure: Annotated[bool, typer.Option("--next", help="Say which measurements would tell most.")] = False
     check: Annotated[
         int, typer.Option("--check", metavar="N", help="Identify N robots whose constants are known.", min=0, max=10000)
     ] = 0
 
 
-@app.command("planar", short_help="Constants of the planar model from a critical spring and its mode.")
+@app.command("planar", short_help="Constants of the planar model from a critical spring and its mode, or from walks.")
 @with_options
 def planar(options: _PlanarOptions) -> None:
     """Friction, half-width and forward offset of the feet from the critical k1 and its mode, with their uncertainty.
@@ -60,49 +104,40 @@ def planar(options: _PlanarOptions) -> None:
     """
     from chilopod.tasks import identify
 
-    data, out = options.data, options.out
-    if _template(options.template, data, identify.TEMPLATE):
+    if options.printed("planar"):
         return
-    described = options.described
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
-    from chilopod.show import files_of
-    from chilopod.show.figures import identification
-    from chilopod.show.files import panel_files
 
-    measured, variants = (critical_mode_data(), variant_settings()) if data is None else (identify.load_data(data), {})
-    free([*files_of("identification", out), *_identified(out)], options.force)
-    more: dict[str, NextMeasurements | SelfTest] = {}
-    with progress_bar("identification") as progress:
-        step = partial(progress, "identification")
-        if isinstance(measured, identify.RecordedWalks):
+    robot, given, variants = options.described, options.data, variant_settings() if options.data is None else {}
+    data: identify.CriticalMode | identify.RecordedWalks = (
+        identify.load_data(given, identify.CriticalMode, identify.RecordedWalks) if given else critical_mode_data()
+    )
+
+    def solve(progress: Callable[[str], Progress]) -> tuple[Found, More]:
+        if isinstance(data, identify.RecordedWalks):
             if options.measure or options.check:
                 raise ParameterError("must not be given with recorded walks", field="--next, --check")
-            walked = identify.identify_recorded(described, measured, (data or Path()).parent, step)
-            lines, numbers, best, panel = walked.lines(), walked.found, walked.best, identification.recorded(walked)
-        else:
-            found = identify.identify_planar(described, measured, options.points, variants, step)
-            lines, numbers, best, panel = found.lines(), found.as_json(), found.best, identification.panel(found)
-            if options.measure:
-                more["next"] = identify.next_measurements(found, progress=partial(progress, "next measurements"))
-            if options.check:
-                step = partial(progress, "self-test")
-                more["check"] = identify.self_test(best, measured, options.check, progress=step)
-    lines += [*(line for each in more.values() for line in each.lines()), f"data, figure and robot file are in {out}"]
-    result = {"robot": described.name, **numbers, **{name: each.as_json() for name, each in more.items()}}
-    _deliver(options, out, result, best, lines, panel_files(panel, out, out))
+            folder = given.parent if given else Path()
+            return identify.identify_recorded(robot, data, folder, progress("identification")), {}
+        found = identify.identify_planar(robot, data, options.points, variants, progress("identification"))
+        more: More = {}
+        if options.measure:
+            more["next"] = identify.next_measurements(found, progress=progress("next measurements"))
+        if options.check:
+            more["check"] = identify.self_test(found.best, data, options.check, progress=progress("self-test"))
+        return found, more
+
+    options.identify(solve)
 
 
 @dataclass(frozen=True)
-class _TwinOptions(RobotOptions):
+class _TwinOptions(_Options):
     """Argument and options of ``identify twin``, as they were typed."""
 
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset with a [twin].")] = "aoi2022"
-    out: OutOption = Path("identification-twin")
-    data: Annotated[
-        Path | None,
-        typer.Option("--data", metavar="FILE", help="TOML file of your own data; by default the paper's numbers."),
-    ] = None
-    template: Annotated[bool, typer.Option("--template", help="Print a file for --data, and end.")] = False
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path(
+        "identification-twin"
+    )
     evaluations: Annotated[
         int, typer.Option(metavar="N", help="Evaluations that find the valley of good constants.", min=1, max=100000)
     ] = 300
@@ -120,58 +155,15 @@ def twin(options: _TwinOptions) -> None:
 
     Example: chilopod identify twin my.toml --data mine.toml --out fit
     """
-    from chilopod.output import check_folder
-    from chilopod.tasks.identify import TWIN_TEMPLATE, BaseSeries, identify_twin
+    from chilopod.tasks import identify
 
-    data, out = options.data, options.out
-    if _template(options.template, data, TWIN_TEMPLATE):
+    if options.printed("twin"):
         return
-    described = options.described
     from chilopod.paper.fit_data import base_series_data
 
-    measured = base_series_data() if data is None else BaseSeries.load(data)
-    free(_identified(out), options.force)
-    counts = options.evaluations, options.samples
-    with progress_bar("identification") as progress:
-        kept, step = check_folder(out / "evaluations"), partial(progress, "identification")
-        found = identify_twin(described, measured, *counts, options.seed, kept, step)
-    result = {"robot": described.name, **found.as_json()}
-    lines = [
-        *(
-            f"{name} = {value['text']}  (90 % of the valley: {value['interval_text']})"
-            for name, value in result["constants"].items()
-        ),
-        *found.words(),
-        f"fits and robot file are in {out}",
-    ]
-    _deliver(options, out, result, found.best, lines)
-
-
-def _template(wanted: bool, data: Path | None, text: str) -> bool:
-    """Print the template of a file of data if it is wanted."""
-    if wanted and data is not None:
-        raise ParameterError("must not be given with --template", field="--data", value=str(data))
-    if wanted:
-        typer.echo(text, nl=False)
-    return wanted
-
-
-def _identified(folder: Path) -> tuple[Path, Path]:
-    return folder / "identification.json", folder / "identified.toml"
-
-
-def _deliver(
-    options: RobotOptions,
-    out: Path,
-    result: dict[str, Any],
-    best: Robot,
-    lines: list[str],
-    more: Iterable[tuple[Path, Content]] = (),
-) -> None:
-    """Write a result, the robot with the best constants and more files, and print it."""
-    from chilopod.output import write_all
-
-    texts = json_text(result) + "\n", best.with_(name="identified").to_toml()
-    files: Iterable[tuple[Path, Content]] = chain(zip(_identified(out), texts, strict=True), more)
-    show = partial(print_json, result) if options.as_json else partial(typer.echo, "\n".join(lines))
-    deliver(lambda: write_all(files, replace=options.force), show)
+    robot, given, counts = options.described, options.data, (options.evaluations, options.samples, options.seed)
+    data = identify.load_data(given, identify.BaseSeries) if given else base_series_data()
+    kept = options.out / "evaluations"
+    options.identify(
+        lambda progress: (identify.identify_twin(robot, data, *counts, kept, progress("identification")), {})
+    )

@@ -8,7 +8,7 @@ from chilopod.paper.robot import structures
 from chilopod.paper.robot.figures import trust
 from chilopod.paper.robot.spread import LOWER
 from chilopod.paper.robot.structures import STRUCTURES
-from chilopod.tasks.identify.twin_data import FREE
+from chilopod.tasks.identify.data import FITTED
 
 ROBOT = load_robot("aoi2022")
 STRIDE = "stride 1.8 cm"
@@ -28,11 +28,11 @@ def test_every_structure_walks_and_walks_differently(structure):
 
 def test_constants_are_moved_until_the_series_is_met_again(monkeypatch):
     rng = np.random.default_rng(2)
-    law = rng.normal(0.0, 10.0, (4, len(FREE.paths)))
-    start = FREE.parts_of(FREE.of(ROBOT))
+    law = rng.normal(0.0, 10.0, (4, len(FITTED.paths)))
+    start = FITTED.parts_of(FITTED.of(ROBOT))
 
     def off(robot, data, engine="twin", duration=60.0):
-        moved = FREE.parts_of(FREE.of(robot)) - start
+        moved = FITTED.parts_of(FITTED.of(robot)) - start
         return law @ moved + 2.0 * (law @ moved) ** 2 / 30.0 + (4.0 if engine == "another" else 0.0)
 
     monkeypatch.setattr(structures, "_off", off)
@@ -41,7 +41,7 @@ def test_constants_are_moved_until_the_series_is_met_again(monkeypatch):
     given, fitted, robot = structures._fitted(ROBOT, None, measured, "another", 5, 60.0)
     assert given == pytest.approx(4.0)
     assert fitted < 1.0
-    assert np.abs(FREE.parts_of(FREE.of(robot)) - start).max() < 0.4  # by the shortest way
+    assert np.abs(FITTED.parts_of(FITTED.of(robot)) - start).max() < 0.4  # by the shortest way
     assert structures._fitted(ROBOT, None, measured, "twin", 5, 60.0)[0] == 0.0
 
 

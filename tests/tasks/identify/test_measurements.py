@@ -12,7 +12,6 @@ from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
 from chilopod.tasks import identify
 from chilopod.tasks.identify import (
-    Identification,
     Measurement,
     NextMeasurements,
     SelfTest,
@@ -26,16 +25,6 @@ from chilopod.tasks.identify.measurements import usual
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
-
-
-@pytest.fixture(scope="module")
-def found():
-    constants, residuals = planar_fit._fit(ROBOT, DATA, np.array([ROBOT.get(path) for path in planar_fit.FREE]))
-    ranges, cut = planar_fit.allowed_ranges(ROBOT, DATA, constants)
-    best = planar_fit.with_constants(ROBOT, constants)
-    rest = {"starts": constants[None], "preset_residuals": residuals, "intervals": ranges, "profile": None}
-    rest["valley"] = np.ones(3), 2.0
-    return Identification(given=ROBOT, data=DATA, best=best, residuals=residuals, ranges=ranges, cut=cut, **rest)
 
 
 def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_not_by_the_worst(found, monkeypatch):
@@ -56,7 +45,7 @@ def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_n
 
         with monkeypatch.context() as patch:
             patch.setattr(planar_fit, "_Residuals", Residuals)
-            there, _ = planar_fit.allowed_ranges(ROBOT, DATA, constants)
+            there = planar_fit.allowed_ranges(ROBOT, DATA, constants)
         left = np.ptp(there, axis=1) / np.ptp(found.ranges, axis=1)
         np.testing.assert_allclose(left, [*row["range_left"].values()], atol=0.04)
     assert max(ranked[0]["range_left"].values()) < 0.8
@@ -92,7 +81,7 @@ def test_measurements_of_known_effect(found):
 def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch):
     # Where a range would be found from rounded numbers it is nothing, and everything from scattered ones.
     monkeypatch.setattr(check, "_fitted", lambda robot, data: (data, np.zeros(3)))
-    monkeypatch.setattr(check, "allowed_ranges", lambda robot, data, best: (np.full((3, 2), np.nan), None))
+    monkeypatch.setattr(check, "allowed_ranges", lambda robot, data, best: np.full((3, 2), np.nan))
     seen = []
 
     def everything(robot, data, best):
@@ -121,7 +110,7 @@ def test_data_that_leave_a_combination_open_bound_nothing(found):
         planar_fit.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar_fit.FREE]))
     ).all()
     with pytest.raises(AnalysisError, match=r"free = .*: must be bounded by the data"):
-        next_measurements(dataclasses.replace(found, best=robot, data=data), [])
+        next_measurements(dataclasses.replace(found, given=robot, data=data), [])
 
 
 def test_the_command_ranks_measurements_and_tests_itself(found, tmp_path, monkeypatch, capsys):

@@ -24,8 +24,8 @@ from chilopod.paper.turning.trials import to_target
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
+from chilopod.tasks.identify.data import FITTED
 from chilopod.tasks.identify.twin import known, samples_of
-from chilopod.tasks.identify.twin_data import FREE
 from chilopod.trials import NONE
 
 SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
@@ -57,14 +57,14 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
     robot, folder, size = context.whole, context.folder, context.size
     preset, valley = known()[0], samples_of(known())
     places = [preset.parts, *valley.drawn(size.of(COUNT, 2, 1) - 1)]
-    constants = np.array([FREE.values_at(parts) for parts in places])
+    constants = np.array([FITTED.values_at(parts) for parts in places])
     rows: list[dict[str, Any]] = []
     for index, values in enumerate(constants):
         progress(index / len(places), f"set {index + 1} of {len(places)}")
-        other = FREE.robot_with(robot, values)
+        other = FITTED.robot_with(robot, values)
         rows.append({**predictions(other, folder, size=size), **nearest_springs(other, folder, size)})
     series = base_series_data()
-    names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), FREE.paths
+    names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), FITTED.paths
 
     def table(name: str, over: str, keys: list[str]) -> tuple[tuple[str, str], np.ndarray]:
         return ("set", over), np.array([[row[name][key] for key in keys] for row in rows])

@@ -30,8 +30,8 @@ from chilopod.paper.turning.criteria import minima
 from chilopod.paper.turning.trials import turning_task
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
+from chilopod.tasks.identify.data import FITTED, BaseSeries
 from chilopod.tasks.identify.twin import PRIOR
-from chilopod.tasks.identify.twin_data import FREE, BaseSeries
 from chilopod.tasks.identify.twin_series import DURATION, base_series, residuals
 
 PHASE, UNIFORM = "module phase 180 deg", "all springs alike"
@@ -163,7 +163,7 @@ def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
         given, fitted, anew = _fitted(changed, data, law, each.engine, rounds, duration)
         found = predictions(anew, folder, each.engine, size)
         criteria = _strategies(anew, folder, each.engine, size)
-        rows.append({**found, "misfit": (given, fitted), "constants": FREE.of(anew), "criteria": criteria})
+        rows.append({**found, "misfit": (given, fitted), "constants": FITTED.of(anew), "criteria": criteria})
     variants = [name for name in rows[0]["onset"] if name != printed.AS_BUILT]
     names = [*variants, UNIFORM]
     predicted = [[*(row["onset"][name] for name in variants), row["uniform"]] for row in rows]
@@ -182,7 +182,7 @@ def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
         coords={
             "structure": [each.name for each in tried],
             "fit": ["given", "fitted"],
-            "constant": FREE.paths,
+            "constant": FITTED.paths,
             "prediction": names,
             "strategy": list(_SPRINGS),
             "criterion": list(CRITERION_NAMES),
@@ -214,11 +214,11 @@ def _strategies(robot: Robot, folder: Folder, engine: str, size: Size) -> Array:
 
 def _law(robot: Robot, data: BaseSeries, progress: Progress) -> Array:
     """Slopes of the residuals over the parts of the constants' ranges, shape (residuals, constants)."""
-    place = FREE.parts_of(FREE.of(robot))
+    place = FITTED.parts_of(FITTED.of(robot))
     columns: list[Array] = []
-    for path, step in zip(FREE.paths, _STEP * np.eye(len(place)), strict=True):
+    for path, step in zip(FITTED.paths, _STEP * np.eye(len(place)), strict=True):
         progress(len(columns) / len(place), path)
-        ends = [_off(FREE.robot_with(robot, FREE.values_at(place + sign * step)), data) for sign in (1.0, -1.0)]
+        ends = [_off(FITTED.robot_with(robot, FITTED.values_at(place + sign * step)), data) for sign in (1.0, -1.0)]
         columns.append((ends[0] - ends[1]) / (2.0 * _STEP))
     return np.array(columns).T
 
@@ -233,7 +233,7 @@ def _fitted(
     robot: Robot, data: BaseSeries, law: Array, engine: str, rounds: int, duration: float
 ) -> tuple[float, float, Robot]:
     """Misfits before and after, and the robot with constants that meet the base series best."""
-    place = FREE.parts_of(FREE.of(robot))
+    place = FITTED.parts_of(FITTED.of(robot))
     best_robot, off = robot, _off(robot, data, engine, duration)
     given = best = float(np.sqrt(np.mean(off**2)))
     here = place
@@ -244,7 +244,7 @@ def _fitted(
         normal = law.T @ law + np.eye(len(here)) / PRIOR**2
         levenberg = -np.linalg.solve(normal, law.T @ off + (here - place) / PRIOR**2)
         step = np.clip(here + levenberg, 0.0, 1.0) - here
-        moved = FREE.robot_with(robot, FREE.values_at(here + step))
+        moved = FITTED.robot_with(robot, FITTED.values_at(here + step))
         found = _off(moved, data, engine, duration)
         law = law + np.outer(found - off - law @ step, step) / max(float(step @ step), 1e-12)  # Broyden
         here, off = here + step, found

@@ -1,4 +1,4 @@
-"""Figure of the ranges of the planar model's constants that a critical spring and its mode leave."""
+"""Figures of identified constants."""
 
 from __future__ import annotations
 
@@ -15,18 +15,42 @@ from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
-from chilopod.tasks.identify import Identification, RecordedIdentification
+from chilopod.tasks.identify import Identification, RecordedIdentification, TwinIdentification
 
 _WIDE = style.Layout("ABC;DEF", 6.2)
 _NARROW = style.Layout("A;B;C;D;E;F", 17.0)
 _COLUMNS = {
     *("friction", "half_width", "largest_residual", "critical_k1"),
-    *("uniform", "uniform_frequency", "coefficient", "verdict"),
+    *("uniform", "coefficient", "verdict"),
 }
 """Columns of a profile that are no variants."""
 
 
-def panel(fit: Identification) -> Panel:
+def panel(found: Identification | RecordedIdentification | TwinIdentification) -> Panel:
+    """Figure of a result: profiles of the planar model's constants, or data as measured and as computed."""
+    if isinstance(found, Identification):
+        return _profiles(found)
+    if isinstance(found, RecordedIdentification):
+        data = found.walks
+    else:
+        data = xr.Dataset({"residual": ("datum", found.fits[0].residuals)}, {"datum": list(found.data.names)})
+    return Panel(
+        name="identification",
+        title="Data as computed with the best constants",
+        draw=lambda narrow: _draw_data(found, narrow),
+        alt="Joint angles over time, dots as recorded and lines as computed, or the residual of each datum.",
+        text=tuple(found.lines()),
+        data=data,
+    )
+
+
+def _draw_data(found: RecordedIdentification | TwinIdentification, narrow: bool) -> Figure:
+    figure, axes = style.figure(style.Layout("A", 5.0), style.Layout("A", 5.0), narrow)
+    found.plot(axes["A"])
+    return figure
+
+
+def _profiles(fit: Identification) -> Panel:
     """The profile of a fit, with the robot it was given beside."""
     data, best, count = fit.profile, fit.best, len(fit.residuals)
     inside = data.largest_residual.values <= 1.0
@@ -53,30 +77,6 @@ def panel(fit: Identification) -> Panel:
         ),
         data=data,
     )
-
-
-def recorded(found: RecordedIdentification) -> Panel:
-    """Measured and fitted joint angles of the first recorded walk."""
-    return Panel(
-        name="identification",
-        title="Recorded and computed walk",
-        draw=lambda narrow: _draw_walk(found.walks, narrow),
-        alt="Joint angles over time, dots as recorded and lines as computed, one colour for each joint.",
-        text=tuple(found.lines()),
-        data=found.walks,
-    )
-
-
-def _draw_walk(walks: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(style.Layout("A", 5.0), style.Layout("A", 5.0), narrow)
-    first = walks.isel(sample=walks.walk.values == 0)
-    for joint, angles in enumerate(np.rad2deg([first.fitted, first.measured]).T):
-        color = style.CURVES[joint % len(style.CURVES)]
-        axes["A"].plot(first.time, angles[:, 1], ".", markersize=2, color=color)
-        axes["A"].plot(first.time, angles[:, 0], color=color, label=f"joint {joint + 1}")
-    axes["A"].set(xlabel="time (s)", ylabel="joint angle (deg)")
-    figure.legend(loc="outside upper left", ncols=3 if narrow else 6)
-    return figure
 
 
 def _valley(fit: Identification) -> str:

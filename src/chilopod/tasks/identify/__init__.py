@@ -6,31 +6,26 @@ from chilopod.lazy import exports
 
 if TYPE_CHECKING:
     from chilopod.tasks.identify.check import SelfTest, self_test
-    from chilopod.tasks.identify.data import TEMPLATE, CriticalMode
+    from chilopod.tasks.identify.data import TEMPLATES, BaseSeries, CriticalMode, RecordedWalks, load_data
     from chilopod.tasks.identify.measurements import Measurement, NextMeasurements, next_measurements
     from chilopod.tasks.identify.planar import Identification, identify_planar
-    from chilopod.tasks.identify.recordings import RecordedWalks, load_data
     from chilopod.tasks.identify.trajectories import RecordedIdentification, identify_recorded
     from chilopod.tasks.identify.twin import TwinIdentification, identify_twin
-    from chilopod.tasks.identify.twin_data import TWIN_TEMPLATE, BaseSeries
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "data": ("TEMPLATE", "CriticalMode"),
+            "data": ("TEMPLATES", "BaseSeries", "CriticalMode", "RecordedWalks", "load_data"),
             "measurements": ("Measurement", "NextMeasurements", "next_measurements"),
             "planar": ("Identification", "identify_planar"),
-            "recordings": ("RecordedWalks", "load_data"),
             "trajectories": ("RecordedIdentification", "identify_recorded"),
             "check": ("SelfTest", "self_test"),
             "twin": ("TwinIdentification", "identify_twin"),
-            "twin_data": ("TWIN_TEMPLATE", "BaseSeries"),
         },
     )
 
 __all__ = [
-    "TEMPLATE",
-    "TWIN_TEMPLATE",
+    "TEMPLATES",
     "BaseSeries",
     "CriticalMode",
     "Identification",

@@ -17,8 +17,8 @@ from chilopod.robot import Robot
 from chilopod.statistics import LEVEL
 from chilopod.tasks.identify.critical import searched
 from chilopod.tasks.identify.data import CriticalMode
+from chilopod.tasks.identify.estimates import CONFIDENCE
 from chilopod.tasks.identify.planar_fit import (
-    CONFIDENCE,
     FREE,
     allowed_ranges,
     best_of,
@@ -44,14 +44,12 @@ class SelfTest(Shown):
     def as_json(self) -> dict[str, Any]:
         """Number of robots whose constant is covered, and the share that this number allows (Clopper and Pearson), by
         the kind of numbers and the constant."""
-        found: dict[str, Any] = {"robots": len(self.true)}
+        found: dict[str, Any] = {"robots": len(self.true), "rounded": {}, "scattered": {}}
         for kind, ends in (("rounded", self.ranges), ("scattered", self.intervals)):
-            counts = ((ends[..., 0] <= self.true) & (self.true <= ends[..., 1])).sum(axis=0)
-            shares = [binomtest(each, len(self.true)).proportion_ci(LEVEL) for each in counts.tolist()]
-            found[kind] = {
-                path: {"covered": int(count), "share": [float(share.low), float(share.high)]}
-                for path, count, share in zip(FREE, counts, shares, strict=True)
-            }
+            covered = (ends[..., 0] <= self.true) & (self.true <= ends[..., 1])
+            for path, count in zip(FREE, covered.sum(axis=0).tolist(), strict=True):
+                share = binomtest(count, len(covered)).proportion_ci(LEVEL)
+                found[kind][path] = {"covered": count, "share": [float(share.low), float(share.high)]}
         return found
 
     def lines(self) -> list[str]:
@@ -80,7 +78,7 @@ def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progr
         rng = np.random.default_rng([seed, number])
         other, constants, exact = made_up(robot, data, rng)
         true.append(constants)
-        ranges.append(allowed_ranges(other, *_fitted(other, rounded(exact)))[0])
+        ranges.append(allowed_ranges(other, *_fitted(other, rounded(exact))))
         intervals.append(confidence_intervals(other, *_fitted(other, scattered(exact, rng))))
         progress((number + 1) / count, f"self-test, robot {number + 1} of {count}")
     return SelfTest(np.array(true), np.array(ranges), np.array(intervals))

@@ -47,10 +47,6 @@ class Measurement:
     tolerance: float
     relative: bool = True
 
-    def tolerances(self, numbers: Array) -> Array:
-        """Tolerance of each of the numbers."""
-        return self.tolerance * (np.abs(numbers) if self.relative else np.ones(numbers.shape))
-
 
 @dataclass(frozen=True)
 class NextMeasurements(Shown):
@@ -89,7 +85,7 @@ def next_measurements(
     """Rank measurements, by default :func:`usual`, by what they would leave of the volume of the constants that are
     ``free``; the others are taken as they were found. AnalysisError if the data leave a combination open."""
     columns = [FREE.index(path) for path in free]
-    known = jacobian(found.best, found.data, np.array([found.best.get(path) for path in FREE]))[:, columns]
+    known = jacobian(found.given, found.data, found.constants)[:, columns]
     if not determined(known):
         problem = "must be bounded by the data: they leave a combination open"
         raise AnalysisError(problem, field="free", value=list(free))
@@ -99,7 +95,7 @@ def next_measurements(
     for number, each in enumerate(given):
         progress(number / len(given), each.name)
         try:
-            predicted, slopes = _linear(each, found, columns)
+            predicted, tolerances, slopes = _linear(each, found, columns)
         except ChilopodError as error:
             left_out[each.name] = str(error)
             continue
@@ -110,7 +106,7 @@ def next_measurements(
                 "measurement": each.name,
                 "tolerance": f"{100.0 * each.tolerance:.2g} %" if each.relative else f"{each.tolerance:.2g}",
                 "predicted_si": predicted.tolist(),
-                "tolerances_si": each.tolerances(predicted).tolist(),
+                "tolerances_si": tolerances.tolist(),
                 "volume_left": float(np.sqrt(left)),
                 "range_left": dict(zip(free, ranges.tolist(), strict=True)),
             }
@@ -118,19 +114,19 @@ def next_measurements(
     return NextMeasurements(sorted(rows, key=lambda row: row["volume_left"]), left_out)
 
 
-def _linear(measurement: Measurement, found: Identification, columns: Sequence[int]) -> tuple[Array, Array]:
-    """Predicted numbers, and their derivatives over constants in units of :func:`scale_of`, over their tolerances, by
-    central differences with two steps that must agree."""
-    best, scale = np.array([found.best.get(path) for path in FREE]), scale_of(found.best, found.data)
+def _linear(measurement: Measurement, found: Identification, columns: Sequence[int]) -> tuple[Array, Array, Array]:
+    """Predicted numbers, their tolerances, and their derivatives over constants in units of :func:`scale_of`, over the
+    tolerances, by central differences with two steps that must agree."""
+    best, scale = found.constants, scale_of(found.given, found.data)
 
     def at(move: Array) -> Array:
-        numbers = np.asarray(measurement.of(with_constants(found.best, best + move * scale)))
+        numbers = np.asarray(measurement.of(with_constants(found.given, best + move * scale)))
         if not np.isfinite(numbers).all():
             raise AnalysisError("the numbers must be finite")
         return numbers
 
     predicted = at(np.zeros(len(FREE)))
-    tolerances = measurement.tolerances(predicted)
+    tolerances = measurement.tolerance * (np.abs(predicted) if measurement.relative else np.ones(predicted.shape))
     if not tolerances.all():
         raise AnalysisError("the tolerance must not be zero, as that of a number that is zero")
     moves = _STEP * np.eye(len(FREE))[columns]
@@ -138,7 +134,7 @@ def _linear(measurement: Measurement, found: Identification, columns: Sequence[i
     fine, coarse = fine / tolerances[:, None], coarse / tolerances[:, None]
     if np.abs(fine - coarse).max() > _AGREE * max(np.abs(fine).max(), 1.0):
         raise AnalysisError("the numbers must be smooth in the constants")
-    return predicted, (4.0 * fine - coarse) / 3.0
+    return predicted, tolerances, (4.0 * fine - coarse) / 3.0
 
 
 def _widths(slopes: Array, residuals: Array) -> Array:
@@ -146,10 +142,7 @@ def _widths(slopes: Array, residuals: Array) -> Array:
     most = max(1.0, float(np.abs(residuals).max()))
     sides = np.vstack([slopes, -slopes]), np.concatenate([most - residuals, most + residuals])
     goals = np.eye(slopes.shape[1])
-    least, negative = (
-        [linprog(sign * goal, *sides, bounds=(None, None)).fun for goal in goals] for sign in (1.0, -1.0)
-    )
-    return -np.array(least) - np.array(negative)
+    return -np.array([sum(linprog(s * goal, *sides, bounds=(None, None)).fun for s in (1.0, -1.0)) for goal in goals])
 
 
 def usual(found: Identification) -> Iterator[Measurement]:
@@ -171,8 +164,8 @@ def usual(found: Identification) -> Iterator[Measurement]:
         of = _critical(path, value, data.between)
         yield Measurement(f"critical k1, {words}", partial(_part, of, slice(1)), part * rough)
         yield Measurement(f"mode, {words}", partial(_part, of, slice(1, None)), part * fine, relative=False)
-    for part, words in enumerate(("critical spring", "frequency of undulation")):
-        yield Measurement(f"{words}, all springs alike", partial(_undulation, data.between, part), rough)
+    for name, words in (("value", "critical spring"), ("frequency", "frequency of undulation")):
+        yield Measurement(f"{words}, all springs alike", partial(_undulation, data.between, name), rough)
     for words, spring in (("decay", 4.0 * critical), ("decay", 2.0 * critical), ("growth", 0.8 * critical)):
         yield Measurement(f"{words} after a push, {said(K1, spring)}", partial(_rate, spring), rough)
     for spring in critical * np.array([0.95, 0.8, 0.6]):
@@ -202,9 +195,9 @@ def _own(path: str, robot: Robot) -> Array:
     return np.array([robot.get(path)])
 
 
-def _undulation(between: Sequence[float], part: int, robot: Robot) -> Array:
+def _undulation(between: Sequence[float], name: str, robot: Robot) -> Array:
     point = first_loss(robot, ALL, (between[0], between[1]), Kind.NEIMARK_SACKER, normal_form=False).point
-    return np.array([(point.value, point.frequency)[part]])
+    return np.array([getattr(point, name)])
 
 
 def _rate(spring: float, robot: Robot) -> Array:

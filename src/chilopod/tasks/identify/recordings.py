@@ -13,53 +13,12 @@ from chilopod import units
 from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
-from chilopod.robot.files import described, parsed
-from chilopod.tasks.identify.data import CriticalMode
+from chilopod.tasks.identify.data import RecordedWalks, Trajectory
 from chilopod.text_file import read_text
-from chilopod.units import Description
 
 _LARGEST, _LONGEST = 50_000_000, 3600.0  # bytes, s
 _CYCLES, _NUMBERS = 5, 100  # of the gait, and angles, which a recording must have
 _UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
-
-
-class Trajectory(Description):
-    """File with a recorded walk, the unit of its angles where it names none, and numbers of the robot in this walk,
-    such as ``springs.stiffness[0]=8 N*mm/deg``."""
-
-    file: str
-    unit: str | None = None
-    settings: tuple[str, ...] = ()
-
-
-class RecordedWalks(Description):
-    """Data: recorded walks of one robot, and least and largest value of each constant that is free, by its path."""
-
-    free: dict[str, tuple[float | str, float | str]]
-    trajectory: tuple[Trajectory, ...]
-
-    def ranges(self, robot: Robot) -> dict[str, tuple[float, float]]:
-        """Ranges of the free constants, SI; ParameterError, in one line, names the fault."""
-        if not (self.free and self.trajectory):
-            raise ParameterError("must not be empty", field="trajectory" if self.free else "free")
-        read = {}
-        for path, ends in self.free.items():
-            low, high = (robot.override(path, end).get(path) for end in ends)
-            if not low < high:
-                raise ParameterError("must rise", field=f"free.{path}", value=ends)
-            read[path] = (low, high)
-        return read
-
-    def recordings(self, robot: Robot, folder: Path) -> list[Recording]:
-        """Walks of a robot from files in a folder; RobotFileError, in one line, names file and fault."""
-        return [_read(each, robot.set_from_text(each.settings), folder / each.file) for each in self.trajectory]
-
-
-def load_data(path: str | Path) -> CriticalMode | RecordedWalks:
-    """Read a TOML file of data, see ``TEMPLATE``; RobotFileError, in one line, names the fault."""
-    table, source = parsed(read_text(path, "file of data", RobotFileError), str(path)), str(path)
-    recorded = {"free", "trajectory"} & {*table}
-    return described(RecordedWalks, table, source) if recorded else described(CriticalMode, table, source)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +30,17 @@ class Recording:
     settings: tuple[str, ...]
     times: Array
     angles: Array
+
+
+def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Recording]:
+    """Walks of a robot from files in a folder; RobotFileError or ParameterError, in one line, names file and fault."""
+    data.free.check(robot)
+    for each in data.trajectory:
+        fixed = {text.partition("=")[0].strip() for text in each.settings}
+        for path in data.free.paths:
+            if {path, path.partition("[")[0]} & fixed:
+                raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
+    return [_read(each, robot.set_from_text(each.settings), folder / each.file) for each in data.trajectory]
 
 
 def _read(given: Trajectory, robot: Robot, path: Path) -> Recording:
@@ -85,6 +55,8 @@ def _read(given: Trajectory, robot: Robot, path: Path) -> Recording:
 
 def _netcdf(path: Path) -> tuple[list[str], Array]:
     """Names of columns and the columns of a netCDF file of one walk."""
+    if not path.exists():
+        raise RobotFileError("no such file")
     try:
         data = xr.load_dataset(path, decode_times=False)
         data = data.squeeze("robot") if "robot" in data.dims else data

@@ -7,67 +7,77 @@ Derivatives are differences of walks that run together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
-from chilopod import units
 from chilopod.frozen import Array
-from chilopod.notebook import Shown, aligned
+from chilopod.notebook import axes_for
 from chilopod.planar import PlanarModel, initial_states
 from chilopod.planar.sampled import states_at
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.tasks.identify.planar_fit import CONFIDENCE
-from chilopod.tasks.identify.recordings import RecordedWalks, Recording
+from chilopod.tasks.identify.data import RecordedWalks
+from chilopod.tasks.identify.estimates import CONFIDENCE, Estimates, Identified
+from chilopod.tasks.identify.free import FreeConstants
+from chilopod.tasks.identify.recordings import Recording, read_recordings
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _STEP, _TOLERANCE = 1e-5, 1e-8  # of differences, in units of ranges, cycles and rad, and of walks
 _EARLIER, _FAR = 0.25, np.pi  # cycles from the start of a walk to its first sample, and angles after it has failed, rad
 _PHASES, _CYCLES = 6, 10  # number of phases to start from, each tried on so many cycles
 _ROUGH, _FINE = (1e-3, 12), (1e-9, 40)  # change of the sum of squares, relative, that ends a fit, and most steps
 _PRIOR = 1e-3  # weight of constants as given, in rad for a range
-_OPEN, _ALIKE = 0.5, 2.0  # half of an interval, in ranges, that leaves a constant open, and factor that is said
-_SMALL = 0.02  # change in a combination that is not said, over the largest
+_ALIKE = 2.0  # factor of variances that is said
 
 
 @dataclass(frozen=True)
-class RecordedIdentification(Shown):
-    """Result of an identification from recorded walks.
+class RecordedIdentification(Identified):
+    """Result of an identification from recorded walks: the constants, with intervals of linear residuals; measured and
+    fitted joint angles, rad; the scatter of the residuals, rad, and the factor by which variances grow where
+    neighbouring residuals are alike; and whether the search converged."""
 
-    ``best`` is the robot with the best constants, and their 90 % intervals as provenance. ``found`` has these as
-    numbers and text, correlations, independent combinations (relative changes of the constants by half of the 90 %
-    interval along each), the scatter of the residuals, rad, and the factor by which variances grow where neighbouring
-    residuals are alike. ``walks`` has measured and fitted joint angles, rad.
-    """
-
-    best: Robot
-    found: dict[str, Any]
+    estimates: Estimates
     walks: xr.Dataset
+    scatter: float
+    variance_factor: float
+    converged: bool
 
-    def lines(self) -> list[str]:
-        """Constants with intervals, and combinations, as lines of text."""
-        level, scatter = f"{CONFIDENCE:.0%} interval", np.rad2deg(self.found["scatter_rad"])
-        rows = [(path, each["text"], each["interval_text"]) for path, each in self.found["constants"].items()]
-        said = [f"residuals of {int(self.walks.measured.count())} joint angles scatter by {scatter:.3g} deg"]
-        said += [*aligned([("constant", "best", level), *rows]), f"independent combinations, by half of their {level}:"]
-        for each in self.found["combinations"]:
-            least = _SMALL * max(map(abs, each["changes"].values()))
-            texts = [f"{path} {100.0 * x:+.2g} %" for path, x in each["changes"].items() if abs(x) > least]
-            said.append(f"  {', '.join(texts)}{' (left open)' if each['open'] else ''}")
-        if not self.found["converged"]:
-            said.append(f"the search ended after {_FINE[1]} steps, before it converged")
-        if (factor := self.found["variance_factor"]) > _ALIKE:
-            wide = f"intervals are {np.sqrt(factor):.1f} times as wide as those of independent ones"
+    @property
+    def title(self) -> str:
+        """Robot, and the scatter of the residuals."""
+        count, scatter = int(self.walks.measured.count()), np.rad2deg(self.scatter)
+        return f"{self.estimates.given.name}: residuals of {count} joint angles scatter by {scatter:.3g} deg"
+
+    def as_json(self) -> dict[str, Any]:
+        """Constants with intervals, correlations and combinations, scatter, and the factor of variances."""
+        rest = {"variance_factor": self.variance_factor, "converged": self.converged}
+        return {**super().as_json(), "scatter_rad": self.scatter, **rest}
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw joint angles of the first walk over time, dots as recorded and lines as computed."""
+        axes, first = axes_for(axes), self.walks.isel(sample=self.walks.walk.values == 0)
+        for joint, angles in enumerate(np.rad2deg([first.fitted, first.measured]).T):
+            axes.plot(first.time, angles[:, 0], color=f"C{joint}", label=f"joint {joint + 1}")
+            axes.plot(first.time, angles[:, 1], ".", markersize=2, color=f"C{joint}")
+        axes.set(xlabel="time (s)", ylabel="joint angle (deg)")
+        axes.legend()
+        return axes
+
+    def _remarks(self) -> list[str]:
+        said = [f"the search ended after {_FINE[1]} steps, before it converged"] * (not self.converged)
+        if self.variance_factor > _ALIKE:
+            wide = f"intervals are {np.sqrt(self.variance_factor):.1f} times as wide as those of independent ones"
             said.append(f"neighbouring residuals are alike: the model or the recording is off; {wide}")
         return said
-
-    _lines = lines
 
 
 def identify_recorded(
@@ -76,68 +86,36 @@ def identify_recorded(
     """Fit the free constants of a robot to recorded walks from files in a folder.
 
     Intervals are those of linear residuals with the scatter that is left. Directions that the data leave open end near
-    the constants of the robot. Errors are those of :class:`RecordedWalks`.
+    the constants of the robot. Errors are those of :func:`read_recordings`.
     """
-    walks = _Walks(robot, data.ranges(robot), data.recordings(robot, folder))
-    free, count = _fit(walks, progress), len(walks.ranges)
-    fitted, measured = [each[:, 0] for each in walks.computed(free[None])], [each.angles for each in walks.recordings]
+    walks = _Walks(robot, data.free, read_recordings(robot, data, folder))
+    unknown, count = _fit(walks, progress), len(data.free.each)
+    measured = [each.angles for each in walks.recordings]
+    fitted = [each[:, 0] for each in walks.computed(unknown[None])]
     off = np.concatenate([(one - other)[np.isfinite(other)] for one, other in zip(fitted, measured, strict=True)])
     factor = max(_alike(one - other) for one, other in zip(fitted, measured, strict=True))
-    scatter = float(np.linalg.norm(off) / np.sqrt(off.size - free.size))
-    covariance = factor * scatter**2 * walks.covariance(free)
-    wide = float(stdtrit(max(off.size / factor - free.size, 1.0), 0.5 + 0.5 * CONFIDENCE))
-    best, half = walks.with_constants(free[:count]), wide * np.sqrt(np.diag(covariance))
-    constants = {path: _constant(best, path, walks, at, free[at], half[at]) for at, path in enumerate(walks.ranges)}
-    sizes = walks.size / np.abs([best.get(path) or size for path, size in zip(walks.ranges, walks.size, strict=True)])
-    values, directions = np.linalg.eigh(covariance * np.outer(sizes, sizes))
-    changes = wide * np.sqrt(np.abs(values)) * directions * np.where(directions.sum(axis=0) < 0.0, -1.0, 1.0)
-    opens = (np.abs(changes) > _OPEN * sizes[:, None]).any(axis=0).tolist()
-    named = [dict(zip(walks.ranges, each, strict=True)) for each in changes.T.tolist()]
-    found = {
-        "constants": constants,
-        "correlations": (covariance * np.outer(wide / half, wide / half)).tolist(),
-        "combinations": [{"changes": one, "open": is_open} for one, is_open in zip(named, opens, strict=True)],
-        "scatter_rad": scatter,
-        "variance_factor": factor,
-        "converged": walks.converged,
-    }
-    files = ", ".join(each.name for each in walks.recordings)
-    texts = {path: f"identified from {files}; 90 %: {each['interval_text']}" for path, each in constants.items()}
+    scatter = float(np.linalg.norm(off) / np.sqrt(off.size - unknown.size))
+    wide = float(stdtrit(max(off.size / factor - unknown.size, 1.0), 0.5 + 0.5 * CONFIDENCE))
+    values, slopes = data.free.values_at(unknown[:count]), data.free.slopes(unknown[:count])
+    spread = wide**2 * factor * scatter**2 * slopes @ walks.covariance(unknown) @ slopes.T
+    half = np.sqrt(np.diag(spread))
+    ends = np.clip(np.array([values - half, values + half]), *data.free.limits(values).T[:, None]).T
     times = np.concatenate([each.times for each in walks.recordings])
     number = np.repeat(range(len(measured)), [len(each) for each in measured])
     record = xr.Dataset(coords={"time": ("sample", times, {"units": "s"}), "walk": ("sample", number)})
     for name, angles in (("measured", measured), ("fitted", fitted)):
         record[name] = ("sample", "joint"), np.vstack(angles), {"units": "rad"}
-    return RecordedIdentification(best.with_(provenance={**best.provenance, **texts}), found, record)
-
-
-def _constant(best: Robot, path: str, walks: _Walks, at: int, scaled: float, half: float) -> dict[str, Any]:
-    """Best value of a constant and its interval."""
-    ends = (walks.low[at] + walks.size[at] * np.clip([scaled - half, scaled + half], 0.0, 1.0)).tolist()
-    text, *limits = (units.format(each, best.unit_of(path), digits=5) for each in (best.get(path), *ends))
-    cut = " (cut by the range searched)" if half > min(scaled, 1.0 - scaled) else ""
-    is_open = bool(half > _OPEN)
-    known = "left open by the walks" if is_open else f"{limits[0]} to {limits[1]}{cut}"
-    return {"value_si": best.get(path), "text": text, "interval_si": None if is_open else ends, "interval_text": known}
+    estimates = Estimates(robot, data.free, values, ends, spread)
+    return RecordedIdentification(estimates, record, scatter, factor, walks.converged)
 
 
 class _Walks:
-    """Computed angles of recorded walks, and derivatives. Unknown are the constants in units of their ranges, from the
-    least value on, then for each walk the phase of the gait, cycles, and the joint angles, rad, at its start."""
+    """Computed angles of recorded walks, and derivatives. Unknown are the constants in parts of their ranges, then for
+    each walk the phase of the gait, cycles, and the joint angles, rad, at its start."""
 
-    def __init__(
-        self, robot: Robot, ranges: Mapping[str, tuple[float, float]], recordings: Sequence[Recording]
-    ) -> None:
-        self.robot, self.ranges, self.recordings, self.converged = robot, ranges, recordings, False
-        self.low, high = np.array(list(ranges.values())).T
-        self.size: Array = high - self.low
-        self.given: Array = np.clip(([robot.get(path) for path in ranges] - self.low) / self.size, 0.0, 1.0)
-
-    def with_constants(self, scaled: Array) -> Robot:
-        robot = self.robot
-        for path, value in zip(self.ranges, self.low + scaled * self.size, strict=True):
-            robot = robot.with_value(path, float(value))
-        return robot
+    def __init__(self, robot: Robot, free: FreeConstants, recordings: Sequence[Recording]) -> None:
+        self.robot, self.free, self.recordings, self.converged = robot, free, recordings, False
+        self.given: Array = np.clip(free.parts_of(free.of(robot)), 0.0, 1.0)
 
     def computed(self, frees: Array) -> list[Array]:
         """Angles of each walk, rad, shape (samples, sets, N-1), with sets of unknowns, shape (sets, unknowns)."""
@@ -145,7 +123,8 @@ class _Walks:
         out = []
         for one, start in zip(self.recordings, starts, strict=True):
             rows, which = np.unique(np.hstack([frees[:, :count], start]), axis=0, return_inverse=True)
-            robots = [self.with_constants(row).set_from_text(one.settings) for row in rows[:, :count]]
+            robots = [self.free.robot_with(self.robot, self.free.values_at(row)) for row in rows[:, :count]]
+            robots = [each.set_from_text(one.settings) for each in robots]
             out.append(_angles(one.times, robots, rows[:, count:])[:, which])
         return out
 
@@ -196,7 +175,7 @@ def _alone(walks: _Walks, recording: Recording) -> Array:
     period, count = walks.robot.gait.period, walks.given.size
     end = int(np.searchsorted(recording.times, _CYCLES * period))
     first = replace(recording, times=recording.times[:end], angles=recording.angles[:end])
-    short, whole = (_Walks(walks.robot, walks.ranges, [each]) for each in (first, recording))
+    short, whole = (_Walks(walks.robot, walks.free, [each]) for each in (first, recording))
     early = recording.angles[recording.times <= 0.5 * period]
     start = np.nan_to_num(early).sum(axis=0) / np.maximum(np.isfinite(early).sum(axis=0), 1)
     guesses = [np.concatenate([walks.given, [k / _PHASES], start]) for k in range(_PHASES)]

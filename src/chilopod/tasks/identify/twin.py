@@ -14,29 +14,35 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from scipy.stats import norm
 from scipy.stats.qmc import LatinHypercube
 
-from chilopod import units
 from chilopod.analysis.parameters import K1
 from chilopod.engine import engine_named
 from chilopod.errors import AnalysisError, ChilopodError
-from chilopod.frozen import Array, Short
+from chilopod.frozen import Array
+from chilopod.notebook import axes_for
 from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.tasks.identify.twin_data import FREE, BaseSeries
+from chilopod.tasks.identify.data import FITTED, BaseSeries
+from chilopod.tasks.identify.estimates import CONFIDENCE, Estimates, Identified
 from chilopod.tasks.identify.twin_series import DURATION, LOST, Series, base_series, residuals
 from chilopod.tasks.identify.valley import LEAST, Samples, Surrogate
 from chilopod.tasks.radius_law import DURATION as LONG
 from chilopod.tasks.radius_law import end_of_walk
 from chilopod.trials import Trial, run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 VERSION = 3
 """Version of evaluations, increased whenever the same constants would give other bends; other versions are ignored."""
@@ -77,7 +83,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class TwinIdentification(Short):
+class TwinIdentification(Identified):
     """Result of a search for the constants of the twin: robot with the constants that are not fitted, data, all
     evaluations, first the best of those that reach the curve from a straight start, then by objective; and the mean
     square error of the surrogate at the samples, over that which it expected."""
@@ -86,11 +92,6 @@ class TwinIdentification(Short):
     data: BaseSeries
     fits: list[Fit]
     misjudged: float = 1.0
-
-    @property
-    def best(self) -> Robot:
-        """The robot with the best constants."""
-        return self.data.free.robot_with(self.given, self.data.free.values_at(self.fits[0].parts))
 
     @property
     def good(self) -> list[Fit]:
@@ -104,51 +105,56 @@ class TwinIdentification(Short):
 
     @property
     def samples(self) -> Samples:
-        """The weighted samples of the valley."""
-        return samples_of(self.fits)
+        """The weighted samples of the valley; none if no fit comes within three standard errors of every datum."""
+        return samples_of(self.fits if self.nearest.largest <= FAR else [])
 
-    def intervals(self) -> dict[str, tuple[float, float, float]]:
-        """Weighted mean of each constant and ends of its 90 % interval, SI; empty if no fit comes within three standard
-        errors of every datum, or without a sample."""
-        samples = self.samples
-        if self.nearest.largest > FAR or not len(samples.weights):
-            return {}
-        values = np.array([self.data.free.values_at(parts) for parts in samples.parts])
-        return {path: samples.interval(each) for path, each in zip(self.data.free.paths, values.T, strict=True)}
+    @property
+    def estimates(self) -> Estimates:
+        """The best constants, with intervals over the samples of the valley."""
+        samples, free = self.samples, self.data.free
+        count, best = len(free.each), free.values_at(self.fits[0].parts)
+        if not len(samples.weights):
+            return Estimates(self.given, free, best, np.full((count, 2), np.nan), np.full((count, count), np.nan))
+        values = np.array([free.values_at(parts) for parts in samples.parts]).T
+        off = values - (values @ samples.weights)[:, None]
+        spread = norm.ppf(0.5 + 0.5 * CONFIDENCE) ** 2 * (samples.weights * off) @ off.T
+        return Estimates(self.given, free, best, np.array([samples.interval(each) for each in values]), spread)
 
-    def words(self) -> list[str]:
-        """How many fits meet all data, or how near the nearest comes and which datum it misses; and how many effective
-        samples the valley has, if there is one."""
-        nearest, samples = self.nearest, self.samples
-        said = [f"largest residual {self.fits[0].largest:.2f} (1: every datum within its error); {len(self.good)} of "]
-        said[0] += f"{len(self.fits)} evaluations meet every datum"
+    @property
+    def title(self) -> str:
+        """Largest residual, how many fits meet all data, or how near the nearest comes and which datum it misses."""
+        nearest = self.nearest
+        said = f"{self.given.name}: largest residual {self.fits[0].largest:.2f} (1: every datum within its error); "
+        said += f"{len(self.good)} of {len(self.fits)} evaluations meet every datum"
         if not self.good:
             missed = self.data.names[int(np.abs(nearest.residuals).argmax())]
-            said[0] += f"; the nearest misses the {missed} by {nearest.largest:.2f} standard errors"
-        if self.intervals():
-            said.append(
-                f"valley: {samples.effective:.3g} effective samples of {len(samples.weights)}; squared errors of the "
-            )
-            said[1] += f"surrogate there are {self.misjudged:.2g} times those that it expected"
-            if samples.effective < LEAST:
-                said[1] += f"; below {LEAST:.0f} intervals are not reliable: more --evaluations or --samples are needed"
+            said += f"; the nearest misses the {missed} by {nearest.largest:.2f} standard errors"
         return said
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the residual of each datum at the best constants."""
+        axes = axes_for(axes)
+        axes.barh(self.data.names, self.fits[0].residuals)
+        axes.invert_yaxis()
+        axes.set(xlabel="computed less measured (standard errors)")
+        return axes
+
+    def _remarks(self) -> list[str]:
+        samples = self.samples
+        if not len(samples.weights):
+            return ["no valley: no constants come within three standard errors of every datum"]
+        said = f"valley: {samples.effective:.3g} effective samples of {len(samples.weights)}; squared errors of the "
+        said += f"surrogate there are {self.misjudged:.2g} times those that it expected"
+        if samples.effective < LEAST:
+            said += f"; below {LEAST:.0f} intervals are not reliable: more --evaluations or --samples are needed"
+        return [said]
 
     def as_json(self) -> dict[str, Any]:
         """Constants with their intervals, and the good fits and samples of the valley, as plain numbers and text."""
-        free, intervals, constants = self.data.free, self.intervals(), {}
-        for path, value in zip(free.paths, free.values_at(self.fits[0].parts).tolist(), strict=True):
-            unit, (mean, *ends) = self.given.unit_of(path), intervals.get(path, (None,))
-            constants[path] = {
-                "value_si": value,
-                "text": units.format(value, unit, digits=3),
-                "mean_si": mean,
-                "interval_si": ends or None,
-                "interval_text": " to ".join(units.format(end, unit, digits=2) for end in ends) or "none found",
-            }
         kept = [fit for fit in self.fits if fit.weight or fit.largest <= GOOD] or self.fits[:1]
+        numbers = [(self.data.free.values_at(fit.parts).tolist(), fit.residuals.tolist(), fit.weight) for fit in kept]
         return {
-            "constants": constants,
+            **super().as_json(),
             "largest_residual": self.fits[0].largest,
             "smallest_largest_residual": self.nearest.largest,
             "residuals": dict(zip(self.data.names, self.fits[0].residuals.tolist(), strict=True)),
@@ -157,14 +163,7 @@ class TwinIdentification(Short):
             "samples": len(self.samples.weights),
             "effective_samples": self.samples.effective,
             "surrogate_squared_error": self.misjudged,
-            "fits": [
-                {
-                    "constants": free.values_at(fit.parts).tolist(),
-                    "residuals": fit.residuals.tolist(),
-                    "weight": fit.weight,
-                }
-                for fit in kept
-            ],
+            "fits": [dict(zip(("constants", "residuals", "weight"), each, strict=True)) for each in numbers],
         }
 
 
@@ -181,26 +180,20 @@ def evaluate(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None =
     given = data.free.robot_with(robot, constants)
     series = [data.springs, data.law, data.shape, data.start(robot, data.springs).tolist()]
     text = json.dumps([VERSION, given.with_(name="robot", provenance={}).to_toml(), series, DURATION])
-    path = None if folder is None else folder / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
-    found = None if path is None else _read(path)
-    if found is None:
-        try:
-            found = base_series(given, data)
-        except ChilopodError:  # legs too short, for example
-            lost = np.full((len(data.springs), given.body.modules - 1), np.nan)
-            found = Series(lost, lost, lost[:, 0])
-        if path is not None:
-            kept = {name: each.tolist() for name, each in vars(found).items()}
-            write_atomic(path, json.dumps({"constants": constants.tolist(), **kept}))
-    return Fit(parts, residuals(given, found, data))
-
-
-def _read(path: Path) -> Series | None:
+    path = (folder or Path()) / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
+    with suppress(OSError, ValueError, KeyError):
+        kept = json.loads(path.read_text()) if folder else {}
+        found = Series(*(np.array(kept[each.name], dtype=np.float64) for each in fields(Series)))
+        return Fit(parts, residuals(given, found, data))
     try:
-        kept = json.loads(path.read_text())
-        return Series(*(np.array(kept[each.name], dtype=np.float64) for each in fields(Series)))
-    except (OSError, ValueError, KeyError):
-        return None
+        found = base_series(given, data)
+    except ChilopodError:  # legs too short, for example
+        lost = np.full((len(data.springs), given.body.modules - 1), np.nan)
+        found = Series(lost, lost, lost[:, 0])
+    if folder:
+        kept = {name: each.tolist() for name, each in vars(found).items()}
+        write_atomic(path, json.dumps({"constants": constants.tolist(), **kept}))
+    return Fit(parts, residuals(given, found, data))
 
 
 def known() -> list[Fit]:
@@ -208,7 +201,7 @@ def known() -> list[Fit]:
     their weights."""
     shipped = json.loads(files("chilopod.tasks.identify").joinpath("twin_fits.json").read_text(encoding="utf-8"))
     return [
-        Fit(FREE.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in shipped["fits"]
+        Fit(FITTED.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in shipped["fits"]
     ]
 
 
@@ -239,14 +232,15 @@ def search(
     last surrogate and weight them.
 
     ``starts`` are evaluated first, in parts of the ranges, and some that are spread evenly if there are few; ``counts``
-    are the numbers of evaluations after these and of samples. Evaluations are kept in ``folder``; a stopped search
-    resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the surrogate at
-    the samples over that which it expected. AnalysisError if the robot walks with none of the first constants.
+    are the numbers of evaluations, these among them, and of samples. Evaluations are kept in ``folder``; a stopped
+    search resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the
+    surrogate at the samples over that which it expected. AnalysisError if the robot walks with none of the first
+    constants.
     """
     rng = np.random.default_rng(seed)
-    few = max(_FIRST - len(starts), 0)
+    trained = counts[0]
+    few = max(min(_FIRST, trained) - len(starts), 0)
     spread = LatinHypercube(len(data.free.each), rng=rng).random(few)
-    trained = len(starts) + few + counts[0]
     fits: list[Fit] = []
 
     def evaluated(places: Sequence[Array] | Array) -> list[Fit]:
@@ -258,7 +252,7 @@ def search(
             progress(count / (trained + counts[1]), f"evaluation {count}: best has a largest residual of {largest:.2f}")
         return found
 
-    fits += evaluated([*starts, *spread])
+    fits += evaluated([*starts[:trained], *spread])
     if all(fit.largest >= LOST for fit in fits):
         raise AnalysisError("must walk with some constants in their ranges", field="robot")
     surrogate, excess = Surrogate(*_walked(fits)), 1.0
@@ -298,9 +292,9 @@ def identify_twin(
     """
     engine_named("twin").common(robot)  # refuses a robot without a twin
     free = data.free
-    for ends in (np.zeros(len(free.each)), np.ones(len(free.each))):
-        free.robot_with(robot, free.values_at(ends))  # refuses numbers that the robot does not have
-    places = [free.parts_of(FREE.values_at(fit.parts)) for fit in known()] if free.paths == FREE.paths else []
+    free.check(robot)
+    data.start(robot, data.springs)  # refuses the shape of another robot
+    places = [free.parts_of(FITTED.values_at(fit.parts)) for fit in known()] if free.paths == FITTED.paths else []
     starts = [parts for parts in places if ((parts >= 0.0) & (parts <= 1.0)).all()]
     kept = None if folder is None else check_folder(folder)
     counts = evaluations, samples

@@ -15,7 +15,7 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.record import Recording
 from chilopod.robot import Robot
-from chilopod.tasks.identify.twin_data import BaseSeries
+from chilopod.tasks.identify.data import BaseSeries
 from chilopod.twin.walk import TOLERANCE
 
 DURATION = 60.0

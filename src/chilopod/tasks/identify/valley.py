@@ -16,9 +16,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
 from chilopod.frozen import Array
-
-LEVEL = 0.9
-"""Level of the intervals over the valley."""
+from chilopod.tasks.identify.estimates import CONFIDENCE
 
 LEAST = 20.0
 """Number of effective samples below which the ends of an interval are not reliable."""
@@ -43,12 +41,12 @@ class Samples:
         """Number of equally weighted samples that scatter as much: (sum w)^2 / sum w^2; 0 without a sample."""
         return float(1.0 / np.sum(self.weights**2)) if len(self.weights) else 0.0
 
-    def interval(self, values: Array, level: float = LEVEL) -> tuple[float, float, float]:
-        """Mean and ends of the central interval of numbers that belong to the samples, shape (samples,)."""
+    def interval(self, values: Array) -> tuple[float, float]:
+        """Ends of the central 90 % interval of numbers that belong to the samples, shape (samples,)."""
         order = np.argsort(values)
         middles = np.cumsum(self.weights[order]) - 0.5 * self.weights[order]
-        low, high = np.interp([0.5 - 0.5 * level, 0.5 + 0.5 * level], middles, values[order])
-        return float(self.weights @ values), float(low), float(high)
+        low, high = np.interp([0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], middles, values[order])
+        return float(low), float(high)
 
     def drawn(self, count: int) -> Array:
         """Constants drawn by their weights, evenly along them, shape (count, constants)."""

@@ -21,8 +21,9 @@ from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
-from chilopod.tasks.identify.twin_data import FREE
-from chilopod.tasks.identify.valley import LEAST, LEVEL, Samples
+from chilopod.tasks.identify.data import FITTED
+from chilopod.tasks.identify.estimates import CONFIDENCE
+from chilopod.tasks.identify.valley import LEAST, Samples
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
@@ -141,8 +142,8 @@ def spread(data: xr.Dataset) -> Panel:
             f"{number(data.attrs['effective'], 2)} of equal weight"
             + (", too few for reliable intervals" if data.attrs["effective"] < LEAST else "")
             + ". Shown are the preset (filled) and sets drawn by these weights. "
-            f"{100.0 * LEVEL:g} % of the sets have (A) {listing(ranges)}.",
-            f"Onsets that they predict (B), mean and {100.0 * LEVEL:g} % interval, in {SPRING_UNIT}: "
+            f"{100.0 * CONFIDENCE:g} % of the sets have (A) {listing(ranges)}.",
+            f"Onsets that they predict (B), mean and {100.0 * CONFIDENCE:g} % interval, in {SPRING_UNIT}: "
             f"{listing(predicted) or 'no point'}. They come nearest to the target in {tasks}\u00a0{SPRING_UNIT}. These "
             "walks are undisturbed: the intervals are those of the valley alone. The standard errors in the table of "
             "the robot are those of its trials alone, all with the preset.",
@@ -155,15 +156,15 @@ def _over_valley(values: xr.DataArray) -> tuple[float, float]:
     """Ends of the interval of a prediction over the sets that have one, without the preset unless it is alone."""
     found = values.values[min(1, values.size - 1) :]
     found = found[np.isfinite(found)]
-    return Samples(found[:, None], np.full(found.size, 1.0 / found.size)).interval(found)[1:]
+    return Samples(found[:, None], np.full(found.size, 1.0 / found.size)).interval(found)
 
 
 def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_SPREAD, narrow)
     for index in data.set.values[::-1]:
-        parts = FREE.parts_of(data.constants.values[index])
+        parts = FITTED.parts_of(data.constants.values[index])
         axes["A"].plot(parts, np.arange(len(parts)), "o", **_marked(int(index)))
-    axes["A"].set_yticks(range(len(FREE.paths)), [path.partition(".")[2].replace("_", " ") for path in FREE.paths])
+    axes["A"].set_yticks(range(len(FITTED.paths)), [path.partition(".")[2].replace("_", " ") for path in FITTED.paths])
     axes["A"].invert_yaxis()
     finish(axes["A"], xlim=(-0.03, 1.03), xlabel="part of the range searched", title="A  Constants")
 
@@ -209,7 +210,7 @@ def structures(data: xr.Dataset) -> Panel:
         draw=lambda narrow: _draw_structures(data, narrow),
         alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
         text=(
-            f"Each of these structures was given to the preset, and its {len(FREE.paths)} constants moved until it "
+            f"Each of these structures was given to the preset, and its {len(FITTED.paths)} constants moved until it "
             "meets the base series again, from few and undisturbed walks: "
             + "; ".join(
                 f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)

@@ -1,4 +1,4 @@
-"""Free constants of the three-dimensional robot, which are hard to measure, and their ranges."""
+"""Constants that are free in an identification, and their ranges."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Self
 import numpy as np
 
 from chilopod import units
-from chilopod.analysis.parameters import ALL, K1
 from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
@@ -17,11 +16,12 @@ from chilopod.robot.parameters import place_of
 from chilopod.units.quantity import is_list
 
 _LOGARITHMIC = 4.0  # ratio of the ends of a range from which its scale is logarithmic
+_STEP = 1e-6  # of differences, in parts of ranges
 
 
 @dataclass(frozen=True)
 class Constant:
-    """Fitted constant: its path in the robot's description and the ends of its range, SI; with ``per``, the range is
+    """Free constant: its path in the robot's description and the ends of its range, SI; with ``per``, the range is
     that of its ratio to an earlier constant."""
 
     path: str
@@ -87,34 +87,54 @@ class FreeConstants:
         for index, other in reversed(self._ratios()):
             ratios[index] /= ratios[other]
         pairs = zip(self.each, ratios.tolist(), strict=True)
-        return np.array(
-            [
-                np.log(x / c.low) / np.log(c.high / c.low) if c.logarithmic else (x - c.low) / (c.high - c.low)
-                for c, x in pairs
-            ]
-        )
+        turned = [np.log([max(x, 1e-300), c.low, c.high]) if c.logarithmic else (x, c.low, c.high) for c, x in pairs]
+        return np.array([(x - low) / (high - low) for x, low, high in turned])
+
+    def slopes(self, parts: Array) -> Array:
+        """Derivatives of the values over the parts, shape (values, parts)."""
+        moves = _STEP * np.eye(len(parts))
+        return np.array([self.values_at(parts + move) - self.values_at(parts - move) for move in moves]).T / (2 * _STEP)
+
+    def limits(self, values: Array) -> Array:
+        """Ends of the range of each constant where the others have their values, shape (constants, 2)."""
+        ends = np.array([(each.low, each.high) for each in self.each])
+        for index, other in self._ratios():
+            ends[index] *= values[other]
+        return ends
 
     def robot_with(self, robot: Robot, values: Sequence[float] | Array) -> Robot:
         """The robot with other values."""
-        for path, value in zip(self.paths, values, strict=True):
-            robot = robot.with_value(path, float(value))
-        return robot
+        return with_values(robot, self.paths, values)
 
     def of(self, robot: Robot) -> Array:
         """Values of a robot."""
         return np.array([robot.get(path) for path in self.paths])
 
+    def check(self, robot: Robot) -> None:
+        """ParameterError if the robot cannot have the constants at the ends of their ranges."""
+        for ends in (np.zeros(len(self.each)), np.ones(len(self.each))):
+            self.robot_with(robot, self.values_at(ends))
+
+
+def with_values(robot: Robot, paths: Sequence[str], values: Sequence[float] | Array) -> Robot:
+    """The robot with other values of some of its numbers, SI."""
+    for path, value in zip(paths, values, strict=True):
+        robot = robot.with_value(path, float(value))
+    return robot
+
 
 def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
     """Constant of an entry in a table of ranges, after others with some paths."""
     path, slash, per = (text.strip() for text in name.partition("/"))
-    if path in (K1, ALL, *before):
-        raise ParameterError("must be given once, and not be k1, which the walks change")
+    if path in before:
+        raise ParameterError("must be given once")
     if slash and per not in before:
         raise ParameterError("must be the ratio to a constant above it", value=per)
     if not is_list(ends) or len(ends) != 2:
         raise ParameterError("must be two ends of a range", value=ends)
     quantity = place_of(path).quantity
+    if quantity.integer:
+        raise ParameterError("must not be a whole number")
     unit = f"{quantity.si or '1'}/({place_of(per).quantity.si or '1'})" if slash else quantity.si
     low, high = (units.parse(end, unit) if slash else quantity.read(end) for end in ends)
     if not low < high or (slash and low <= 0.0):
