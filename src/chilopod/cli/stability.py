@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -23,7 +22,6 @@ from chilopod.errors import ParameterError
 
 if TYPE_CHECKING:
     from chilopod.analysis import StraightWalk
-    from chilopod.progress import Progress
     from chilopod.robot import Robot
     from chilopod.twin import CycleMultipliers
 
@@ -61,11 +59,11 @@ def stability(
             found: StraightWalk | CycleMultipliers = straight_walk(described)
         else:
             with own_code(show):
-                found = _multipliers(described, engine, size, partial(show, "stability"))
+                found = _multipliers(described, engine, size)
     options.deliver_json(files, found.as_json(), found.lines())
 
 
-def _multipliers(robot: Robot, engine: str, amplitude: float, progress: Progress) -> CycleMultipliers:
+def _multipliers(robot: Robot, engine: str, amplitude: float) -> CycleMultipliers:
     from chilopod.engine.named import engine_named
 
     known: Any = engine_named(engine)
@@ -73,7 +71,7 @@ def _multipliers(robot: Robot, engine: str, amplitude: float, progress: Progress
     if multipliers is None:
         said, allowed = "has no state that can be divided by its place", "planar, twin, or a chilopod.twin.Edited"
         raise ParameterError(said, field="engine", value=engine, allowed=allowed)
-    found: CycleMultipliers = multipliers(robot, amplitude=amplitude, progress=progress)
+    found: CycleMultipliers = multipliers(robot, amplitude=amplitude)
     return found
 
 
