@@ -1,12 +1,16 @@
 """Multipliers of walks in MuJoCo: against solutions by hand, walks that decay, and other paths to the same state."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, cycle_multipliers, start, walk_multipliers
+from chilopod.twin.modes import CycleMode
 from chilopod.twin.multipliers import cycle_map
 from helpers.command_line import printed, run
 
@@ -97,6 +101,23 @@ def test_modes_and_the_grazing_foot_have_names(straight):
     assert printed["multipliers"][0]["frequency_rad_s"] * PERIOD == pytest.approx(2.0 * np.pi / 36.0, rel=0.05)
     assert len(printed["multipliers"][0]["joint_components"]) == 5
     assert "beyond which contacts change: leg" in "\n".join(straight.lines())
+
+
+def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
+    per_unit = STIFF.get(K1) / 75.0
+
+    def measured(robot, **given):
+        value = np.exp(0.01 * (30.0 - robot.get(K1) / per_unit))
+        return SimpleNamespace(finite=(CycleMode(complex(value), 0.001, np.ones(5)),))
+
+    monkeypatch.setattr("chilopod.twin.walk_multipliers", measured)
+    arguments = ["stability", "aoi2022", "--engine", "twin", "--json", "--onset", K1]
+    found = printed(*arguments, "20 N*mm/deg", "50 N*mm/deg")
+    # Its error over the slope.
+    np.testing.assert_allclose(
+        np.array([found["onset_si"], *found["interval_si"]]) / per_unit, [30.0, 29.9, 30.1], atol=0.03
+    )
+    assert "must hold an onset" in run(*arguments, "40 N*mm/deg", "50 N*mm/deg")[2]
 
 
 def test_the_command_line_prints_them(straight, monkeypatch):

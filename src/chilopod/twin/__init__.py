@@ -11,6 +11,7 @@ from chilopod.twin.edited import Edited  # noqa: E402
 from chilopod.twin.model import TwinModel  # noqa: E402
 from chilopod.twin.modes import CycleMultipliers  # noqa: E402
 from chilopod.twin.multipliers import cycle_multipliers, walk_multipliers  # noqa: E402
+from chilopod.twin.onset import bend_onset  # noqa: E402
 from chilopod.twin.simulate import simulate  # noqa: E402
 from chilopod.twin.start import common, initial_states, resume, start, traits  # noqa: E402
 from chilopod.twin.walk import TwinWalk  # noqa: E402
@@ -22,6 +23,7 @@ __all__ = [
     "Edited",
     "TwinModel",
     "TwinWalk",
+    "bend_onset",
     "common",
     "cycle_multipliers",
     "foot_creep",
