@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CycleMode(ReadOnlyArrays):
-    """A mode of a walk: its multiplier over one gait cycle, an estimate of the error or half the interval of 95 %, and
-    its yaw joints, front to rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
+    """A mode of a walk: its multiplier over one gait cycle, half the interval of 95 %, and its yaw joints, front to
+    rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
 
     multiplier: complex
     error: float

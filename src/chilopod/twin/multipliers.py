@@ -14,13 +14,14 @@ from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
-from chilopod import statistics
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import Array, ComplexArray
+from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
 from chilopod.stability.spectrum.eigenvalues import eigensystem
+from chilopod.statistics import LEVEL
 from chilopod.twin.cycle_map import CycleMap
 from chilopod.twin.legs import servo_targets, twin_of
 from chilopod.twin.model import Edit, TwinModel, compiled
@@ -103,12 +104,12 @@ def cycle_multipliers(
     exact: tuple[CycleMode, ...] = ()
     if closes and step:
         tiny = [_followed(cycle, x, size * basis, dual / size, 1)[0] for size in (step, _SHORTER * step)]
-        exact = _modes(np.concatenate(tiny), basis[at])
+        exact = _modes(np.concatenate(tiny), basis[at], 1)
     found = _followed(cycle, x, amplitude * basis, dual / amplitude, _FORGOTTEN + cycles)
     matrices, seen = (each[_FORGOTTEN:] for each in found)
     reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(seen))
     mismatch, spread = float(np.abs(seen[-1] - seen[-2]).max()), np.ptp(seen[:, at], axis=0)
-    finite = _modes(matrices, basis[at])
+    finite = _modes(matrices, basis[at], _BLOCK)
     return CycleMultipliers(name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts)
 
 
@@ -167,27 +168,20 @@ def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int)
     return np.array(matrices), np.array(seen)
 
 
-def _modes(matrices: Array, angles: Array) -> tuple[CycleMode, ...]:
-    """Modes of the mean of matrices (cycles, r, r), with half intervals from their scatter, or, of two matrices, with
-    their difference; rows of ``angles`` (joints, r) are yaw joints."""
+def _modes(matrices: Array, angles: Array, block: int) -> tuple[CycleMode, ...]:
+    """Modes of the mean of matrices (m, r, r), with half their intervals of 95 % by Student's t, from means over blocks
+    of some of them in turn; rows of ``angles`` (joints, r) are yaw joints."""
     values, right, left = eigensystem(matrices.mean(axis=0))
-    # To first order, a cycle changes an eigenvalue by left^H (M - mean) right.
+    # To first order, a matrix changes an eigenvalue by left^H (M - mean) right.
     each = np.einsum("ji,kjl,li->ik", left.conj(), matrices, right)
-    modes = []
-    for value, parts, turns in zip(values, each, (angles @ right).T, strict=True):
-        if value.imag >= 0.0:
-            error = abs(parts[0] - parts[-1]) if len(parts) == 2 else _half_interval(parts)
-            largest = turns[np.abs(turns).argmax()]
-            scaled = turns / largest if abs(largest) > _NOT_BENT else np.zeros_like(turns)
-            modes.append(CycleMode(complex(value), float(error), scaled))
-    return tuple(modes)
-
-
-def _half_interval(values: ComplexArray) -> float:
-    """Half the interval of the mean of numbers in turn, from means of blocks of them."""
-    blocks = values[len(values) % _BLOCK :].reshape(-1, _BLOCK).mean(axis=1)
-    parts = [statistics.mean(part).interval for part in (blocks.real, blocks.imag) if part.any()]
-    return math.hypot(*(0.5 * (part.high - part.low) for part in parts))
+    blocks = each[:, len(matrices) % block :].reshape(len(values), -1, block).mean(axis=2)
+    count = blocks.shape[1]
+    errors = stdtrit(count - 1, 0.5 + 0.5 * LEVEL) * blocks.std(axis=1, ddof=1) / math.sqrt(count)
+    turns = angles @ right
+    largest = turns[np.abs(turns).argmax(axis=0), np.arange(len(values))]
+    scaled = np.where(np.abs(largest) > _NOT_BENT, turns / np.where(largest == 0.0, 1.0, largest), 0.0)
+    kept = np.flatnonzero(values.imag >= 0.0)
+    return tuple(CycleMode(complex(values[i]), float(errors[i]), scaled[:, i]) for i in kept)
 
 
 def _reach(cycle: CycleMap, x: Array, basis: Array, low: float) -> tuple[float, tuple[str, ...]]:
