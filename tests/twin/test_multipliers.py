@@ -1,12 +1,16 @@
 """Multipliers of walks in MuJoCo: against solutions by hand, walks that decay, and other paths to the same state."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, cycle_multipliers, start, walk_multipliers
+from chilopod.twin.modes import CycleMode
 from chilopod.twin.multipliers import cycle_map
 from helpers.command_line import printed, run
 
@@ -30,7 +34,7 @@ def test_a_cart_and_a_spring_have_the_multipliers_of_their_steps():
     control = np.sin(2.0 * np.pi * np.arange(steps) / steps)[:, None] * [1.0, 0.5]
     cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), control, travel=("x",))
     assert cycle.names == ("y", "rate of x", "rate of y")
-    found = cycle_multipliers("cart", cycle, np.zeros(3), ["y"], 1.0)
+    found = cycle_multipliers("cart", cycle, np.zeros(3), ["y"])
     # Euler's step with the damper at its end: v' = (v - h k x / m) / (1 + h d / m), x' = x + h v'.
     step = np.array([[1.0 - 2e-4 / 1.001, 0.01 / 1.001], [-0.02 / 1.001, 1.0 / 1.001]])
     pair = np.linalg.eigvals(step)[0] ** steps
@@ -60,9 +64,9 @@ def test_coordinates_lead_to_the_state_and_back_wherever_it_stands():
     walk.advance(PERIOD)
     states = walk.states()
     reached = cycle.reduced(states[:, : plan.model.nq], states[:, plan.model.nq :])
-    np.testing.assert_allclose(cycle(x), reached, rtol=0, atol=1e-9)
-    cold, _ = cycle_map(STIFF, warm_start=False)
-    np.testing.assert_allclose(cold(x), reached, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(cycle(x)[0], reached, rtol=0, atol=1e-9)
+    cycle.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
+    np.testing.assert_allclose(cycle(x)[0], reached, rtol=0, atol=1e-6)
 
 
 def test_small_bends_of_independent_walks_decay_by_the_multipliers(straight):
@@ -90,13 +94,30 @@ def test_small_bends_of_independent_walks_decay_by_the_multipliers(straight):
 
 def test_modes_and_the_grazing_foot_have_names(straight):
     assert [mode.shape for mode in straight.exact] == ["undulation", "bend"]
-    assert straight.exact[0].frequency * PERIOD == pytest.approx(2.0 * np.pi / 36.0, rel=0.05)
     assert 1e-6 < straight.reach < 1e-3
     assert any(words.startswith("leg6_left_foot at 0.004") for words in straight.contacts)
     printed = straight.as_json()
     assert printed["closes"] is True
+    assert printed["multipliers"][0]["frequency_rad_s"] * PERIOD == pytest.approx(2.0 * np.pi / 36.0, rel=0.05)
     assert len(printed["multipliers"][0]["joint_components"]) == 5
     assert "beyond which contacts change: leg" in "\n".join(straight.lines())
+
+
+def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
+    per_unit = STIFF.get(K1) / 75.0
+
+    def measured(robot, **given):
+        value = np.exp(0.01 * (30.0 - robot.get(K1) / per_unit))
+        return SimpleNamespace(finite=(CycleMode(complex(value), 0.001, np.ones(5)),))
+
+    monkeypatch.setattr("chilopod.twin.walk_multipliers", measured)
+    arguments = ["stability", "aoi2022", "--engine", "twin", "--json", "--onset", K1]
+    found = printed(*arguments, "20 N*mm/deg", "50 N*mm/deg")
+    # Its error over the slope.
+    np.testing.assert_allclose(
+        np.array([found["onset_si"], *found["interval_si"]]) / per_unit, [30.0, 29.9, 30.1], atol=0.03
+    )
+    assert "must hold an onset" in run(*arguments, "40 N*mm/deg", "50 N*mm/deg")[2]
 
 
 def test_the_command_line_prints_them(straight, monkeypatch):

@@ -22,8 +22,8 @@ from chilopod.cli.user_code import own_code
 from chilopod.errors import ParameterError
 
 if TYPE_CHECKING:
-    from chilopod.analysis import StraightWalk
-    from chilopod.progress import Progress
+    from collections.abc import Callable
+
     from chilopod.robot import Robot
     from chilopod.twin import CycleMultipliers
 
@@ -35,6 +35,10 @@ def stability(
     amplitude: Annotated[
         str, typer.Option(metavar="ANGLE", help='Size of the bends that the twin is given, such as "1 deg".')
     ] = "1 deg",
+    onset: Annotated[
+        tuple[str, str, str] | None,
+        typer.Option(metavar="PATH LOW HIGH", help="Number of the robot, and values between which bends set in."),
+    ] = None,
     out: OutOption = None,
 ) -> None:
     """Floquet multipliers, exponents and modes of the straight walk: is it stable?
@@ -44,7 +48,8 @@ def stability(
     Exponents are the principal logarithms of the multipliers over T: their imaginary parts lie in (-pi/T, pi/T].
 
     The twin has leading multipliers of its smallest bends, if its walk repeats from cycle to cycle, and of bends of a
-    given size, whose contacts with the floor may differ.
+    given size, whose contacts with the floor may differ. With --onset PATH LOW HIGH, such as "springs.stiffness[0]"
+    "28 N*mm/deg" "41 N*mm/deg", it is the value at which the multiplier of these bends passes 1, with its interval.
 
     Example: chilopod stability aoi2022 --engine twin --set "springs.stiffness[0]=41 N*mm/deg"
     """
@@ -54,18 +59,21 @@ def stability(
 
     with reading("amplitude"):
         size = units.parse(amplitude, "rad")
+    if engine == "planar" and onset:
+        raise ParameterError("must be 'twin' for --onset", field="engine", value=engine, allowed="chilopod bifurcation")
     with progress_bar("stability") as show:
         if engine == "planar":
             from chilopod.analysis import straight_walk
 
-            found: StraightWalk | CycleMultipliers = straight_walk(described)
+            walk = straight_walk(described)
+            result, lines = walk.as_json(), walk.lines()
         else:
             with own_code(show):
-                found = _multipliers(described, engine, size, partial(show, "stability"))
-    options.deliver_json(files, found.as_json(), found.lines())
+                result, lines = _of_bends(described, _multipliers(engine, size), onset)
+    options.deliver_json(files, result, lines)
 
 
-def _multipliers(robot: Robot, engine: str, amplitude: float, progress: Progress) -> CycleMultipliers:
+def _multipliers(engine: str, amplitude: float) -> Callable[[Robot], CycleMultipliers]:
     from chilopod.engine.named import engine_named
 
     known: Any = engine_named(engine)
@@ -73,8 +81,25 @@ def _multipliers(robot: Robot, engine: str, amplitude: float, progress: Progress
     if multipliers is None:
         said, allowed = "has no state that can be divided by its place", "planar, twin, or a chilopod.twin.Edited"
         raise ParameterError(said, field="engine", value=engine, allowed=allowed)
-    found: CycleMultipliers = multipliers(robot, amplitude=amplitude, progress=progress)
-    return found
+    return partial(multipliers, amplitude=amplitude)
+
+
+def _of_bends(
+    robot: Robot, multipliers: Callable[[Robot], CycleMultipliers], onset: tuple[str, str, str] | None
+) -> tuple[dict[str, Any], list[str]]:
+    if onset is None:
+        found = multipliers(robot)
+        return found.as_json(), found.lines()
+    from chilopod import units
+    from chilopod.twin import bend_onset
+
+    path, unit = onset[0], robot.unit_of(onset[0])
+    point = bend_onset(multipliers, robot, path, interval(robot, path, onset[1:]))
+    shown = [units.format(each, unit, digits=4) for each in (point.value, point.low, point.high)]
+    said = f"{robot.name}: bends grow from {path} = {shown[0]} on, interval of 95 % {shown[1]} to {shown[2]}"
+    return {"robot": robot.name, "parameter": path, "onset_si": point.value, "interval_si": [point.low, point.high]}, [
+        said
+    ]
 
 
 @with_options

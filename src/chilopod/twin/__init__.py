@@ -19,9 +19,15 @@ from chilopod.twin.walk import TwinWalk  # noqa: E402
 if TYPE_CHECKING:
     from chilopod.twin.modes import CycleMultipliers
     from chilopod.twin.multipliers import cycle_multipliers, walk_multipliers
+    from chilopod.twin.onset import bend_onset
 else:  # walks need nothing of chilopod.stability
     __getattr__, __dir__ = exports(
-        __name__, {"modes": ("CycleMultipliers",), "multipliers": ("cycle_multipliers", "walk_multipliers")}
+        __name__,
+        {
+            "modes": ("CycleMultipliers",),
+            "multipliers": ("cycle_multipliers", "walk_multipliers"),
+            "onset": ("bend_onset",),
+        },
     )
 
 __all__ = [
@@ -31,6 +37,7 @@ __all__ = [
     "Edited",
     "TwinModel",
     "TwinWalk",
+    "bend_onset",
     "common",
     "cycle_multipliers",
     "foot_creep",

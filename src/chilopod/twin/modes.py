@@ -11,6 +11,7 @@ import numpy as np
 
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.notebook import Summary, axes_for
+from chilopod.stability.shown import number
 from chilopod.stability.spectrum.errors import VERDICTS, stable_within
 
 if TYPE_CHECKING:
@@ -19,86 +20,52 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CycleMode(ReadOnlyArrays):
-    """A mode of a walk.
-
-    Attributes
-    ----------
-    multiplier, error
-        Multiplier over one gait cycle, and a bound on its absolute error or half its interval of 95 %.
-    angles
-        Yaw joints of the mode, front to rear, (N-1,); the largest is 1.
-    period
-        Period of the gait, s.
-    """
+    """A mode of a walk: its multiplier over one gait cycle, half the interval of 95 %, and its yaw joints, front to
+    rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
 
     multiplier: complex
     error: float
     angles: ComplexArray
-    period: float
 
     @property
     def shape(self) -> str:
         """``bend`` if all yaw joints turn to one side at a time, ``undulation`` if not, ``other`` if none turns."""
-        if not self.angles.any():
-            return "other"
         turned = self.angles * np.conj(self.angles.sum())
-        return "bend" if (turned.real > 0.0).all() else "undulation"
+        return ("bend" if (turned.real > 0.0).all() else "undulation") if self.angles.any() else "other"
 
-    @property
-    def frequency(self) -> float:
-        """Angular frequency, rad/s."""
-        return abs(float(np.angle(self.multiplier))) / self.period
-
-    def as_json(self) -> dict[str, Any]:
-        """The mode as plain numbers."""
+    def as_json(self, period: float) -> dict[str, Any]:
+        """The mode as plain numbers, for a period of the gait in s."""
         return {
             "multiplier": [self.multiplier.real, self.multiplier.imag],
             "error": self.error if math.isfinite(self.error) else None,
             "shape": self.shape,
-            "frequency_rad_s": self.frequency,
+            "frequency_rad_s": abs(float(np.angle(self.multiplier))) / period,
             "joint_components": [[angle.real, angle.imag] for angle in self.angles.tolist()],
         }
 
     def cells(self, which: str) -> Sequence[str]:
         """A row of the table."""
-        value, turns = self.multiplier, abs(float(np.angle(self.multiplier))) / (2.0 * math.pi)
-        shown = f"{value.real:.6f}" + (f" ± {abs(value.imag):.6f}i" if value.imag else "")
-        shape = f"{self.shape} of {1.0 / turns:.3g} cycles" if turns else self.shape
-        angles = "  ".join(f"{a.real:.2f}" + (f"{a.imag:+.2f}i" if value.imag else "") for a in self.angles)
-        return which, shown, f"{self.error:.1e}", f"{abs(value):.6f}", shape, angles
+        turn = abs(float(np.angle(self.multiplier)))
+        shown = number(self.multiplier, 6).replace("+", " ± ")
+        shape = self.shape + (f" of {2.0 * math.pi / turn:.3g} cycles" if turn else "")
+        angles = "  ".join(number(angle, 2) for angle in self.angles)
+        return which, shown, f"{self.error:.1e}", f"{abs(self.multiplier):.6f}", shape, angles
 
 
 @dataclass(frozen=True)
 class CycleMultipliers(Summary, ReadOnlyArrays):
-    """Leading multipliers and modes of a walk in MuJoCo.
-
-    Attributes
-    ----------
-    name
-        Name of the robot.
-    state, mismatch
-        Coordinates at the start of the cycle, see :class:`CycleMap`, and their largest change over one.
-    exact
-        Leading modes of the derivative, by falling modulus; empty if the walk does not close.
-    reach
-        Largest bend along them that changes no contact, rad; NaN if the walk does not close.
-    amplitude, finite
-        Size of bends, rad, and their modes.
-    spread
-        Range of each yaw joint at the start of consecutive cycles, rad, (N-1,).
-    contacts
-        Contacts that such bends change, or that change from cycle to cycle, a phrase each.
-    """
+    """Leading multipliers and modes of a walk in MuJoCo."""
 
     name: str
-    state: Array
-    mismatch: float
-    exact: tuple[CycleMode, ...]
-    reach: float
-    amplitude: float
-    finite: tuple[CycleMode, ...]
-    spread: Array
-    contacts: tuple[str, ...]
+    period: float  # of the gait, s
+    state: Array  # coordinates at the start of a cycle, see CycleMap
+    mismatch: float  # largest change of a coordinate over a cycle
+    exact: tuple[CycleMode, ...]  # modes of the derivative, by falling modulus; none if the walk does not close
+    reach: float | None  # largest bend along them that changes no contact, rad
+    amplitude: float  # size of finite bends, rad
+    finite: tuple[CycleMode, ...]  # modes of bends of that size
+    spread: Array  # range of each yaw joint at the start of consecutive cycles, rad, (N-1,)
+    contacts: tuple[str, ...]  # those that a larger bend than the reach changes, or that differ between cycles
 
     @property
     def stable(self) -> bool | None:
@@ -117,36 +84,31 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         return {
             "robot": self.name,
             "engine": "twin",
-            "period_s": self.finite[0].period,
+            "period_s": self.period,
             "stable": self.stable,
             "verdict": VERDICTS[self.stable],
             "closes": bool(self.exact),
             "mismatch": self.mismatch,
-            "multipliers": [mode.as_json() for mode in self.exact],
-            "reach_rad": self.reach if self.exact else None,
+            "multipliers": [mode.as_json(self.period) for mode in self.exact],
+            "reach_rad": self.reach,
             "amplitude_rad": self.amplitude,
-            "multipliers_of_amplitude": [mode.as_json() for mode in self.finite],
+            "multipliers_of_amplitude": [mode.as_json(self.period) for mode in self.finite],
             "spread_rad": self.spread.tolist(),
             "contacts": list(self.contacts),
         }
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         size = f"{math.degrees(self.amplitude):.3g}°"
-        rows: list[Sequence[str]] = [("bends", "multiplier", "error", "modulus", "shape", "yaw joints, front to rear")]
-        rows += [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
-        changed = ", ".join(self.contacts) or "none found"
-        if self.exact:
-            below = [
-                f"The walk closes to {self.mismatch:.0e} in a cycle. The derivative holds for bends up to about "
-                f"{math.degrees(self.reach):.1g}°, beyond which contacts change: {changed}."
-            ]
+        head = ("bends", "multiplier", "error", "modulus", "shape", "yaw joints, front to rear")
+        rows = [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
+        closes = f"The walk changes by {self.mismatch:.0e} in a cycle"
+        if self.reach is None:
+            scatter = f"yaw joints scatter over {math.degrees(self.spread.max()):.2g}°"
+            said = f"{closes}, {scatter}, and there is no derivative. Contacts change from cycle to cycle"
         else:
-            below = [
-                f"The walk does not close: a cycle changes it by {self.mismatch:.0e}, yaw joints scatter over "
-                f"{math.degrees(self.spread.max()):.2g}°, and it has no derivative.",
-                f"Contacts that change from cycle to cycle: {changed}.",
-            ]
-        return [], rows, below
+            bends = f"bends up to about {math.degrees(self.reach):.1g}°"
+            said = f"{closes}. The derivative holds for {bends}, beyond which contacts change"
+        return [], [head, *rows], [f"{said}: {', '.join(self.contacts) or 'none found'}."]
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the multipliers beside the unit circle: of smallest bends as discs, of finite ones as crosses."""
