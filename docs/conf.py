@@ -67,7 +67,7 @@ html_theme = "furo"
 html_math_renderer = "mathml"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
-html_js_files = ["disk.js"]
+html_js_files = ["site.js"]
 html_logo = html_favicon = "static/logo.svg"
 html_title = "chilopod"
 html_copy_source = False

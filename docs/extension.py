@@ -123,6 +123,13 @@ def scraped(block: tuple[Any, ...], block_vars: dict[str, Any], gallery_conf: di
     return matplotlib_scraper(block, block_vars, gallery_conf)
 
 
+def levels(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
+    """Give captions of contents, which Sphinx marks as headings, the level that a heading needs."""
+    for part in ("furo_navigation_tree", "body"):
+        if part in context:
+            context[part] = context[part].replace('role="heading">', 'role="heading" aria-level="2">')
+
+
 def play_page(app: Sphinx, failure: Exception | None) -> None:
     """Write the page in which the planar robot walks beside its description."""
     if failure is None and app.builder.format == "html":
@@ -142,5 +149,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("viewcode-follow-imported", source_of)
     app.connect("doctree-read", lead_to_gallery)
     app.connect("missing-reference", resolve)
+    app.connect("html-page-context", levels, priority=900)  # behind the theme
     app.connect("build-finished", play_page)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -86,6 +86,18 @@ class Browser:
         logged = [what for what in self.named("Log.entryAdded") if what["entry"]["level"] == "error"]
         return said + logged + self.named("Runtime.exceptionThrown")
 
+    def nameless(self) -> list[str]:
+        """Roles of what can be reached by the keyboard, or is a picture, and has no name for a screen reader."""
+        nodes = self("Accessibility.getFullAXTree")["nodes"]
+        used = [each for each in nodes if not each["ignored"] and each["role"]["value"] != "RootWebArea"]
+        reached = [
+            each
+            for each in used
+            if each["role"]["value"] in ("image", "img")
+            or any(p["name"] == "focusable" for p in each.get("properties", ()))
+        ]
+        return [each["role"]["value"] for each in reached if not each.get("name", {}).get("value", "").strip()]
+
     def requested(self) -> list[str]:
         """Addresses of everything that was asked for."""
         return [what["request"]["url"] for what in self.named("Network.requestWillBeSent")]

@@ -86,6 +86,18 @@ def test_the_page_asks_for_nothing_and_finds_nothing_wrong(page, browser):
     assert page.stat().st_size < 100_000
 
 
+def test_the_page_is_used_without_eyes_and_without_a_mouse(browser):
+    assert browser.nameless() == []
+    browser.run("document.getElementById('floor').focus()")
+    for key in ("keyDown", "keyUp"):
+        browser("Input.dispatchKeyEvent", type=key, key="ArrowUp", code="ArrowUp", windowsVirtualKeyCode=38)
+    assert browser.run("play.robot.target !== null")
+    browser("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=1, mobile=False)
+    assert browser.run("document.documentElement.scrollWidth") <= 390
+    browser("Emulation.clearDeviceMetricsOverride")
+    browser.run("document.getElementById('none').click()")
+
+
 def test_what_the_page_says(browser):
     say = "(() => {{ {} return play.words(); }})()"
     by = "document.getElementById"

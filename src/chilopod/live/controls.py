@@ -49,7 +49,7 @@ _KEYS: Final = (
     ("M", "follow the robot, or not"),
     ("H, Esc", "this help; close it"),
 )
-HELP = "| key | |\n|---|---|\n" + "\n".join(f"| {key} | {what} |" for key, what in _KEYS)
+HELP = "| key | effect |\n|---|---|\n" + "\n".join(f"| {key} | {what} |" for key, what in _KEYS)
 
 
 class Controls:

@@ -65,6 +65,16 @@
     put([left + event.offsetX / zoom, top - event.offsetY / zoom]);
   });
 
+  // Arrow keys on the floor move the target as it is seen; the first one sets it at the middle.
+  const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }, NEXT = 0.1;
+  by("floor").addEventListener("keydown", (event) => {
+    const way = ARROWS[event.key];
+    if (!way) return;
+    event.preventDefault();
+    const from = robot.target || [camera.x, camera.y];
+    put(from.map((each, axis) => each + NEXT * way[axis]));
+  });
+
   const fork = by("fork");
   fork.addEventListener("pointerdown", (event) => { fork.setPointerCapture(event.pointerId); slide(event); });
   fork.addEventListener("pointermove", (event) => { if (fork.hasPointerCapture(event.pointerId)) slide(event); });
