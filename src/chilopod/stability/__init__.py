@@ -8,6 +8,7 @@ False
 """
 
 from chilopod.flows.called import NotAnalytic
+from chilopod.flows.deadline import SpentError
 from chilopod.flows.events import Event
 from chilopod.flows.jumps import UndeclaredSwitch
 from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, switch
@@ -62,6 +63,7 @@ __all__ = [
     "SearchStatus",
     "Section",
     "SpecialPoint2",
+    "SpentError",
     "Start",
     "Start2",
     "SymmetricCrossing",

@@ -203,7 +203,7 @@ def multipliers(
 
 
 def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[Multipliers]:
-    """Multipliers of many systems at their known orbits, on all cores if the systems allow it; an AnalysisError after
+    """Multipliers of many systems at their known orbits, on all cores if the systems allow it; a SpentError after
     ``seconds``, the time in s."""
     if not isinstance(systems, Sequence):
         raise ParameterError("must be a list", field="systems", value=systems, allowed="a list of systems")
@@ -232,7 +232,7 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: fl
     with Deadline(seconds):
         found = find_orbit(system, orbit)
         image = found.image
-        if is_stiff(system, found.state, image.period / image.returns):
+        if is_stiff(system, found.state, image.duration):
             log_nu, modes, moved = split_stiff(system, found.state, image)
         else:
             cut = moderate_cut(system, found.state, image)

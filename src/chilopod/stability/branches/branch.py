@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
@@ -326,7 +326,7 @@ def _at_event(curve: Curve, last: BranchPoint) -> bool:
     system = curve.system(last.value)
     try:
         return jumps_at_ends(system, last.orbit, _duration(system, last))
-    except AnalysisError:
+    except ChilopodError:
         return False
 
 
@@ -334,7 +334,7 @@ def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
     """The anchor at another state of the orbit of a point; None if time 0 is fixed, or no state suits."""
     system = curve.system(last.value)
     for part in _PARTS if is_autonomous(system) else ():
-        with contextlib.suppress(AnalysisError):
+        with contextlib.suppress(ChilopodError):
             x = carried(system, last.orbit[None], 0.0, part * _duration(system, last))[0]
             rising = bool(last.tangent[-1] > 0.0)
             anchor = anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)

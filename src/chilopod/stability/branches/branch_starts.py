@@ -249,13 +249,13 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
     """Sizes of the states, shape (n,), up to which returns near an orbit are linear."""
     system = curve.system(value)
     image = curve.image(x, value, section)
-    base = sizes(system, x, image.period / image.returns)
+    base = sizes(system, x, image.duration)
     direction = np.cos(1.0 + 3.0 * np.arange(x.size))
     direction = image.across @ (base * direction / np.abs(direction).max())
     returned = image.state, image.jacobian @ direction
     flown = []
     for part in _PARTS:
-        time = part * image.period / image.returns
+        time = part * image.duration
         state, derivative = system.flow(np.array(x), 0.0, time)
         flown.append((time, (state, derivative @ direction)))
 
@@ -312,7 +312,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
         tangent = np.append(start.mode / units[:-1], 0.0)
         tangent /= np.linalg.norm(tangent)
     leaving = start.mode is not None
-    known = image if leaving else bounded(curve.system(start.value), start.orbit, image).image
+    known = image if leaving else bounded(curve.system(start.value), start.orbit, image.duration).image
     values, bound = curve.multipliers(known)
     about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": curve.periods}
     if start.bifurcation is not None:

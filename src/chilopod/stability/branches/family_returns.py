@@ -90,7 +90,7 @@ class FamilyReturns:
     def noise(self, x: Array, value: float, section: Section | None) -> float:
         """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
         image, system = self.image(x, value, section), self.system(value)
-        other = in_parts(system, x, image.period / image.returns)
+        other = in_parts(system, x, image.duration)
         return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
     def _parameter_step(self, value: float, steepness: float) -> float:

@@ -27,7 +27,6 @@ from chilopod.stability.branches.special_points import Place, special_point
 from chilopod.stability.branches.within import Within
 from chilopod.stability.crossing_points.description import ContinuumError
 from chilopod.stability.orbit_blocks import crossings_in
-from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import offers
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import spectrum
@@ -209,8 +208,6 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
     def matrices(places: Array) -> tuple[Array, Array]:
         try:
             return np.array([within.jacobian(place) for place in places.tolist()]), np.full(places.size, _ERROR)
-        except SpentError:
-            raise
         except AnalysisError as error:
             if step.size > _TELLING:
                 raise ArithmeticError("the corrector fails within the step") from error

@@ -56,9 +56,9 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
         point = replace(point, tangent=between / np.linalg.norm(between))
     if not place.fold and (block is None or block.trivial):
 
-        def bounded_at(_: float, moved: Array, error: Array, image: ReturnMap) -> Orbit:
+        def bounded_at(_: float, moved: Array, error: Array, duration: float) -> Orbit:
             x, value = curve.reached(start, moved)
-            return bounded(curve.system(value), x, image, error=error[:-1] * curve.units(x.size)[:-1])
+            return bounded(curve.system(value), x, duration, error[:-1] * curve.units(x.size)[:-1])
 
         regular = past_singular(course, crossing, bounded_at)
     if regular is None:

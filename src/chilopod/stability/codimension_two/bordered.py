@@ -257,7 +257,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return place, return_map(system, place.state, with_error, section)
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
-        size = sizes(system, place.state, image.period / image.returns)
+        size = sizes(system, place.state, image.duration)
         if self.known or place.state.any() or given_scale(system) is not None:
             return size
         # The parameters set the size of an orbit that rests at zero.
@@ -279,7 +279,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         basis = np.zeros((n, 0)) if self.known else symmetric_states(system, place.state, size)
         section = None
         if image.normal is not None:
-            section = Section(place.state, image.normal, image.period / image.returns)
+            section = Section(place.state, image.normal, image.duration)
         jacobian = image.jacobian * size / size[:, None]
         critical = self._critical(jacobian, place.cosine)
         if before is None:

@@ -14,6 +14,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.problem.returns import ReturnMap
@@ -164,8 +165,8 @@ def _collision(matrix: Array, crossing: Crossing) -> float:
     return float(((a - others[1]) ** 2).real)
 
 
-Bounded = Callable[[float, Array, Array, ReturnMap], Orbit]
-"""The orbit at a place, with error bounds, from an interpolated one with its error, and a return map nearby."""
+Bounded = Callable[[float, Array, Array, float], Orbit]
+"""The orbit at a place, with error bounds, from an interpolated one with its error, and the duration of a return."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +201,7 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
         return None
     bound, reach, found = min(tried, key=lambda each: each[0])
     place = crossing.value + reach * found.place
-    orbit = bounded(place, found.orbit, found.orbit_error, found.beside.image)
+    orbit = bounded(place, found.orbit, found.orbit_error, found.beside.image.duration)
     spec = spectrum(orbit.image)
     distances = np.abs(spec.values - 1.0)
     order = distances.argsort()
@@ -242,7 +243,7 @@ class _Interpolation(NamedTuple):
 def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _Interpolation | None:
     try:
         beside = course.at(place + reach * nodes)
-    except AnalysisError:
+    except (AnalysisError, SpentError):
         return None
     # The product over all multipliers stays smooth where the critical one meets another.
     values = np.array([(spectrum(each.image).values - 1.0).prod().real for each in beside])

@@ -98,6 +98,11 @@ class ReturnMap(ReadOnlyArrays):
     normal: Array | None = None
 
     @property
+    def duration(self) -> float:
+        """Duration of the return."""
+        return self.period / self.returns
+
+    @property
     def across(self) -> Array:
         """Projection along the motion onto the section, shape (n, n); the unit matrix without a section."""
         if self.velocity is None or self.normal is None:

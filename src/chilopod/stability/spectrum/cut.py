@@ -51,7 +51,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
     """A return from a state on the orbit in parts of moderate condition, apart from the ``unresolved`` fastest
     directions; AnalysisError if there are none. The return of a map, which has no parts, stays whole."""
     # The derivative on a section may be only round-off; an orbit that moves gives the sizes.
-    autonomous, duration = is_autonomous(system), image.period / image.returns
+    autonomous, duration = is_autonomous(system), image.duration
     units = sizes(system, x, duration) if autonomous else numerical_balance(image.jacobian)
     parts: list[_Part] = []
     for start, end in itertools.pairwise(np.linspace(0.0, duration, _FEWEST + 1).tolist()):

@@ -152,10 +152,10 @@ def split_stiff(system: Capabilities, x: Array, image: ReturnMap) -> tuple[Compl
         for drawn in disturbed(np.array(cut.factors), np.array(cut.errors), _DRAWS_OF_STIFF):
             others = np.abs(values[:, None] - split_leading(list(drawn), slow)[0])
             errors = np.maximum(errors, SAFETY * others.min(axis=1))
-    growth, error = system.flow_volume(x, 0.0, image.period / image.returns)
+    growth, error = system.flow_volume(x, 0.0, image.duration)
     turned = system.symmetry is not None and np.linalg.det(system.symmetry) < 0.0
     fastest = complex(growth, np.pi if turned else 0.0) - values.sum()
-    modes = np.hstack([modes, _fastest(system, x, cut, image.period / image.returns)])
+    modes = np.hstack([modes, _fastest(system, x, cut, image.duration)])
     return np.append(values, fastest), np.asarray(cut.basis @ modes), np.append(errors, error + errors.sum())
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
 from chilopod.stability.spectrum.errors import DRAWS, SAFETY, disturbed
@@ -111,7 +112,7 @@ class Spectra:
         """The values with a matrix, with the matrix and its error."""
         try:
             matrices, errors = self._matrices(np.array(values))
-        except AnalysisError:
+        except (AnalysisError, SpentError):
             middle = (len(values) + 1) // 2
             return self._ask(values[:middle]) + self._ask(values[middle:]) if len(values) > 1 else []
         return [each for each in zip(values, matrices, errors, strict=True) if np.isfinite(each[1]).all()]
