@@ -24,10 +24,8 @@ from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, i
 from chilopod.stability.problem.returns import return_maps
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
-from chilopod.stability.spectrum.cut import moderate_cut
-from chilopod.stability.spectrum.eigenvalues import phased, spectrum
-from chilopod.stability.spectrum.errors import VERDICTS, stable_within
-from chilopod.stability.spectrum.splitting import split_product, split_stiff
+from chilopod.stability.spectrum.eigenvalues import VERDICTS, phased, spectrum, stable_within
+from chilopod.stability.spectrum.splitting import moderate_cut, split_product, split_stiff
 
 if TYPE_CHECKING:
     import xarray as xr

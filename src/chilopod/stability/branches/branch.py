@@ -28,15 +28,13 @@ from chilopod.stability.branches.family_returns import PRECISION
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_interval
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import carried, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
-from chilopod.stability.spectrum.errors import VERDICTS
-from chilopod.stability.tracing.ending import Ending
-from chilopod.stability.tracing.step import Step
-from chilopod.stability.tracing.tracer import outward, trace
+from chilopod.stability.spectrum.eigenvalues import VERDICTS
+from chilopod.stability.tracing.equations import Step
+from chilopod.stability.tracing.tracer import Ending, outward, trace
 
 if TYPE_CHECKING:
     import xarray as xr

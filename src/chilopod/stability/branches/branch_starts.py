@@ -13,14 +13,12 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.orbits.orbit import bounded, find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, system_of
-from chilopod.stability.problem.budget import UserCode
+from chilopod.stability.problem.arguments import UserCode, check_arguments, system_of
 from chilopod.stability.problem.capabilities import (
     Family,
     SystemLike,
@@ -28,9 +26,9 @@ from chilopod.stability.problem.capabilities import (
     is_autonomous,
     known_orbit,
     returns_per_period,
+    sizes,
 )
 from chilopod.stability.problem.returns import Section, returned_states, whole_period
-from chilopod.stability.problem.scales import sizes
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""

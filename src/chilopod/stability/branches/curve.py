@@ -14,16 +14,22 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, read_only
-from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
+from chilopod.stability.branches.branch_points import (
+    Anchor,
+    BranchPoint,
+    OnCurve,
+    Returned,
+    null_vector,
+    symmetric_space,
+    within_space,
+)
 from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 from chilopod.stability.problem.capabilities import checked_flow, given_scale, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
-from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
-from chilopod.stability.tracing.step import Before, Guess, Step
+from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error

@@ -9,8 +9,7 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
-from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget, system_of
 from chilopod.stability.problem.capabilities import Family, SystemLike, returns_per_period
 from chilopod.stability.problem.returns import (
     ReturnMap,

@@ -25,14 +25,11 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
-from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import Budget
-from chilopod.stability.problem.capabilities import SystemLike, given_scale
+from chilopod.stability.problem.arguments import Budget, system_of
+from chilopod.stability.problem.capabilities import SystemLike, given_scale, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
-from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
-from chilopod.stability.tracing.step import Before, Guess, Step
+from chilopod.stability.tracing.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 
 Family2 = Callable[[float, float], SystemLike]
@@ -110,7 +107,7 @@ class Evaluated(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Spot(Evaluated):
-    """Point of a curve from which steps start (:class:`chilopod.stability.tracing.step.Anchor`), in its own frame."""
+    """Point of a curve from which steps start (:class:`~chilopod.stability.tracing.equations.Anchor`), in its frame."""
 
     matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
     tangent: Array  # unit tangent, shape (m + k + 1,)

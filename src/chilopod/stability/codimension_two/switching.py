@@ -20,8 +20,7 @@ from chilopod.stability.codimension_two.detection import Critical, Detector, acr
 from chilopod.stability.codimension_two.two_parameters import BUDGET, over_periods
 from chilopod.stability.normal_forms.center_manifold import displacements
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget, check_arguments, checked_box, system_of
 from chilopod.stability.problem.capabilities import known_orbit
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states

@@ -25,9 +25,8 @@ from chilopod.stability.points import (
     kind_at_plus_one,
     with_coefficients,
 )
-from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
+from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, sizes
 from chilopod.stability.problem.returns import returned_states
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block

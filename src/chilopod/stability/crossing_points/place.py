@@ -18,8 +18,7 @@ from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.problem.returns import ReturnMap
-from chilopod.stability.spectrum import errors
-from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers, spectrum
+from chilopod.stability.spectrum.eigenvalues import Spectrum, disturbed, return_multipliers, spectrum
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
 
@@ -146,7 +145,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     matrix = image.jacobian
     error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
     here = _collision(matrix, crossing)
-    moved = max(abs(_collision(other, crossing) - here) for other in errors.disturbed(matrix, error))
+    moved = max(abs(_collision(other, crossing) - here) for other in disturbed(matrix, error))
     before, after, apart = course.jacobians(crossing)
     slope = abs(_collision(after, crossing) - _collision(before, crossing)) / apart
     # All of eight draws are less than a third of the root mean square in one case of 50 000.

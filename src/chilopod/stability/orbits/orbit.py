@@ -18,8 +18,7 @@ from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, shot
-from chilopod.stability.problem.arguments import check_arguments, check_system
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget, check_arguments, check_system
 from chilopod.stability.problem.capabilities import (
     Capabilities,
     SystemLike,
@@ -28,6 +27,7 @@ from chilopod.stability.problem.capabilities import (
     is_stiff,
     known_orbit,
     offers,
+    sizes,
     spatial_symmetries,
 )
 from chilopod.stability.problem.returns import (
@@ -42,7 +42,6 @@ from chilopod.stability.problem.returns import (
     section_at,
     turned,
 )
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.mirrored import symmetric_states
 

@@ -19,10 +19,9 @@ from scipy.linalg.lapack import dgesv
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.convergence import NODES, RETURN
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget
 from chilopod.stability.problem.capabilities import Autonomous, SystemLike, checked_flow, is_autonomous
-from chilopod.stability.problem.returns import Section, carried, crossing, section_at
+from chilopod.stability.problem.returns import NODES, RETURN, Section, carried, crossing, section_at
 
 _EVALUATIONS, FEW_ROUNDS = 60, 12  # largest numbers of damped corrections, and of those on a curve, with near points
 _LONGEST = 4.0  # longest return, relative to the guess

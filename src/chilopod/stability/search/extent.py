@@ -13,7 +13,7 @@ from chilopod.stability.branches.branch_starts import begin
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.crossing_points.place import Sample
 from chilopod.stability.points import Kind
-from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.arguments import Budget, SpentError
 from chilopod.stability.problem.capabilities import Family, SystemLike
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.samples import NEAR_FOLD, Samples

@@ -18,8 +18,7 @@ from chilopod.stability.crossing_points.place import Course, past_singular, plac
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_interval
-from chilopod.stability.problem.budget import SpentError, UserCode
+from chilopod.stability.problem.arguments import SpentError, UserCode, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.extent import Fold, extent

@@ -14,10 +14,9 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state, near_orbit
-from chilopod.stability.problem.budget import Budget, SpentError, UserCode
-from chilopod.stability.problem.capabilities import Family, SystemLike
+from chilopod.stability.problem.arguments import Budget, SpentError, UserCode
+from chilopod.stability.problem.capabilities import Family, SystemLike, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, return_maps, section_at
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.search.checked_family import CheckedFamily
 from chilopod.stability.unit_circle.crossings import first_values
 
