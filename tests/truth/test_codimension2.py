@@ -150,16 +150,9 @@ def test_double_multiplier_and_flip_on_a_curve_of_folds(units, first):
     x = np.full(2, -1.5 / 1.6)
     start = BifurcationPoint(Kind.FOLD, -(1.5**2) / 3.2 * first, 0.0, x * units, units.astype(complex), 1.0 + 0j, 0.0)
     curve = follow2(family2, start, ((-2.0 * first, first), (-2.0, 1.5)), second=0.5, longest=0.1)
-    curve = replace(
-        curve,
-        **{
-            name: tuple(
-                replace(each, values=each.values / [first, 1.0], error_bound=each.error_bound / [first, 1.0])
-                for each in getattr(curve, name)
-            )
-            for name in ("points", "special")
-        },
-    )
+    scale = np.array([first, 1.0])
+    points = (replace(each, values=each.values / scale, error_bound=each.error_bound / scale) for each in curve.points)
+    curve = replace(curve, points=tuple(points))
     check_curve(curve, lambda values: values[0] + (1.0 + values[1]) ** 2 / 3.2)
     assert all((point.error_bound < 1e-11).all() for point in curve.special)
     check_special(

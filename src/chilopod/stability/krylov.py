@@ -172,7 +172,7 @@ def tangent_map(system: Capabilities, x: Array, section: Section | None = None) 
 
 
 def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
-    """Sizes of the states, shape (n,), as :func:`~chilopod.stability.problem.capabilities.sizes`, without the matrix: the
+    """Sizes of the states, shape (n,), as :func:`.problem.capabilities.sizes`, without the matrix: the
     largest value of a state during a return, or its change within a part of it when the others are disturbed at random
     by their own sizes (the one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 2000)."""
     given = given_scale(system)
