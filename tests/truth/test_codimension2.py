@@ -188,7 +188,7 @@ def test_generalised_period_doubling():
     check_special(curve, (CodimensionTwo.GENERALISED_PERIOD_DOUBLING, (0.36**2, -0.36)))
     # a = u + s u^2 + t u^4, for the s and t with which u has no square and no fourth power, goes to -u - 2 c^2 u^5.
     check_next(curve.special[0], 4.0 * 0.36**2)
-    for point in curve.points:
+    for point in (each for each in curve.points if each.coefficient is not None):
         assert point.coefficient == pytest.approx(-2.0 * (point.values[1] + 0.36), abs=1e-7)
 
 
