@@ -23,7 +23,7 @@ from chilopod.stability import (
     multipliers,
     sweep,
 )
-from chilopod.stability.problem.budget import SpentError
+from chilopod.stability.problem.arguments import SpentError
 from chilopod.stability.search.extent import find_fold
 from chilopod.stability.unit_circle.crossings import SearchStatus
 from helpers.systems import duffing, linear, lorenz

@@ -150,16 +150,9 @@ def test_double_multiplier_and_flip_on_a_curve_of_folds(units, first):
     x = np.full(2, -1.5 / 1.6)
     start = BifurcationPoint(Kind.FOLD, -(1.5**2) / 3.2 * first, 0.0, x * units, units.astype(complex), 1.0 + 0j, 0.0)
     curve = follow2(family2, start, ((-2.0 * first, first), (-2.0, 1.5)), second=0.5, longest=0.1)
-    curve = replace(
-        curve,
-        **{
-            name: tuple(
-                replace(each, values=each.values / [first, 1.0], error_bound=each.error_bound / [first, 1.0])
-                for each in getattr(curve, name)
-            )
-            for name in ("points", "special")
-        },
-    )
+    scale = np.array([first, 1.0])
+    points = (replace(each, values=each.values / scale, error_bound=each.error_bound / scale) for each in curve.points)
+    curve = replace(curve, points=tuple(points))
     check_curve(curve, lambda values: values[0] + (1.0 + values[1]) ** 2 / 3.2)
     assert all((point.error_bound < 1e-11).all() for point in curve.special)
     check_special(
@@ -195,7 +188,7 @@ def test_generalised_period_doubling():
     check_special(curve, (CodimensionTwo.GENERALISED_PERIOD_DOUBLING, (0.36**2, -0.36)))
     # a = u + s u^2 + t u^4, for the s and t with which u has no square and no fourth power, goes to -u - 2 c^2 u^5.
     check_next(curve.special[0], 4.0 * 0.36**2)
-    for point in curve.points:
+    for point in (each for each in curve.points if each.coefficient is not None):
         assert point.coefficient == pytest.approx(-2.0 * (point.values[1] + 0.36), abs=1e-7)
 
 

@@ -18,7 +18,7 @@ from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.stability.spectrum.errors import VERDICTS
+from chilopod.stability.spectrum.eigenvalues import VERDICTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from chilopod.cores import cores
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.flows import deadline
 from chilopod.frozen import Array
 
@@ -37,7 +37,7 @@ class TooManySteps(AnalysisError):
     """The budget of steps is spent, as for a stiff right-hand side."""
 
 
-def failure(status: int, t: float) -> AnalysisError:
+def failure(status: int, t: float) -> ChilopodError:
     """The error for an integration that stopped early at a time."""
     if status not in _REASONS:
         return deadline.over()

@@ -13,15 +13,15 @@ from typing import Self
 
 import numpy as np
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
 
 _STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
 _SAID: ContextVar[set[str] | None] = ContextVar("said", default=None)
 
 
-class SpentError(AnalysisError):
-    """The budget of a search is spent."""
+class SpentError(ChilopodError, RuntimeError):
+    """The budget or the time of a search is spent: an end of the whole search, unlike an :class:`AnalysisError`."""
 
 
 class Deadline:

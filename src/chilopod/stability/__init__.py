@@ -8,6 +8,7 @@ False
 """
 
 from chilopod.flows.called import NotAnalytic
+from chilopod.flows.deadline import SpentError
 from chilopod.flows.events import Event
 from chilopod.flows.jumps import UndeclaredSwitch
 from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, switch
@@ -21,16 +22,15 @@ from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget
 from chilopod.stability.problem.capabilities import Autonomous, Capabilities, SystemLike
 from chilopod.stability.problem.maps import from_map
 from chilopod.stability.problem.returns import ReturnMap, Section
-from chilopod.stability.problem.system import PeriodicSystem
-from chilopod.stability.rhs import from_rhs
+from chilopod.stability.problem.system import PeriodicSystem, from_rhs
 from chilopod.stability.search.locate import Located, locate
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
-from chilopod.stability.tracing.ending import Ending
+from chilopod.stability.tracing.tracer import Ending
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
 __all__ = [
@@ -62,6 +62,7 @@ __all__ = [
     "SearchStatus",
     "Section",
     "SpecialPoint2",
+    "SpentError",
     "Start",
     "Start2",
     "SymmetricCrossing",

@@ -18,11 +18,10 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array, numbers
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.normal_forms.extrapolation import radii, series
+from chilopod.stability.normal_forms.center_manifold import radii, series
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality
-from chilopod.stability.problem.arguments import check_system, system_of
-from chilopod.stability.problem.budget import UserCode
+from chilopod.stability.problem.arguments import UserCode, check_system, system_of
 from chilopod.stability.problem.capabilities import (
     Autonomous,
     Family,
@@ -32,8 +31,7 @@ from chilopod.stability.problem.capabilities import (
     offers,
 )
 from chilopod.stability.problem.returns import section_at
-from chilopod.stability.spectrum.eigenvalues import phased
-from chilopod.stability.spectrum.errors import SAFETY, disturbed, eigenvalue_errors
+from chilopod.stability.spectrum.eigenvalues import SAFETY, disturbed, eigenvalue_errors, phased
 
 _EPSILON = float(np.finfo(float).eps)
 ROUNDING = 16.0 * _EPSILON

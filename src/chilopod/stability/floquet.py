@@ -24,10 +24,8 @@ from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, i
 from chilopod.stability.problem.returns import return_maps
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
-from chilopod.stability.spectrum.cut import moderate_cut
-from chilopod.stability.spectrum.eigenvalues import phased, spectrum
-from chilopod.stability.spectrum.errors import VERDICTS, stable_within
-from chilopod.stability.spectrum.splitting import split_product, split_stiff
+from chilopod.stability.spectrum.eigenvalues import VERDICTS, phased, spectrum, stable_within
+from chilopod.stability.spectrum.splitting import moderate_cut, split_product, split_stiff
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -203,7 +201,7 @@ def multipliers(
 
 
 def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[Multipliers]:
-    """Multipliers of many systems at their known orbits, on all cores if the systems allow it; an AnalysisError after
+    """Multipliers of many systems at their known orbits, on all cores if the systems allow it; a SpentError after
     ``seconds``, the time in s."""
     if not isinstance(systems, Sequence):
         raise ParameterError("must be a list", field="systems", value=systems, allowed="a list of systems")
@@ -232,7 +230,7 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: fl
     with Deadline(seconds):
         found = find_orbit(system, orbit)
         image = found.image
-        if is_stiff(system, found.state, image.period / image.returns):
+        if is_stiff(system, found.state, image.duration):
             log_nu, modes, moved = split_stiff(system, found.state, image)
         else:
             cut = moderate_cut(system, found.state, image)

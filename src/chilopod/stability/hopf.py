@@ -25,8 +25,7 @@ from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_interval
-from chilopod.stability.problem.budget import SpentError, UserCode
+from chilopod.stability.problem.arguments import SpentError, UserCode, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, given_scale, offers
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.search.extent import Fold

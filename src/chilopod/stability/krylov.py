@@ -21,12 +21,12 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, shape_of
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.convergence import RETURN
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget
 from chilopod.stability.problem.capabilities import Capabilities, given_scale, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import (
     CUTS,
     REPEATED,
+    RETURN,
     Section,
     carried,
     return_duration,
@@ -34,8 +34,7 @@ from chilopod.stability.problem.returns import (
     section_at,
     turned,
 )
-from chilopod.stability.spectrum.eigenvalues import eigensystem
-from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors
+from chilopod.stability.spectrum.eigenvalues import FIRST_ORDER, eigensystem, eigenvalue_errors
 
 LARGE = 100  # number of states from which a few directions are cheaper than the whole derivative
 
@@ -173,7 +172,7 @@ def tangent_map(system: Capabilities, x: Array, section: Section | None = None) 
 
 
 def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
-    """Sizes of the states, shape (n,), as in :func:`chilopod.stability.problem.scales.sizes`, without the matrix: the
+    """Sizes of the states, shape (n,), as :func:`.problem.capabilities.sizes`, without the matrix: the
     largest value of a state during a return, or its change within a part of it when the others are disturbed at random
     by their own sizes (the one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 2000)."""
     given = given_scale(system)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
@@ -28,15 +28,13 @@ from chilopod.stability.branches.family_returns import PRECISION
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_interval
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import carried, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
-from chilopod.stability.spectrum.errors import VERDICTS
-from chilopod.stability.tracing.ending import Ending
-from chilopod.stability.tracing.step import Step
-from chilopod.stability.tracing.tracer import outward, trace
+from chilopod.stability.spectrum.eigenvalues import VERDICTS
+from chilopod.stability.tracing.equations import Step
+from chilopod.stability.tracing.tracer import Ending, outward, trace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -326,7 +324,7 @@ def _at_event(curve: Curve, last: BranchPoint) -> bool:
     system = curve.system(last.value)
     try:
         return jumps_at_ends(system, last.orbit, _duration(system, last))
-    except AnalysisError:
+    except ChilopodError:
         return False
 
 
@@ -334,7 +332,7 @@ def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
     """The anchor at another state of the orbit of a point; None if time 0 is fixed, or no state suits."""
     system = curve.system(last.value)
     for part in _PARTS if is_autonomous(system) else ():
-        with contextlib.suppress(AnalysisError):
+        with contextlib.suppress(ChilopodError):
             x = carried(system, last.orbit[None], 0.0, part * _duration(system, last))[0]
             rising = bool(last.tangent[-1] > 0.0)
             anchor = anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)

@@ -1,4 +1,4 @@
-"""Points along a branch of periodic orbits, and anchors of steps."""
+"""Points along a branch of periodic orbits, anchors of steps, and their matrices and tangents."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.problem.returns import ReturnMap, Section
-from chilopod.stability.spectrum.errors import stable_within
-from chilopod.stability.tracing.step import Before
+from chilopod.stability.spectrum.eigenvalues import stable_within
+from chilopod.stability.symmetry.mirrored import symmetric_states
+from chilopod.stability.tracing.equations import Before
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class BranchPoint(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Anchor(ReadOnlyArrays):
-    """A point from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
+    """A point from which steps start: see :class:`chilopod.stability.tracing.equations.Anchor`."""
 
     last: BranchPoint  # the point
     # Jacobian of [H - x; tangent . step] with respect to state and parameter in units, shape (n+1, n+1).
@@ -104,3 +107,49 @@ class OnCurve(NamedTuple):
     value: float
     image: ReturnMap
     wrong: float
+
+
+_UNCERTAIN = 1e-6  # singular value that counts as zero: the error of a difference
+
+
+def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None) -> Array | None:
+    """Projection onto the states with the spatial symmetries of an orbit, and of the ``mode`` of a leaving branch if
+    given, in units of the states' ``sizes``, shape (n, n); None without symmetries.
+
+    In this space the branch is regular where symmetry-breaking branches leave it (Golubitsky, Stewart & Schaeffer,
+    *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
+    """
+    if system.symmetry is not None or not spatial_symmetries(system):
+        return None
+    x = state if mode is None else state + sizes * mode / np.linalg.norm(mode)
+    basis = symmetric_states(system, x, sizes)
+    return basis @ basis.T if basis.shape[1] < x.size else None
+
+
+def within_space(space: Array | None, matrix: Array) -> Array:
+    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), restricted to a space of states, replaced
+    by a contraction across it."""
+    if space is None:
+        return matrix
+    n = len(space)
+    across = np.eye(n) - space
+    result = np.array(matrix)
+    result[:n] = space @ result[:n]
+    result[:n, :n] -= result[:n, :n] @ across + across
+    return result
+
+
+def null_vector(bordered: Array) -> Array:
+    """Unit null vector of all but the last row of a matrix, on the side of the last row.
+
+    At a branch point the matrix is singular within its errors, and the shortest solution is used. A return that
+    magnifies errs along the magnified direction only, so its largest singular value does not matter.
+    """
+    n = len(bordered) - 1
+    if not np.isfinite(bordered).all():
+        raise AnalysisError("the return map is not finite", field="flow")
+    least = _UNCERTAIN / max(1.0, float(np.linalg.norm(bordered, 2)))
+    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=least)[0]
+    if not tangent.any():
+        raise AnalysisError("the curve has no direction here", field="step")
+    return tangent / np.linalg.norm(tangent)

@@ -13,14 +13,12 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.orbits.orbit import bounded, find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, system_of
-from chilopod.stability.problem.budget import UserCode
+from chilopod.stability.problem.arguments import UserCode, check_arguments, system_of
 from chilopod.stability.problem.capabilities import (
     Family,
     SystemLike,
@@ -28,9 +26,9 @@ from chilopod.stability.problem.capabilities import (
     is_autonomous,
     known_orbit,
     returns_per_period,
+    sizes,
 )
 from chilopod.stability.problem.returns import Section, returned_states, whole_period
-from chilopod.stability.problem.scales import sizes
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
@@ -249,13 +247,13 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
     """Sizes of the states, shape (n,), up to which returns near an orbit are linear."""
     system = curve.system(value)
     image = curve.image(x, value, section)
-    base = sizes(system, x, image.period / image.returns)
+    base = sizes(system, x, image.duration)
     direction = np.cos(1.0 + 3.0 * np.arange(x.size))
     direction = image.across @ (base * direction / np.abs(direction).max())
     returned = image.state, image.jacobian @ direction
     flown = []
     for part in _PARTS:
-        time = part * image.period / image.returns
+        time = part * image.duration
         state, derivative = system.flow(np.array(x), 0.0, time)
         flown.append((time, (state, derivative @ direction)))
 
@@ -312,7 +310,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
         tangent = np.append(start.mode / units[:-1], 0.0)
         tangent /= np.linalg.norm(tangent)
     leaving = start.mode is not None
-    known = image if leaving else bounded(curve.system(start.value), start.orbit, image).image
+    known = image if leaving else bounded(curve.system(start.value), start.orbit, image.duration).image
     values, bound = curve.multipliers(known)
     about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": curve.periods}
     if start.bifurcation is not None:

@@ -14,17 +14,22 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, read_only
-from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
+from chilopod.stability.branches.branch_points import (
+    Anchor,
+    BranchPoint,
+    OnCurve,
+    Returned,
+    null_vector,
+    symmetric_space,
+    within_space,
+)
 from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
-from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import checked_flow, given_scale, is_autonomous
 from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
-from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
-from chilopod.stability.tracing.step import Before, Guess, Step
+from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
@@ -189,14 +194,14 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         matrix = within_space(anchor.space, guess.matrix)
         try:
             return timed, self.corrected(timed, Guess(guess.moved, matrix), plane)
-        except (OutsideBoxError, SpentError):
+        except OutsideBoxError:
             raise
         except AnalysisError:
             if count < _FEWEST_NODES:
                 raise
         moved, _, _, image, _ = self._shot(anchor, timed, plane, count)
         if timed.section is not None:
-            timed = replace(timed, section=replace(timed.section, duration=image.period / image.returns))
+            timed = replace(timed, section=replace(timed.section, duration=image.duration))
         return timed, self.corrected(timed, Guess(moved, matrix), plane)
 
     def _shot(
@@ -246,7 +251,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         tangent, matrix, section = step.tangent, step.matrix, None
         if anchor.section is not None:
             system = self.system(value)
-            section = section_at(system, x, self.sizes, image.period / image.returns)
+            section = section_at(system, x, self.sizes, image.duration)
             assert section is not None
             assert is_autonomous(system)
             velocity = np.asarray(system.velocity(x))
@@ -273,7 +278,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         if float(section.normal @ velocity) > 0.0 and motion >= _SHRUNK * np.cbrt(self.precision) * self._motion:
             return
         # A small cycle is smaller than its velocity in any state times its period.
-        path = self._path(found.x, found.value, found.image.period / found.image.returns)
+        path = self._path(found.x, found.value, found.image.duration)
         extent = float(np.linalg.norm((path - found.x) / self.units(velocity.size)[:-1], axis=1).max())
         raise AnalysisError(
             "the orbit shrinks into an equilibrium: a Hopf point"

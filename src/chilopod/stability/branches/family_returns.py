@@ -9,8 +9,7 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
-from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget, system_of
 from chilopod.stability.problem.capabilities import Family, SystemLike, returns_per_period
 from chilopod.stability.problem.returns import (
     ReturnMap,
@@ -90,7 +89,7 @@ class FamilyReturns:
     def noise(self, x: Array, value: float, section: Section | None) -> float:
         """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
         image, system = self.image(x, value, section), self.system(value)
-        other = in_parts(system, x, image.period / image.returns)
+        other = in_parts(system, x, image.duration)
         return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
     def _parameter_step(self, value: float, steepness: float) -> float:

@@ -23,20 +23,18 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.special_points import Place, special_point
-from chilopod.stability.branches.within import Within
+from chilopod.stability.branches.special_points import Place, Within, special_point
 from chilopod.stability.crossing_points.description import ContinuumError
 from chilopod.stability.orbit_blocks import crossings_in
-from chilopod.stability.problem.budget import SpentError
 from chilopod.stability.problem.capabilities import offers
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import spectrum
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.tracing.step import Step, predicted
+from chilopod.stability.tracing.equations import Step, predicted
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.interpolation import DEGREE, PLACES, interpolated
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, factors
+from chilopod.stability.unit_circle.zeros import DEGREE, PLACES, interpolated
 
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
 _BUDGET = 400  # corrected orbits within one step
@@ -209,8 +207,6 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
     def matrices(places: Array) -> tuple[Array, Array]:
         try:
             return np.array([within.jacobian(place) for place in places.tolist()]), np.full(places.size, _ERROR)
-        except SpentError:
-            raise
         except AnalysisError as error:
             if step.size > _TELLING:
                 raise ArithmeticError("the corrector fails within the step") from error

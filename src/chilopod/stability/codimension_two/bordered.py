@@ -25,14 +25,11 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
-from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import Budget
-from chilopod.stability.problem.capabilities import SystemLike, given_scale
+from chilopod.stability.problem.arguments import Budget, system_of
+from chilopod.stability.problem.capabilities import SystemLike, given_scale, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
-from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
-from chilopod.stability.tracing.step import Before, Guess, Step
+from chilopod.stability.tracing.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 
 Family2 = Callable[[float, float], SystemLike]
@@ -110,7 +107,7 @@ class Evaluated(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Spot(Evaluated):
-    """Point of a curve from which steps start (:class:`chilopod.stability.tracing.step.Anchor`), in its own frame."""
+    """Point of a curve from which steps start (:class:`~chilopod.stability.tracing.equations.Anchor`), in its frame."""
 
     matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
     tangent: Array  # unit tangent, shape (m + k + 1,)
@@ -257,7 +254,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return place, return_map(system, place.state, with_error, section)
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
-        size = sizes(system, place.state, image.period / image.returns)
+        size = sizes(system, place.state, image.duration)
         if self.known or place.state.any() or given_scale(system) is not None:
             return size
         # The parameters set the size of an orbit that rests at zero.
@@ -279,7 +276,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         basis = np.zeros((n, 0)) if self.known else symmetric_states(system, place.state, size)
         section = None
         if image.normal is not None:
-            section = Section(place.state, image.normal, image.period / image.returns)
+            section = Section(place.state, image.normal, image.duration)
         jacobian = image.jacobian * size / size[:, None]
         critical = self._critical(jacobian, place.cosine)
         if before is None:

@@ -12,7 +12,7 @@ from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, mark, rows
-from chilopod.stability.tracing.ending import Ending
+from chilopod.stability.tracing.tracer import Ending
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,9 +107,7 @@ class Curve2(Result):
     kind
         Kind of the bifurcation along it.
     points
-        Points in order.
-    special
-        Points of codimension two, in order.
+        Points in order, those of codimension two included.
     endings
         Reasons for the end at its first point and at its last.
     reasons
@@ -120,10 +118,14 @@ class Curve2(Result):
 
     kind: Kind
     points: tuple[Point2, ...]
-    special: tuple[SpecialPoint2, ...]
     endings: tuple[Ending, Ending]
     reasons: tuple[str, str] = ("", "")
     periods: int = 1
+
+    @property
+    def special(self) -> tuple[SpecialPoint2, ...]:
+        """Points of codimension two."""
+        return tuple(point for point in self.points if isinstance(point, SpecialPoint2))
 
     @property
     def values(self) -> Array:
@@ -153,19 +155,13 @@ class Curve2(Result):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """Dataset of the points over ``point``, in order along the curve, with those of codimension two; ``special`` is
-        empty at ordinary points. Multipliers belong to the return map."""
-        points, scale = list(self.points), np.ptp(self.values, axis=0)
-        scale[scale == 0.0] = 1.0
-        for each in self.special:
-            places = np.array([point.values for point in points]) / scale
-            away = np.linalg.norm(places - each.values / scale, axis=1)
-            detours = away[:-1] + away[1:] - np.linalg.norm(np.diff(places, axis=0), axis=1)
-            points.insert(int(detours.argmin()) + 1 if detours.size else 1, each)
-        kinds = {"special": [getattr(point, "kind", None) for point in points]}
+        """Dataset of the points over ``point``, in order along the curve; ``special`` is empty at ordinary points.
+        Multipliers belong to the return map."""
+        kinds = {"special": [getattr(point, "kind", None) for point in self.points]}
         names = ("values", "error_bound", "coefficient", "coefficient_error", "frequency", "orbit", "multipliers")
         first, last = (end.label for end in self.endings)
-        return dataset("point", columns(points, *names) | kinds, kind=self.kind.label, first_end=first, last_end=last)
+        about = {"kind": self.kind.label, "first_end": first, "last_end": last}
+        return dataset("point", columns(self.points, *names) | kinds, **about)
 
 
 @dataclass(frozen=True)

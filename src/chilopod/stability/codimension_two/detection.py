@@ -27,7 +27,7 @@ from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import spectrum
 from chilopod.stability.symmetry.mirrored import reverses
-from chilopod.stability.tracing.step import Step
+from chilopod.stability.tracing.equations import Step
 from chilopod.stability.tracing.tracer import Parts
 from chilopod.stability.unit_circle.spectra import TARGETS, Event
 

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
@@ -20,8 +20,7 @@ from chilopod.stability.codimension_two.detection import Critical, Detector, acr
 from chilopod.stability.codimension_two.two_parameters import BUDGET, over_periods
 from chilopod.stability.normal_forms.center_manifold import displacements
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
-from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.arguments import Budget, check_arguments, checked_box, system_of
 from chilopod.stability.problem.capabilities import known_orbit
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
@@ -151,9 +150,7 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
             if place is None:
                 continue
             found = folds.begin(place)
-        except SpentError:
-            raise
-        except (ChilopodError, ArithmeticError, ValueError) as error:
+        except (AnalysisError, ArithmeticError, ValueError) as error:
             cause = error
             continue
         values, origin = found.values, there.spot.place

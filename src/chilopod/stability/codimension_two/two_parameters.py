@@ -19,15 +19,12 @@ from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, Station
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_box, system_of
-from chilopod.stability.problem.budget import Budget
-from chilopod.stability.problem.capabilities import known_orbit
+from chilopod.stability.problem.arguments import Budget, check_arguments, checked_box, system_of
+from chilopod.stability.problem.capabilities import known_orbit, sizes
 from chilopod.stability.problem.returns import return_duration, whole_period
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import reverses
-from chilopod.stability.tracing.ending import Ending
-from chilopod.stability.tracing.step import Step
-from chilopod.stability.tracing.tracer import trace
+from chilopod.stability.tracing.equations import Step
+from chilopod.stability.tracing.tracer import Ending, trace
 
 BUDGET = 20_000
 """Default budget of a curve, in return maps with derivatives."""
@@ -125,7 +122,6 @@ def follow2(
     return Curve2(
         start.kind,
         (*reversed(before.points), origin.point, *after.points),
-        (*reversed(before.special), *after.special),
         (before.ending, after.ending),
         (before.reason, after.reason),
         periods,
@@ -170,7 +166,6 @@ class _Half:
     last: Station
     progress: Progress2
     points: list[Point2] = field(default_factory=list)
-    special: list[SpecialPoint2] = field(default_factory=list)
     ending: Ending = Ending.START
     reason: str = ""
 
@@ -191,7 +186,7 @@ class _Half:
     def keep(self, found: _Looked, count: int) -> None:
         """Keep a step with its events."""
         station, special = found
-        self.special += special
+        self.points += special
         if station is not None:
             self.points.append(station.point)
             self.last = station

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.crossing_points.place import critical_multipliers
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
@@ -24,9 +25,8 @@ from chilopod.stability.points import (
     kind_at_plus_one,
     with_coefficients,
 )
-from chilopod.stability.problem.capabilities import SystemLike, is_autonomous
+from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, sizes
 from chilopod.stability.problem.returns import returned_states
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block
@@ -112,7 +112,7 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
     # The flow carries the velocity as it carries the mode.
     start = np.stack([mode, system.velocity(np.array(orbit.state))], axis=1)
     moves: list[tuple[Array, ComplexArray]] = [(orbit.state, start)]
-    duration = orbit.period / orbit.image.returns
+    duration = orbit.image.duration
 
     def carried(x: Array, directions: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
         x, derivative = system.flow(np.array(x), 0.0, part * duration)
@@ -137,7 +137,7 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
 def _is_continuum(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> bool:
     """True if all terms of the bifurcation equation vanish along a mode: an orbit beside this one, corrected across the
     critical space alone, returns to itself (Lyapunov-Schmidt reduction). Orbits of a linear map do so uncorrected."""
-    size = sizes(system, orbit.state, orbit.period / orbit.image.returns)
+    size = sizes(system, orbit.state, orbit.image.duration)
     ahead = mode.real / size
     shift = _ASIDE * ahead / np.linalg.norm(ahead)
     matrix = orbit.image.jacobian * size / size[:, None] - np.eye(size.size)
@@ -160,14 +160,14 @@ def _formed(
     if event is not Event.PAIR:
         mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
     bounded = replace(image, error=np.nan_to_num(image.error, nan=0.0, posinf=0.0))
-    scale = sizes(system, orbit.state, orbit.period / image.returns)
+    scale = sizes(system, orbit.state, image.duration)
 
     def mapped(states: Array) -> Array:
         return returned_states(system, states, orbit.section)
 
     try:
         return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)
-    except (AnalysisError, ValueError):
+    except (AnalysisError, SpentError, ValueError):
         return None
 
 

@@ -19,9 +19,9 @@ from chilopod.stability.problem.capabilities import (
     checked_flow,
     is_autonomous,
     returns_per_period,
+    sizes,
 )
 from chilopod.stability.problem.returns import carried, return_duration, returned_states
-from chilopod.stability.problem.scales import sizes
 
 _OF_GUESS = 16  # nodes of a guess that is a whole orbit
 _FEWEST_ROWS = 5

@@ -18,8 +18,7 @@ from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, shot
-from chilopod.stability.problem.arguments import check_arguments, check_system
-from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.arguments import Budget, check_arguments, check_system
 from chilopod.stability.problem.capabilities import (
     Capabilities,
     SystemLike,
@@ -28,6 +27,7 @@ from chilopod.stability.problem.capabilities import (
     is_stiff,
     known_orbit,
     offers,
+    sizes,
     spatial_symmetries,
 )
 from chilopod.stability.problem.returns import (
@@ -42,7 +42,6 @@ from chilopod.stability.problem.returns import (
     section_at,
     turned,
 )
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
@@ -87,7 +86,7 @@ class Orbit(Shown, ReadOnlyArrays):
         """Section of ``image``, if the system does not depend on time."""
         if self.image.normal is None:
             return None
-        return Section(self.state, self.image.normal, self.image.period / self.image.returns)
+        return Section(self.state, self.image.normal, self.image.duration)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         """The state, so that an orbit serves wherever a guess of one is wanted."""
@@ -156,7 +155,9 @@ def find_orbit(
     Raises
     ------
     AnalysisError
-        If no start converges, or the budget or the time is spent.
+        If no start converges.
+    SpentError
+        If the budget or the time is spent.
     """
     if seconds != math.inf:
         with Deadline(seconds):
@@ -178,8 +179,6 @@ def find_orbit(
     try:
         found = _solved(system, Nodes(x[None], duration), with_error, budget, section)
         return _shortest(system, found, with_error, budget) if shortened else found
-    except SpentError:
-        raise
     except TooManySteps as error:
         allowed = "a guess closer to the orbit and its period, or method='implicit' for a stiff system"
         said = f"the motion from the guess {error.problem}"
@@ -193,8 +192,6 @@ def find_orbit(
             try:
                 found = _solved(system, nearer, with_error, budget, careful=careful)
                 return _shortest(system, found, with_error, budget) if shortened else found
-            except SpentError:
-                raise
             except AnalysisError:
                 continue
         raise failed
@@ -226,7 +223,7 @@ def find_large_orbit(system: Capabilities, guess: ArrayLike | None = None) -> tu
         image, size = closed_orbit(system, x, farthest=_KNOWN if exact else np.inf)
     except AnalysisError:
         found = find_orbit(system, guess, with_error=False)
-        size = tangent_sizes(system, found.state, found.period / found.image.returns)
+        size = tangent_sizes(system, found.state, found.image.duration)
         return tangent_map(system, found.state, found.section), size
     with contextlib.suppress(AnalysisError):
         while (parts := _parts(system, image.point, image.duration, size)) > 1:
@@ -239,16 +236,14 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
     """Orbit over its shortest period, if every instant may be time 0."""
     if not is_autonomous(system):
         return orbit
-    duration = orbit.period / orbit.image.returns
+    duration = orbit.image.duration
     while (parts := _parts(system, orbit.state, duration, sizes(system, orbit.state, duration))) > 1:
         duration /= parts
         try:
             orbit = _solved(system, Nodes(orbit.state[None], duration), with_error, budget)
-        except SpentError:
-            raise
         except AnalysisError:
             break
-        duration = orbit.period / orbit.image.returns
+        duration = orbit.image.duration
     return orbit
 
 
@@ -286,7 +281,7 @@ def from_known(
     # No size is smaller than the state's value, unless the system gives the sizes.
     if not moved.any() or (given_scale(system) is None and (moved <= _RETURNED * np.abs(x)).all()):
         return Orbit(x, image, np.zeros(x.size))
-    size = sizes(system, x, image.period / image.returns)
+    size = sizes(system, x, image.duration)
     off = _relative(moved, size)
     if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
         return Orbit(x, image, np.zeros(x.size))
@@ -344,7 +339,7 @@ def _found(
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
-        return _bounded(system, x, duration)
+        return bounded(system, x, duration)
     section = section_at(system, x, units, duration)
     image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
@@ -361,13 +356,9 @@ def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
     return size[:, None] * basis if basis.shape[1] < x.size else None
 
 
-def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None = None) -> Orbit:
-    """The orbit through a state on it, shape (n,), with the section across its motion and with error bounds; ``image``
-    is the return map there or nearby, ``error`` a bound on the state's error, shape (n,), if known."""
-    return _bounded(system, x, image.period / image.returns, error)
-
-
-def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None = None) -> Orbit:
+def bounded(system: SystemLike, x: Array, duration: float, error: Array | None = None) -> Orbit:
+    """The orbit through a state on it, shape (n,), with the section across its motion and with error bounds, by the
+    approximate ``duration`` of a return; ``error`` is a bound on the state's error, shape (n,), if known."""
     size = sizes(system, x, duration)
     shared, given = _shared(system, x, size), x
     basis = np.eye(x.size) if shared is None else shared / size[:, None]
@@ -381,7 +372,7 @@ def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None 
         flow = _matrix(image.error, size) @ size
         stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():
-            twice = REPEATED * np.abs(in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
+            twice = REPEATED * np.abs(in_parts(system, x, image.duration) - image.state) + _CHANCE * size
             flow = flow + twice if stiff else np.minimum(flow, twice)
         wrong = np.abs(image.state - x) + flow
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T

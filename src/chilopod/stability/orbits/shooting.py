@@ -19,10 +19,9 @@ from scipy.linalg.lapack import dgesv
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.convergence import NODES, RETURN
-from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.arguments import Budget
 from chilopod.stability.problem.capabilities import Autonomous, SystemLike, checked_flow, is_autonomous
-from chilopod.stability.problem.returns import Section, carried, crossing, section_at
+from chilopod.stability.problem.returns import NODES, RETURN, Section, carried, crossing, section_at
 
 _EVALUATIONS, FEW_ROUNDS = 60, 12  # largest numbers of damped corrections, and of those on a curve, with near points
 _LONGEST = 4.0  # longest return, relative to the guess
@@ -222,7 +221,7 @@ class _Equations:
                     with np.errstate(all="ignore"):  # values that are not finite are refused later
                         self._linear[i, :, n + 1] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
             except AnalysisError as error:
-                if m == 1 or isinstance(error, SpentError):
+                if m == 1:
                     raise
                 raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
 
@@ -239,8 +238,8 @@ class _Equations:
                 self._linear[0, :, : x.size] = second @ first
                 self.nodes, self._returned = self.nodes._replace(duration=start + rest), True
                 return frame
-            except AnalysisError as error:
-                if not self._problem.careful or isinstance(error, SpentError):
+            except AnalysisError:
+                if not self._problem.careful:
                     raise
         self._ends[0], self._linear[0, :, : x.size] = checked_flow(system, x, 0.0, duration)
         return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
@@ -312,8 +311,8 @@ class _Equations:
         astray, reach = frame.astray and self.residual > _NEAR, frame.reach * (1.0 if frame.astray else _FARTHER)
         try:
             return _Equations(self._problem, there, frame._replace(reach=reach, astray=astray))
-        except AnalysisError as error:
-            if self._problem.free is not None or isinstance(error, SpentError):
+        except AnalysisError:
+            if self._problem.free is not None:
                 raise
             return None
 

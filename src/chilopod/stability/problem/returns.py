@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -25,12 +25,13 @@ from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.stability.problem.capabilities import (
     Autonomous,
     SystemLike,
+    check_finite,
     checked_flow,
     is_autonomous,
     offers,
     returns_per_period,
+    sizes,
 )
-from chilopod.stability.problem.scales import check_finite, sizes
 
 _APPROACHES = (1.0 / 16.0, 0.4)  # distances before a section, in returns, from which the crossing is corrected
 _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
@@ -38,6 +39,7 @@ _CROSSING_ROUNDS = 30
 _BENT = 0.5  # largest part of a correction of the time that the change of the speed adds
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
 _ENDS = 1e-3, 1e-4  # parts of a return, at its ends
+_FALLING = 0.5  # least fall of the residual that is progress
 
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
@@ -45,6 +47,21 @@ errors."""
 
 REPEATED = 10.0
 """Factor on the difference of two computations with different steps for a bound on the error of one."""
+
+
+class Rule(NamedTuple):
+    """Stopping rule: the residual is round-off, or small and no longer halves, which is the equations' accuracy."""
+
+    round_off: float  # residual, relative to the sizes of the unknowns, that is round-off
+    settled: float  # residual below which it may stop falling
+
+    def met(self, off: float, best: float) -> bool:
+        """True if a residual ends the corrections, given the best earlier one."""
+        return off <= self.round_off or (off <= self.settled and off >= _FALLING * best)
+
+
+RETURN = Rule(8e-16, 1e-10)  # for a return: a flow may err by a thousand times its tolerance
+NODES = Rule(1e-13, 1e-9)  # for any node of an orbit: with many nodes and long flows the residual is larger
 
 
 @dataclass(frozen=True)
@@ -96,6 +113,11 @@ class ReturnMap(ReadOnlyArrays):
     period: float
     velocity: Array | None = None
     normal: Array | None = None
+
+    @property
+    def duration(self) -> float:
+        """Duration of the return."""
+        return self.period / self.returns
 
     @property
     def across(self) -> Array:

@@ -6,8 +6,7 @@ import contextlib
 from collections.abc import Iterator
 
 from chilopod.errors import AnalysisError, ParameterError, in_words
-from chilopod.stability.problem.arguments import system_of
-from chilopod.stability.problem.budget import UserCode, UserError
+from chilopod.stability.problem.arguments import UserCode, UserError, system_of
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
 
 _KEPT = 64  # cached systems: those around a point are used repeatedly

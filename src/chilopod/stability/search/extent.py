@@ -13,7 +13,7 @@ from chilopod.stability.branches.branch_starts import begin
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.crossing_points.place import Sample
 from chilopod.stability.points import Kind
-from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.arguments import Budget, SpentError
 from chilopod.stability.problem.capabilities import Family, SystemLike
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.samples import NEAR_FOLD, Samples
@@ -152,7 +152,7 @@ def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool)
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
     try:
         beside = samples.at(fold.value + (-away if rising else away))
-    except AnalysisError:
+    except (AnalysisError, SpentError):
         return True  # no evidence against it
     off = [each.off_plus_one for each in beside]
     return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
@@ -171,5 +171,5 @@ def _moved(samples: Samples, system: SystemLike, image: ReturnMap) -> float:
     """Extent of the motion within a return, relative to the sizes of the states."""
     path = [image.state]
     for _ in range(_PARTS - 1):
-        path.append(system.flow(path[-1], 0.0, image.period / image.returns / _PARTS)[0])
+        path.append(system.flow(path[-1], 0.0, image.duration / _PARTS)[0])
     return float((np.ptp(np.array(path), axis=0) / samples.size).max())

@@ -18,8 +18,7 @@ from chilopod.stability.crossing_points.place import Course, past_singular, plac
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import check_arguments, checked_interval
-from chilopod.stability.problem.budget import SpentError, UserCode
+from chilopod.stability.problem.arguments import SpentError, UserCode, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.extent import Fold, extent
@@ -207,7 +206,7 @@ def located(
             try:
                 with samples.budget, UserCode("family", crossing.value):
                     results += described(crossing, block)
-            except AnalysisError as error:
+            except (AnalysisError, SpentError) as error:
                 status = status.worst(SearchStatus.INCOMPLETE)
                 results.append(f"the crossing at {crossing.value:.9g} could not be described: {error}")
     results += [fold(each) for each in here.folds]
@@ -252,8 +251,8 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     touch = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1) and crossing.change == 0
     touch = touch and not crossing.collision and samples.low < crossing.value < samples.high
 
-    def bounded_at(value: float, state: Array, error: Array, image: ReturnMap) -> Orbit:
-        return bounded(samples.family(value), state, image, error=error)
+    def bounded_at(value: float, state: Array, error: Array, duration: float) -> Orbit:
+        return bounded(samples.family(value), state, duration, error)
 
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
     # A symmetry-breaking mode is not part of the orbit, which is regular among symmetric states.
@@ -262,7 +261,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     if regular is None:
         value, (sample,) = crossing.value, samples.at(np.array([crossing.value]))
         system, x, image = samples.family(value), sample.orbit, sample.image
-        orbit = from_known(system, x, image=image) if samples.known else bounded(system, x, image)
+        orbit = from_known(system, x, image=image) if samples.known else bounded(system, x, image.duration)
         bound = place_error(course, crossing, orbit.image)
     else:
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit

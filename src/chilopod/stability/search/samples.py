@@ -14,10 +14,9 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state, near_orbit
-from chilopod.stability.problem.budget import Budget, SpentError, UserCode
-from chilopod.stability.problem.capabilities import Family, SystemLike
+from chilopod.stability.problem.arguments import Budget, SpentError, UserCode
+from chilopod.stability.problem.capabilities import Family, SystemLike, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, return_maps, section_at
-from chilopod.stability.problem.scales import sizes
 from chilopod.stability.search.checked_family import CheckedFamily
 from chilopod.stability.unit_circle.crossings import first_values
 
@@ -75,7 +74,7 @@ class Samples:
         self.budget = Budget(self._allowed, seconds)
         with self.budget, UserCode("family", low):
             self.first = find_orbit(self.family(low), guess, budget=self.budget)
-            self.size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
+            self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
         self.budget.left = self._allowed
         self._exact = self.known and self.family.timed
         if not self._exact:
@@ -100,8 +99,6 @@ class Samples:
                     self._keep_known([value])
                 else:
                     self._keep(self._of_itself(value) if self.known else self._between(value))
-            except SpentError:
-                raise
             except AnalysisError as error:
                 self._missing[value] = error
         for value in missing:
@@ -131,7 +128,7 @@ class Samples:
         for i in np.flatnonzero(values[:, -1] <= _SURE):
             sample = samples[i]
             if sample.value not in self._bends:
-                system, duration = self.family(sample.value), sample.image.period / sample.image.returns
+                system, duration = self.family(sample.value), sample.image.duration
                 section = section_at(system, sample.orbit, self.size, duration)
                 beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[i, -1], False, section)
                 change = (beside.jacobian - sample.image.jacobian) * units
@@ -188,7 +185,7 @@ class Samples:
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
         with self.family.calling(value):
-            section = self._section(system, near, beside.image.period / beside.image.returns)
+            section = self._section(system, near, beside.image.duration)
             return _sample(value, near_orbit(system, near, self.known, section, self.size, self.budget))
 
     def _section(self, system: SystemLike, near: Array, duration: float) -> Section | None:
@@ -209,8 +206,6 @@ class Samples:
             if found.passes(around[0]) and found.passes(around[1]) and not self._goes_through(around[0], found):
                 raise AnalysisError("is another orbit", field="orbit")
             return found
-        except SpentError:
-            raise
         except AnalysisError:
             reached = self._follow(around[:1], value, _ATTEMPTS)
             for sample in reached:
@@ -286,8 +281,6 @@ class Samples:
             value = behind[-1].value + part * (ahead.value - behind[-1].value)
             try:
                 return self._sampled(value, self._foreseen(behind[: -_BEHIND - 1 : -1], value), behind[-1])
-            except SpentError:
-                raise
             except AnalysisError:
                 continue
         return None
@@ -369,8 +362,6 @@ class Samples:
                 return apart <= _SAME
             try:
                 middle = self._sampled(0.5 * (left.value + right.value), 0.5 * (left.orbit + right.orbit), left)
-            except SpentError:
-                raise
             except AnalysisError:  # H - 1 is singular at the passage
                 return bool(np.isfinite(before))
             left, right = (left, middle) if middle.passes(left) else (middle, right)
@@ -385,8 +376,6 @@ def _found(compute: Callable[[], T]) -> T | None:
     """Result of a function; None after an AnalysisError."""
     try:
         return compute()
-    except SpentError:
-        raise
     except AnalysisError:
         return None
 

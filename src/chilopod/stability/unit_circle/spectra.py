@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
-from chilopod.stability.spectrum.errors import DRAWS, SAFETY, disturbed
+from chilopod.stability.spectrum.eigenvalues import DRAWS, SAFETY, disturbed
 
 Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
@@ -49,9 +50,9 @@ def distances(nu: ComplexArray, event: Event) -> Array:
 class Spectra:
     """Eigenvalues of a family of matrices M, each computed once.
 
-    Errors come from random changes of M within its errors (:mod:`chilopod.stability.spectrum.errors`). The relative
-    error of an entry multiplies the geometric mean of the largest entries of its row and column, in units that balance
-    M: this does not depend on the user's units, and keeps a small multiplier beside a huge one if the matrix separates
+    Errors come from random changes of M within its errors (:mod:`chilopod.stability.spectrum.eigenvalues`). The
+    relative error of an entry multiplies the geometric mean of the largest entries of its row and column, in units that
+    balance M: this does not depend on the units, and keeps a small multiplier beside a huge one if the matrix separates
     them. M is evaluated at up to ``budget`` values, twice where errors matter, or ``affordable()`` more if its cost
     decides.
     """
@@ -111,7 +112,7 @@ class Spectra:
         """The values with a matrix, with the matrix and its error."""
         try:
             matrices, errors = self._matrices(np.array(values))
-        except AnalysisError:
+        except (AnalysisError, SpentError):
             middle = (len(values) + 1) // 2
             return self._ask(values[:middle]) + self._ask(values[middle:]) if len(values) > 1 else []
         return [each for each in zip(values, matrices, errors, strict=True) if np.isfinite(each[1]).all()]
