@@ -31,7 +31,7 @@ found
 # %%
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), sharey=True, layout="constrained")
 values = found.values * [1.0, 1e3]  # N·mm/deg and mm
-coefficient = np.array([point.coefficient for point in found.curve.points])
+coefficient = np.array([point.coefficient for point in found.curve.points], dtype=float)  # NaN where it changes
 left.plot(*values.T, color="grey", linewidth=1)
 for gentle, color, name in ((coefficient < 0.0, "C0", "bends gently"), (coefficient >= 0.0, "C3", "jumps")):
     left.plot(*values[gentle].T, "o", markersize=4, color=color, label=name)

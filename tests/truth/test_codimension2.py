@@ -58,13 +58,14 @@ def check_next(point, expected):
 
 def check_curve(curve, across):
     """``across(values)``, a function that is zero on the curve, is so within the bounds of all points."""
+    special = {id(point) for point in curve.special}
     for point in curve.points:
         slopes = [
             (across(point.values + h) - across(point.values - h)) / 2e-6
             for h in (np.array([1e-6, 0]), np.array([0, 1e-6]))
         ]
         assert abs(across(point.values)) <= np.abs(slopes) @ point.error_bound
-        assert (point.error_bound < 1e-11 * (1.0 + np.abs(point.values))).all()
+        assert id(point) in special or (point.error_bound < 1e-11 * (1.0 + np.abs(point.values))).all()
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-9])
