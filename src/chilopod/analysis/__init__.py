@@ -1,11 +1,14 @@
-"""Analyses in the planar theory: stability of the straight walk, its bifurcations, and the curved walks beyond them."""
+"""Analyses: stability of the straight walk, its bifurcations, and the curved walks beyond them."""
 
 from typing import TYPE_CHECKING
 
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
+    from chilopod.analysis.bend_onset import bend_onset
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
+    from chilopod.analysis.cycle_modes import CycleMultipliers
+    from chilopod.analysis.cycle_multipliers import cycle_multipliers, walk_multipliers
     from chilopod.analysis.radius_law import RadiusLaws, radius_laws
     from chilopod.analysis.square_root import SquareRootFit, square_root_fit
     from chilopod.analysis.straight_walk import (
@@ -22,7 +25,10 @@ else:
     __getattr__, __dir__ = exports(
         __name__,
         {
+            "bend_onset": ("bend_onset",),
             "branch": ("curved_walks", "read_walks", "resumed"),
+            "cycle_modes": ("CycleMultipliers",),
+            "cycle_multipliers": ("cycle_multipliers", "walk_multipliers"),
             "radius_law": ("RadiusLaws", "radius_laws"),
             "square_root": ("SquareRootFit", "square_root_fit"),
             "straight_walk": (
@@ -39,13 +45,16 @@ else:
     )
 
 __all__ = [
+    "CycleMultipliers",
     "RadiusLaws",
     "SquareRootFit",
     "StraightWalk",
     "TransitionCurve",
     "WalkBifurcation",
+    "bend_onset",
     "bifurcations",
     "curved_walks",
+    "cycle_multipliers",
     "first_loss",
     "pitchfork",
     "radius_laws",
@@ -55,4 +64,5 @@ __all__ = [
     "straight_walk",
     "transition_curve",
     "undulating_walks",
+    "walk_multipliers",
 ]

@@ -24,8 +24,8 @@ from chilopod.errors import ParameterError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from chilopod.analysis import CycleMultipliers
     from chilopod.robot import Robot
-    from chilopod.twin import CycleMultipliers
 
 
 @with_options
@@ -68,38 +68,28 @@ def stability(
             walk = straight_walk(described)
             result, lines = walk.as_json(), walk.lines()
         else:
+            from chilopod.analysis import walk_multipliers
+
             with own_code(show):
-                result, lines = _of_bends(described, _multipliers(engine, size), onset)
+                result, lines = _of_bends(described, partial(walk_multipliers, engine=engine, amplitude=size), onset)
     options.deliver_json(files, result, lines)
-
-
-def _multipliers(engine: str, amplitude: float) -> Callable[[Robot], CycleMultipliers]:
-    from chilopod.engine.named import engine_named
-
-    known: Any = engine_named(engine)
-    multipliers = getattr(known, "walk_multipliers", None)
-    if multipliers is None:
-        said, allowed = "has no state that can be divided by its place", "planar, twin, or a chilopod.twin.Edited"
-        raise ParameterError(said, field="engine", value=engine, allowed=allowed)
-    return partial(multipliers, amplitude=amplitude)
 
 
 def _of_bends(
     robot: Robot, multipliers: Callable[[Robot], CycleMultipliers], onset: tuple[str, str, str] | None
 ) -> tuple[dict[str, Any], list[str]]:
     if onset is None:
-        found = multipliers(robot)
-        return found.as_json(), found.lines()
+        walk = multipliers(robot)
+        return walk.as_json(), walk.lines()
     from chilopod import units
-    from chilopod.twin import bend_onset
+    from chilopod.analysis import bend_onset
 
     path, unit = onset[0], robot.unit_of(onset[0])
     point = bend_onset(multipliers, robot, path, interval(robot, path, onset[1:]))
     shown = [units.format(each, unit, digits=4) for each in (point.value, point.low, point.high)]
-    said = f"{robot.name}: bends grow from {path} = {shown[0]} on, interval of 95 % {shown[1]} to {shown[2]}"
-    return {"robot": robot.name, "parameter": path, "onset_si": point.value, "interval_si": [point.low, point.high]}, [
-        said
-    ]
+    said = f"{robot.name}: multiplier of bends passes 1 at {path} = {shown[0]}, 95 %: {shown[1]} to {shown[2]}"
+    found = {"robot": robot.name, "parameter": path, "onset_si": point.value, "interval_si": [point.low, point.high]}
+    return found, [said]
 
 
 @with_options

@@ -64,7 +64,7 @@ class _Own:
         self.traits: Traits = engine.traits
 
     def __getattr__(self, name: str) -> Any:
-        if name != "walk_multipliers":  # the only optional part
+        if name.startswith("_") or not hasattr(self._engine, name):  # optional, as in contract.HasFootCreep
             raise AttributeError(name)
         found = getattr(self._engine, name)
         return partial(_theirs, self._name, name, found) if callable(found) else found

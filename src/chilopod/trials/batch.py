@@ -60,10 +60,11 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     Every thread walks its part of the trials, unless their controller is a user's, which may not expect threads. The
     results do not depend on the number of threads.
     """
+    if not engine_named(trials[0].engine).traits.threads or _is_own(trials[0]):
+        return _walked(trials)
     import numba  # takes half a second to load
 
-    several = engine_named(trials[0].engine).traits.threads and not _is_own(trials[0])
-    threads = min(numba.get_num_threads(), len(trials) // _LEAST) if several else 1
+    threads = min(numba.get_num_threads(), len(trials) // _LEAST)
     if threads < 2:
         return _walked(trials)
     stopped = Event()

@@ -13,12 +13,15 @@ from scipy.spatial.transform import Rotation
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array
-from chilopod.twin.model import silence
+from chilopod.robot import Robot
+from chilopod.twin.legs import servo_targets, twin_of
+from chilopod.twin.model import Edit, compiled, silence
 
 _TOLERANCE = 1e-15
 """Tolerance of the contact solver: its first guess (the warm start) then changes an image by some 1e-8 or less."""
 
 _FREE, *_PLAIN = map(int, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
+_WHOLE = 1e-9  # of a cycle
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the body has fallen
 _SPEEDS = ("ahead", "left", "up", "roll", "pitch", "yaw")
 
@@ -114,3 +117,25 @@ class CycleMap:
             first, last = np.flatnonzero(differs[:, geom])[[0, -1]] * timestep
             found.append(f"{self.model.geom(geom).name or geom} at {first:.3f} to {last + timestep:.3f} s")
         return tuple(found)
+
+
+def walk_cycle(robot: Robot, edit: Edit | None = None) -> tuple[CycleMap, Array]:
+    """Cycle map of the robot in three dimensions, changed by an edit as of :class:`chilopod.twin.Edited`, and the
+    coordinates of the robot as it stands; ParameterError if a gait cycle is no whole number of control intervals, or
+    steps are too coarse for the servos."""
+    twin = twin_of(robot)
+    count = robot.gait.period / twin.control_interval
+    if abs(count - round(count)) > _WHOLE * count:
+        said, value = "must repeat with the gait", f"{twin.control_interval:g} s"
+        allowed = "a whole part of a gait cycle"
+        raise ParameterError(said, field="twin.control_interval", value=value, allowed=allowed)
+    coarse = 2.0 * twin.joint_inertia / max(twin.servo_damping, 1e-300)
+    if twin.timestep > coarse:
+        said, value = "must be shorter for the damping of the servos", f"{1e3 * twin.timestep:g} ms"
+        raise ParameterError(said, field="twin.timestep", value=value, allowed=f"at most {1e3 * coarse:.3g} ms")
+    plan = compiled(robot, edit=edit)
+    control = np.zeros((round(count), plan.model.nu))
+    targets = servo_targets(robot, np.arange(len(control)) * twin.control_interval)
+    control[:, plan.leg_controls.ravel()] = targets.reshape(len(control), -1)
+    cycle = CycleMap(plan.model, np.repeat(control, plan.steps_per_control, axis=0))
+    return cycle, cycle.reduced(plan.initial_positions(), np.zeros(plan.model.nv))

@@ -5,16 +5,14 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from types import CodeType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from chilopod.frozen import Array
 from chilopod.robot import Robot
+from chilopod.twin.cycle_map import CycleMap, walk_cycle
 from chilopod.twin.model import Edit
 from chilopod.twin.start import common, initial_states, resume, start, traits
 from chilopod.twin.walk import TwinWalk
-
-if TYPE_CHECKING:
-    from chilopod.twin.modes import CycleMultipliers
 
 
 class Edited:
@@ -58,11 +56,9 @@ class Edited:
         """See :func:`chilopod.twin.start`."""
         return start(*arguments, **named, edit=self._edit, traits=self.traits)
 
-    def walk_multipliers(self, *arguments: Any, **named: Any) -> CycleMultipliers:
-        """See :func:`chilopod.twin.walk_multipliers`."""
-        from chilopod.twin.multipliers import walk_multipliers  # with chilopod.stability, which walks do not need
-
-        return walk_multipliers(*arguments, **named, edit=self._edit)
+    def walk_cycle(self, robot: Robot) -> tuple[CycleMap, Array]:
+        """See :func:`chilopod.twin.walk_cycle`."""
+        return walk_cycle(robot, self._edit)
 
     def resume(self, saved: bytes, threads: int = 0) -> TwinWalk:
         """See :func:`chilopod.twin.resume`."""

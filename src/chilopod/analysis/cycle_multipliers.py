@@ -11,21 +11,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
+from chilopod.engine import Engine, engine_named
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
 from chilopod.stability.spectrum.eigenvalues import eigensystem
 from chilopod.statistics import LEVEL
-from chilopod.twin.cycle_map import CycleMap
-from chilopod.twin.legs import servo_targets, twin_of
-from chilopod.twin.model import Edit, TwinModel, compiled
-from chilopod.twin.modes import CycleMode, CycleMultipliers
+
+if TYPE_CHECKING:
+    from chilopod.twin import CycleMap
 
 AMPLITUDE = math.radians(1.0)
 """Default size of a bend, rad: the standard deviation of the trials' disturbance."""
@@ -39,45 +41,28 @@ _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
 _FORGOTTEN, _BLOCK = 2, 4  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
 _NOT_BENT = 1e-9  # part of a mode
-_WHOLE = 1e-9  # of a cycle
 
 
 def walk_multipliers(
-    robot: Robot, *, amplitude: float = AMPLITUDE, cycles: int = 20, edit: Edit | None = None
+    robot: Robot, engine: str | Engine = "twin", *, amplitude: float = AMPLITUDE, cycles: int = 20
 ) -> CycleMultipliers:
-    """Leading Floquet multipliers and modes of the straight walk of a robot with a table [twin], changed by an edit as
-    of :class:`chilopod.twin.Edited`; ``amplitude`` and ``cycles`` see :func:`cycle_multipliers`.
+    """Leading Floquet multipliers and modes of the straight walk of a robot in an engine that has its cycle map: the
+    twin, also as :class:`chilopod.twin.Edited`; ``amplitude`` and ``cycles`` see :func:`cycle_multipliers`.
 
     Raises
     ------
     ParameterError
-        If a gait cycle is no whole number of control intervals, or steps are too coarse for the servos.
+        If the engine has no cycle map, or that has none of this robot, see :func:`chilopod.twin.walk_cycle`.
     AnalysisError
         If the walk falls.
     """
-    cycle, plan = cycle_map(robot, edit)
+    known: Any = engine_named(engine) if isinstance(engine, str) else engine
+    if not hasattr(known, "walk_cycle"):
+        said, allowed = "has no state that can be divided by its place", "twin, or a chilopod.twin.Edited"
+        raise ParameterError(said, field="engine", value=engine, allowed=allowed)
+    cycle, standing = known.walk_cycle(robot)
     names = [f"yaw{i}" for i in range(1, robot.body.modules)]
-    standing = cycle.reduced(plan.initial_positions(), np.zeros(plan.model.nv))
     return cycle_multipliers(robot.name, cycle, standing, names, amplitude, cycles)
-
-
-def cycle_map(robot: Robot, edit: Edit | None = None) -> tuple[CycleMap, TwinModel]:
-    """Cycle map of the robot in three dimensions, and its model; errors see :func:`walk_multipliers`."""
-    twin = twin_of(robot)
-    count = robot.gait.period / twin.control_interval
-    if abs(count - round(count)) > _WHOLE * count:
-        said, value = "must repeat with the gait", f"{twin.control_interval:g} s"
-        allowed = "a whole part of a gait cycle"
-        raise ParameterError(said, field="twin.control_interval", value=value, allowed=allowed)
-    coarse = 2.0 * twin.joint_inertia / max(twin.servo_damping, 1e-300)
-    if twin.timestep > coarse:
-        said, value = "must be shorter for the damping of the servos", f"{1e3 * twin.timestep:g} ms"
-        raise ParameterError(said, field="twin.timestep", value=value, allowed=f"at most {1e3 * coarse:.3g} ms")
-    plan = compiled(robot, edit=edit)
-    control = np.zeros((round(count), plan.model.nu))
-    targets = servo_targets(robot, np.arange(len(control)) * twin.control_interval)
-    control[:, plan.leg_controls.ravel()] = targets.reshape(len(control), -1)
-    return CycleMap(plan.model, np.repeat(control, plan.steps_per_control, axis=0)), plan
 
 
 def cycle_multipliers(

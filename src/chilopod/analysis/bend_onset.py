@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from chilopod.analysis.cycle_modes import CycleMultipliers
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.robot import Robot
 from chilopod.statistics import Interval
-from chilopod.twin.modes import CycleMultipliers
 
 _MOST = 8  # multipliers between the ends
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.analysis import cycle_multipliers, walk_multipliers
+from chilopod.analysis.cycle_modes import CycleMode
 from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.twin import CycleMap, cycle_multipliers, start, walk_multipliers
-from chilopod.twin.modes import CycleMode
-from chilopod.twin.multipliers import cycle_map
+from chilopod.twin import CycleMap, start, walk_cycle
 from helpers.command_line import printed, run
 
 STIFF = load_robot("aoi2022").set_from_text(["springs.stiffness[0]=75 N*mm/deg"])
@@ -46,9 +46,8 @@ def test_a_cart_and_a_spring_have_the_multipliers_of_their_steps():
 
 
 def test_coordinates_lead_to_the_state_and_back_wherever_it_stands():
-    cycle, plan = cycle_map(STIFF)
-    random = np.random.default_rng(0)
-    x = cycle.reduced(plan.initial_positions(), np.zeros(plan.model.nv)) + random.uniform(-0.02, 0.02, (3, 71))
+    cycle, standing = walk_cycle(STIFF)
+    x = standing + np.random.default_rng(0).uniform(-0.02, 0.02, (3, 71))
     positions, rates = cycle.full(x)
     np.testing.assert_allclose(cycle.reduced(positions, rates), x, rtol=0, atol=1e-12)
     cos, sin = np.cos(0.7), np.sin(0.7)
@@ -63,7 +62,7 @@ def test_coordinates_lead_to_the_state_and_back_wherever_it_stands():
     walk = start([STIFF] * 3, initial=np.hstack([moved, rotated]), record=None, tolerance=1e-15)
     walk.advance(PERIOD)
     states = walk.states()
-    reached = cycle.reduced(states[:, : plan.model.nq], states[:, plan.model.nq :])
+    reached = cycle.reduced(*np.split(states, [cycle.model.nq], axis=1))
     np.testing.assert_allclose(cycle(x)[0], reached, rtol=0, atol=1e-9)
     cycle.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
     np.testing.assert_allclose(cycle(x)[0], reached, rtol=0, atol=1e-6)
@@ -73,11 +72,11 @@ def test_small_bends_of_independent_walks_decay_by_the_multipliers(straight):
     assert straight.stable
     assert straight.mismatch < 1e-9
     assert max(mode.error for mode in straight.exact) < 1e-4
-    cycle, plan = cycle_map(STIFF)
-    state = np.hstack(cycle.full(straight.state))
-    states = np.tile(state, (2, 1))
-    states[:, plan.yaw_positions] += 1e-6 * np.array([[1.0], [-1.0]]) * [0.3, 0.5, 0.2, 1.0, 0.6]
-    walk = start([STIFF] * 2, initial=states, record=None, tolerance=1e-15)
+    cycle, _ = walk_cycle(STIFF)
+    bent = np.array([cycle.names.index(f"yaw{i}") for i in range(1, 6)])
+    states = np.tile(straight.state, (2, 1))
+    states[:, bent] += 1e-6 * np.array([[1.0], [-1.0]]) * [0.3, 0.5, 0.2, 1.0, 0.6]
+    walk = start([STIFF] * 2, initial=np.hstack(cycle.full(states)), record=None, tolerance=1e-15)
     angles = []
     for i in range(1, 31):
         walk.advance(i * PERIOD)
@@ -110,7 +109,7 @@ def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
         value = np.exp(0.01 * (30.0 - robot.get(K1) / per_unit))
         return SimpleNamespace(finite=(CycleMode(complex(value), 0.001, np.ones(5)),))
 
-    monkeypatch.setattr("chilopod.twin.walk_multipliers", measured)
+    monkeypatch.setattr("chilopod.analysis.walk_multipliers", measured)
     arguments = ["stability", "aoi2022", "--engine", "twin", "--json", "--onset", K1]
     found = printed(*arguments, "20 N*mm/deg", "50 N*mm/deg")
     # Its error over the slope.
@@ -122,7 +121,7 @@ def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
 
 def test_the_command_line_prints_them(straight, monkeypatch):
     asked = []
-    monkeypatch.setattr("chilopod.twin.walk_multipliers", lambda robot, **given: asked.append(given) or straight)
+    monkeypatch.setattr("chilopod.analysis.walk_multipliers", lambda robot, **given: asked.append(given) or straight)
     arguments = ["stability", "aoi2022", "--engine", "twin", "--amplitude", "2 deg"]
     assert printed(*arguments, "--json") == straight.as_json()
     assert run(*arguments)[1].splitlines() == straight.lines()
@@ -145,8 +144,7 @@ def test_a_model_without_such_a_state_and_a_walk_that_falls_are_refused():
     ball = '<mujoco><worldbody><body><joint type="ball"/><geom size="0.1"/></body></worldbody></mujoco>'
     with pytest.raises(ParameterError, match="must have a state that can be put back"):
         CycleMap(mujoco.MjModel.from_xml_string(ball), np.zeros((5, 0)))
-    cycle, plan = cycle_map(STIFF)
-    lying = cycle.reduced(plan.initial_positions(), np.zeros(plan.model.nv))
+    cycle, lying = walk_cycle(STIFF)
     lying[1] = 1.5
     with pytest.raises(AnalysisError, match="the walk falls"):
         cycle(lying[None])
