@@ -155,19 +155,19 @@ def test_not_analytic_in_one_part_of_the_period_only(compiled):
     assert abs(found.values[0] - exp(-3.0)) <= found.error_bound
 
 
-def test_own_jacobian_complex_step_and_compiled_agree():
+def test_complex_step_and_compiled_agree():
     @numba.njit
     def compiled(t, x, k):
         return np.array([x[1], -k * np.sin(x[0]) * (1 + 0.3 * np.cos(t)) - 0.1 * x[1]])
 
-    def jacobian(t, x, k):
-        return [[0.0, 1.0], [-k * np.cos(x[0]) * (1 + 0.3 * np.cos(t)), -0.1]]
+    def called(t, x, k):
+        return compiled.py_func(t, x, k if t < 9.0 else 0.0)
 
     x = np.array([0.9, -0.2])
     ways = [
         from_rhs(compiled, 2, 2 * pi, args=(1.7,)),
         from_rhs(compiled.py_func, 2, 2 * pi, args=(1.7,)),
-        from_rhs(compiled.py_func, 2, 2 * pi, args=(1.7,), jacobian=jacobian),
+        from_rhs(called, 2, 2 * pi, args=(1.7,)),
     ]
     results = [way.flow(x, 0.2, 6.0) for way in ways]
     for state, derivative in results[1:]:
@@ -175,12 +175,6 @@ def test_own_jacobian_complex_step_and_compiled_agree():
         np.testing.assert_allclose(derivative, results[0][1], rtol=1e-11)
     many = ways[0].flow_states(np.array([x, 2 * x]), 0.2, 6.0)
     np.testing.assert_allclose(many[0], results[0][0], rtol=1e-12)
-
-
-def test_a_wrong_jacobian_is_refused():
-    with pytest.raises(ParameterError, match=r"entry \(1, 0\) at .* should be -1") as error:
-        from_rhs(oscillator, 2, 2.0, jacobian=lambda t, x: [[0.0, 1.0], [1.0, 0.0]])
-    assert error.value.field == "jacobian"
 
 
 # Jumps with the state, and pulses, in functions that can only be called
@@ -317,7 +311,6 @@ REFUSED = {
     "orbit a number": (oscillator, 2, 1.0, {"orbit": 0.0}, "orbit"),
     "orbit nan": (oscillator, 2, 1.0, {"orbit": [0, np.nan]}, "orbit"),
     "orbit text": (oscillator, 2, 1.0, {"orbit": "zero"}, "orbit"),
-    "jacobian shape": (oscillator, 2, 1.0, {"jacobian": lambda t, x: [[1.0]]}, "jacobian"),
     "symmetry shape": (oscillator, 2, 1.0, {"symmetry": [[1.0]]}, "symmetry"),
     "symmetry of no finite order": (oscillator, 2, 1.0, {"symmetry": [[0, 1], [-1, 1.1]]}, "symmetry"),
     "spatial symmetry stretched": (oscillator, 2, 1.0, {"spatial_symmetry": 2 * np.eye(2)}, "spatial_symmetry"),

@@ -105,24 +105,17 @@ def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
     return array
 
 
-def check_shape(
-    function: Callable[..., ArrayLike],
-    args: tuple[Any, ...],
-    times: Array,
-    x: Array,
-    shape: tuple[int, ...],
-    field: str,
-) -> None:
-    """Evaluate a function once and check the shape of its result."""
+def check_shape(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], t: float, x: Array) -> None:
+    """Evaluate a right-hand side once and check the shape of its result."""
     try:
         with np.errstate(all="ignore"):
-            result = function(float(times[0]), x.copy(), *args)
+            result = rhs(t, x.copy(), *args)
     except Exception as error:
         if isinstance(error, ArithmeticError | ValueError) and not re.search("shape|sequence", str(error)):
             return  # a singularity at this state is not an error
         said = f"cannot be evaluated at a state of shape {x.shape} ({in_words(error)})"
-        raise ParameterError(said, field=field) from error
-    numbers(result, shape, field)
+        raise ParameterError(said, field="rhs") from error
+    numbers(result, x.shape, "rhs")
 
 
 Slopes = Callable[[Array, Array], Array]

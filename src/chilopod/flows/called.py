@@ -48,11 +48,9 @@ class CalledFlow:
     """Flow and derivative of dx/dt = rhs(t, x, *args) from calls of the function, with tolerances relative to the
     largest size of every state on the way."""
 
-    # as for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative comes from a complex step if the
-    # function accepts it near the state, else from central differences.
+    # The derivative comes from a complex step if the function accepts it near the state, else from central differences.
     rhs: Callable[..., ArrayLike]
     args: tuple[Any, ...]
-    jacobian: Callable[..., ArrayLike] | None
     edges: Array  # times from 0 to the period at which the integration stops and starts anew
     # borders of the parts of the period with fast changes of the function, shape (parts, 2): steps are limited there
     fast: Array
@@ -130,16 +128,11 @@ class CalledFlow:
         return 2.0 * max(off) / float(np.abs(direction).min())
 
     def _slope(self, t: float, x: Array) -> Array:
-        return self._value("rhs", t, x, x.shape)
-
-    def _value(self, name: str, t: float, x: Array, shape: tuple[int, ...]) -> Array:
-        with UserCode(name):
-            return numbers(getattr(self, name)(t, x, *self.args), shape, name)
+        with UserCode("rhs"):
+            return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
 
     def _gradient(self, x: Array, sizes: Array) -> tuple[Gradient, float]:
         """The derivative of f near a state, by the best method for f, and its error relative to its largest entry."""
-        if self.jacobian is not None:
-            return lambda t, x: self._value("jacobian", t, x, (x.size, x.size)), _ANALYTIC_FLOOR
         if _is_analytic(self.rhs, self.args, x, sizes, self.times):
             return lambda t, x: self._by_complex_steps(t, x, sizes), _ANALYTIC_FLOOR
         said = (

@@ -1,13 +1,9 @@
-"""Ends of integrations, cuts of intervals and loops over many states, shared by the compiled flows."""
+"""Ends of integrations and cuts of intervals, shared by the flows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
-from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.flows import deadline
 from chilopod.frozen import Array
@@ -54,14 +50,3 @@ def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[floa
     inside = [t for t in switches if t0 + 1e-12 * period < t < t1 - 1e-12 * period]
     cuts = [t0, *inside, t1]
     return [(a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b > a]
-
-
-def carry_all(carry: Callable[[slice], None], count: int, fewest: int) -> None:
-    """Call a function for all of a number of states, in several threads if each has at least ``fewest`` of them."""
-    threads = min(cores(), count // fewest) if count >= 2 * fewest else 1
-    if threads > 1:
-        borders = [count * i // threads for i in range(threads + 1)]
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(carry, map(slice, borders[:-1], borders[1:])))
-    else:
-        carry(slice(0, count))

@@ -26,12 +26,11 @@ from chilopod.flows.events import Event, check_events, checked_events
 from chilopod.flows.implicit.flow import ImplicitFlow, can_be_implicit
 from chilopod.flows.jumps import fast_parts, warn_of_jumps
 from chilopod.flows.taylor.flow import TaylorFlow
-from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_jacobian, evaluate_series, trace
+from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_series, trace
 from chilopod.flows.tracing.traced import Untraceable
 from chilopod.frozen import Array, read_only
 
 TOLERANCE, _COARSEST = 1e-14, 1e-3
-_SAME = 1e-6
 _FLOOR = 0.01  # truncation of a Taylor step relative to the tolerance: a small one costs almost nothing
 _ESTIMATED = 100.0
 """Error estimate of an implicit step relative to the tolerance: the estimate is far larger than the error."""
@@ -61,7 +60,6 @@ class RightHandSide:
     args: tuple[Any, ...] = ()
     events: Sequence[Event] = ()
     switch_times: Sequence[float] = ()
-    jacobian: Callable[..., ArrayLike] | None = None
     orbit: ArrayLike | None = None
     method: Method = "automatic"
     tolerance: float = TOLERANCE
@@ -102,8 +100,6 @@ class RightHandSide:
             self._refuse_calls(reason)
             slopes, members = self._called(str(reason))
         else:
-            if self.jacobian is not None:
-                self._check_jacobian(self.jacobian, traced)
             slopes, members = self._traced(traced)
         if self.autonomous:
             check_timeless(slopes, self.base, self.duration)
@@ -111,10 +107,7 @@ class RightHandSide:
 
     def _refuse_calls(self, reason: Untraceable) -> None:
         """Refuse a function of the wrong shape, and options that need a traced function."""
-        n = self.dimension
-        check_shape(self.rhs, self.args, self.times, self.base, (n,), "rhs")
-        if self.jacobian is not None:
-            check_shape(self.jacobian, self.args, self.times, self.base, (n, n), "jacobian")
+        check_shape(self.rhs, self.args, float(self.times[0]), self.base)
         if self.events:
             allowed = "arithmetic, elementary functions and numpy arrays, without branches on the state"
             raise ParameterError(
@@ -128,7 +121,7 @@ class RightHandSide:
         slopes = sampled(self.rhs, self.args, self.dimension)
         warn_of_jumps(slopes, self.dimension, self.edges, self.start)
         fast = fast_parts(slopes, self.base, self.edges)
-        called = CalledFlow(self.rhs, self.args, self.jacobian, self.edges, fast, self.times, reason, self.tolerance)
+        called = CalledFlow(self.rhs, self.args, self.edges, fast, self.times, reason, self.tolerance)
         return slopes, {name: getattr(called, name) for name in _FLOWS}
 
     def _traced(self, traced: Trace) -> tuple[Slopes, Members]:
@@ -176,24 +169,6 @@ class RightHandSide:
                 patience=_PATIENCE if other else 0,
             )
         return found
-
-    def _check_jacobian(self, jacobian: Callable[..., ArrayLike], traced: Trace) -> None:
-        """Check the user's jacobian: a traced function does not need it, but a wrong one is an error."""
-        base, n = self.base, self.dimension
-        check_shape(jacobian, self.args, self.times, base, (n, n), "jacobian")
-        for t in self.times.tolist():
-            x = base + (float(np.abs(base).max()) or 1.0) * np.cos(3.0 * np.arange(n) + 1.0)
-            _, right = evaluate_jacobian(traced.tape, t, x, traced.params)
-            with np.errstate(all="ignore"):
-                given = np.asarray(jacobian(t, x.copy(), *self.args), dtype=np.float64)
-            off = np.abs((given - right) * x) > _SAME * (np.abs(right) @ np.abs(x))[:, None]
-            if off.any() and np.isfinite(right).all():
-                i, j = np.argwhere(off)[0]
-                raise ParameterError(
-                    f"is not the derivative of rhs: entry ({i}, {j}) at t = {t:g} should be {right[i, j]:g}",
-                    field="jacobian",
-                    value=float(given[i, j]),
-                )
 
 
 def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:

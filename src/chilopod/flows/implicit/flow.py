@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.balance import numerical_balance
-from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
+from chilopod.flows.carrying import RESOLUTION, failure, pieces
 from chilopod.flows.jumps import longest_step
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.tape import Tape
@@ -24,7 +24,6 @@ _STAGES, _OTHER_STAGES = 9, 7
 _NEAREST = 3  # largest number of couplings between two states with their derivative under step control
 _MOST_WORK = 3e9  # multiplications
 _FEWEST_STEPS = 2000
-_FEWEST_PER_THREAD = 4
 _VOLUME_STEPS = 64  # fewest steps for the growth of volume
 _OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _FINER = 0.2
@@ -76,14 +75,7 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""
-        states, stop = np.array(states, dtype=np.float64), deadline.stop()
-
-        def carry(some: slice) -> None:
-            for x in states[some]:
-                x[:] = self._run(x, (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
-
-        carry_all(carry, len(states), _FEWEST_PER_THREAD)
-        return states
+        return np.array([self._run(x, (t0, t1), _STAGES, self.tolerance, derived=False)[0] for x in states])
 
     def flow_volume(self, x: Array, t0: float, t1: float) -> tuple[float, float]:
         """Logarithm of the growth of volume, by Liouville's formula, and its difference from another computation."""
@@ -101,13 +93,12 @@ class ImplicitFlow(ReadOnlyArrays):
         stages: int,
         tolerance: float,
         derived: bool = True,
-        stop: Array | None = None,
         longest: float = np.inf,
     ) -> tuple[Array, Array, float]:
         """State and derivative at t1, and the logarithm of the growth of volume."""
         from chilopod.flows.implicit import collocation as kernels  # numba takes half a second to import
 
-        n, stop = self.tape.dimension, deadline.stop() if stop is None else stop
+        n, stop = self.tape.dimension, deadline.stop()
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
         if x.shape != (n,):

@@ -20,7 +20,7 @@ import numpy as np
 
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
+from chilopod.flows.carrying import RESOLUTION, failure, pieces
 from chilopod.flows.tracing.tape import Tape
 from chilopod.flows.tracing.trace import evaluate
 from chilopod.frozen import Array
@@ -28,7 +28,6 @@ from chilopod.frozen import Array
 _MOST_WORK = 1e7
 _FEWEST_STEPS = 5000
 _MOST_CLOCKS = 8  # tables of 4096 rows, each for one set of parameters
-_FEWEST_PER_THREAD = 16
 _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
 _OWN = 10.0  # factor on the difference of two independent errors for a bound on either
@@ -115,12 +114,7 @@ class TaylorFlow:
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
         """Carry many states, shape (states, n)."""
         states, params = np.array(states, dtype=np.float64, order="C"), np.array(params, dtype=np.float64)
-        none, stop = np.empty((self.tape.dimension, 0)), deadline.stop()
-
-        def carry(some: slice) -> None:
-            self._run(states[some], (t0, t1), params, none, stop=stop)
-
-        carry_all(carry, len(states), _FEWEST_PER_THREAD)
+        self._run(states, (t0, t1), params, np.empty((self.tape.dimension, 0)))
         return states
 
     def _run(
@@ -133,13 +127,11 @@ class TaylorFlow:
         *,
         other: bool = False,
         stepwise: bool = True,
-        stop: Array | None = None,
     ) -> int:
         """Carry one state, or several without derivatives, derivative and bound in place, by the second computation if
         ``other``; return the steps of one."""
         from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
 
-        stop = deadline.stop() if stop is None else stop
         n, parameters = self._shape
         several = x.ndim == 2 and derivative.shape == (n, 0)
         fits = x.shape[several:] == derivative.shape[:1] == (n,)
@@ -148,7 +140,7 @@ class TaylorFlow:
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         report, steps = np.zeros(2), 0
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
-        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
+        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, deadline.stop())
         outcome = kernels.Outcome(derivative, bound, report)
         clock = self._clock(params.tobytes())
         carry = kernels.advance_each if several else kernels.advance

@@ -161,7 +161,6 @@ def from_rhs(
     args: tuple[Any, ...] = (),
     events: Sequence[Event] = (),
     switch_times: Sequence[float] = (),
-    jacobian: Callable[..., ArrayLike] | None = None,
     symmetry: ArrayLike | None = None,
     spatial_symmetry: ArrayLike | None = None,
     orbit: ArrayLike | None = None,
@@ -181,7 +180,8 @@ def from_rhs(
 
     A stiff system, whose fastest decay is much faster than its motion, is integrated by an implicit method, Radau IIA
     collocation with the exact derivative of its steps. A function that branches on its arguments (``if x[0] > 0``) or
-    calls other libraries cannot be traced: scipy's DOP853 integrates it from calls, hundreds of times slower.
+    calls other libraries cannot be traced: scipy's DOP853 integrates it from calls, hundreds of times slower, with a
+    derivative from a complex step or, if ``rhs`` does not accept complex states, from differences with nine digits.
 
     Parameters
     ----------
@@ -197,10 +197,6 @@ def from_rhs(
     switch_times
         Times in [0, T) at which ``rhs`` jumps or has a kink. A traced function needs none; others are evaluated
         strictly inside each interval, and undeclared jumps cost time and digits.
-    jacobian
-        Function ``jacobian(t, x, *args)`` -> (n, n), for functions that cannot be traced; without it the derivative
-        then comes from a complex step or, if ``rhs`` does not accept complex states, from central differences, with
-        about nine digits.
     symmetry, spatial_symmetry, orbit, scale, guess_period
         See :class:`PeriodicSystem`. Without a period ``guess_period`` must be given, and ``orbit`` may be a
         guess.
@@ -220,9 +216,7 @@ def from_rhs(
     """
     autonomous = period is None
     length = positive("guess_period" if autonomous else "period", guess_period if autonomous else period)
-    given = RightHandSide(
-        rhs, dimension, length, autonomous, args, events, switch_times, jacobian, orbit, method, tolerance
-    )
+    given = RightHandSide(rhs, dimension, length, autonomous, args, events, switch_times, orbit, method, tolerance)
     slopes, members = given.flows()
     members |= {"scale": scale, "symmetry": symmetry, "spatial_symmetry": spatial_symmetry}
     system = PeriodicSystem(
