@@ -11,7 +11,6 @@ import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
-    Budget,
     Ending,
     PeriodicSystem,
     exponents,
@@ -23,7 +22,7 @@ from chilopod.stability import (
     multipliers,
     sweep,
 )
-from chilopod.stability.problem.arguments import SpentError
+from chilopod.stability.problem.arguments import Budget, SpentError
 from chilopod.stability.search.extent import find_fold
 from chilopod.stability.unit_circle.crossings import SearchStatus
 from helpers.systems import duffing, linear, lorenz

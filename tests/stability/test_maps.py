@@ -81,8 +81,6 @@ def test_the_derivative_is_within_its_bound():
         (lambda: follow(logistic, [0.6], {1.0, 2.0}), r"between = .*: must be numbers"),
         (lambda: multipliers(logistic(2.5), [[0.6], [0.7, 0.8]]), r"orbit = .*: must be numbers"),
         (lambda: multipliers(logistic(2.5), [10**400]), r"orbit = .*: must be numbers"),
-        (lambda: find_orbit(logistic(2.5), [0.6], section=3), r"section = 3: must be a section"),
-        (lambda: find_orbit(logistic(2.5), [0.6], budget=3), r"budget = 3: must be a budget"),
         (lambda: PeriodicSystem(1, "1", lambda x, t0, t1: x), r"period = '1': must be a number"),
         (lambda: multipliers(PeriodicSystem(1, 1.0, lambda x, t0, t1: None), [0.5]), r"flow = 'NoneType': must return"),
         (lambda: sweep(3), r"systems = 3: must be a list"),

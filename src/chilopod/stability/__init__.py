@@ -22,7 +22,6 @@ from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.problem.arguments import Budget
 from chilopod.stability.problem.capabilities import Autonomous, Capabilities, SystemLike
 from chilopod.stability.problem.maps import from_map
 from chilopod.stability.problem.returns import ReturnMap, Section
@@ -39,7 +38,6 @@ __all__ = [
     "BifurcationPoint",
     "Branch",
     "BranchPoint",
-    "Budget",
     "Capabilities",
     "CodimensionTwo",
     "Criticality",

@@ -19,7 +19,8 @@ from chilopod.flows.arguments import finite_array, numbers
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.normal_forms.center_manifold import radii, series
-from chilopod.stability.orbits.orbit import Orbit, find_orbit
+from chilopod.stability.orbits.orbit import Orbit, near_orbit
+from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.problem.arguments import UserCode, check_system, system_of
 from chilopod.stability.problem.capabilities import (
@@ -317,7 +318,7 @@ def _cycle(
         moved = 2.0 * (np.sqrt(square) * form.mode + square * form.second).real + square * form.mean
         size = np.maximum(np.abs(rest + moved), np.sqrt(square) * mode * units)
         section = section_at(system, rest + moved, size, duration)
-        found = find_orbit(system, rest + moved, with_error=False, section=section, settle=False)
+        found = near_orbit(system, Nodes((rest + moved)[None], duration), False, None, section)
     missed = float(np.linalg.norm((found.state - rest - moved) / units))
     if not missed <= _MISSED * float(np.linalg.norm(moved / units)):
         raise AnalysisError("the corrector found another orbit", field="orbit")

@@ -132,7 +132,7 @@ class TaylorFlow:
         ``other``; return the steps of one."""
         from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
 
-        n, parameters = self._shape
+        (n, parameters), stop = self._shape, deadline.stop()
         several = x.ndim == 2 and derivative.shape == (n, 0)
         fits = x.shape[several:] == derivative.shape[:1] == (n,)
         if not (fits and params.shape == (parameters,)):
@@ -140,7 +140,7 @@ class TaylorFlow:
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         report, steps = np.zeros(2), 0
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
-        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, deadline.stop())
+        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
         outcome = kernels.Outcome(derivative, bound, report)
         clock = self._clock(params.tobytes())
         carry = kernels.advance_each if several else kernels.advance

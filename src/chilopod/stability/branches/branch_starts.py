@@ -16,7 +16,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
-from chilopod.stability.orbits.orbit import bounded, find_orbit, known_state
+from chilopod.stability.orbits.orbit import bounded, known_state, searched_orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import UserCode, check_arguments, system_of
 from chilopod.stability.problem.capabilities import (
@@ -126,7 +126,7 @@ def begin(
         guess = known_state(system) if orbit is None else orbit
         studied = system if symmetric else whole_period(system, periods)
         try:
-            found = find_orbit(studied, guess, with_error=False, shortest=periods == 1)
+            found = searched_orbit(studied, guess, with_error=False, shortest=periods == 1)
         except AnalysisError:
             _check_moving(system, guess)
             raise
@@ -207,7 +207,7 @@ def switch(
         periods = known if periods is None else int(periods)
         if is_autonomous(system):
             whole = whole_period(system, periods)
-            period = find_orbit(whole, point.orbit, with_error=False, shortest=periods == 1).period
+            period = searched_orbit(whole, point.orbit, with_error=False, shortest=periods == 1).period
     axial = point.symmetry is not None and bool(point.symmetry.branches)
     modes = point.mode.real[None]
     if point.modes is not None and (axial or kind is not Kind.COLLISION):  # two that meet have one eigenvector

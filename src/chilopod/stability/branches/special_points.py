@@ -17,7 +17,7 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.crossing_points.description import described
 from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, past_singular, place_error
 from chilopod.stability.orbit_blocks import Blocks, orbit_blocks
-from chilopod.stability.orbits.orbit import Orbit, bounded, find_orbit
+from chilopod.stability.orbits.orbit import Orbit, bounded, searched_orbit
 from chilopod.stability.points import Kind
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
@@ -164,7 +164,7 @@ def _orbit(within: Within, point: BranchPoint, place: Place) -> Orbit:
         x = sum((block.basis @ (block.dual @ x) for block in trivial), 0.0 * x)
     if not place.fold:
         with contextlib.suppress(AnalysisError):
-            orbit = find_orbit(system, x, section=section)
+            orbit = searched_orbit(system, x, section=section)
             if float((np.abs(orbit.state - x) / curve.units(x.size)[:-1]).max()) <= SAME_ORBIT:
                 return orbit
     return Orbit(x, curve.image(x, point.value, section, with_error=True), np.zeros(x.size))

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import finite_array, positive
+from chilopod.errors import AnalysisError
+from chilopod.flows.arguments import finite_array
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
@@ -113,10 +113,7 @@ def find_orbit(
     system: SystemLike,
     guess: ArrayLike | None = None,
     with_error: bool = True,
-    section: Section | None = None,
     settle: bool = True,
-    budget: Budget | None = None,
-    shortest: bool = True,
     *,
     seconds: float = math.inf,
 ) -> Orbit:
@@ -140,15 +137,8 @@ def find_orbit(
         (times, n), as a tuple or an ``xarray.DataArray`` over ``time``. The result then has the period of the guess.
     with_error
         True to bound errors.
-    section
-        Section of the search, if the system does not depend on time; by default across the motion at the guess. The
-        result has the section across its own motion.
     settle
         True to let the motion settle if Newton's method fails: up to 330 returns, or 83 guessed periods.
-    budget
-        Budget of return maps: up to 60 are taken for every start of Newton's method, and 100 for settling.
-    shortest
-        True to find the shortest period, if no section is given.
     seconds
         Time, s, after which the search ends.
 
@@ -157,27 +147,35 @@ def find_orbit(
     AnalysisError
         If no start converges.
     SpentError
-        If the budget or the time is spent.
+        If the time is spent.
     """
-    if seconds != math.inf:
-        with Deadline(seconds):
-            return find_orbit(system, guess, with_error, section, settle, budget, shortest)
     check_system(system)
-    check_arguments(with_error=with_error, settle=settle, shortest=shortest)
-    if not isinstance(budget, Budget | None):
-        raise ParameterError("must be a budget", field="budget", value=budget, allowed="Budget(allowed), or None")
-    if section is not None:
-        _check_section(section, system)
+    check_arguments(with_error=with_error, settle=settle)
+    with Deadline(seconds):
+        return searched_orbit(system, guess, with_error, settle=settle)
+
+
+def searched_orbit(
+    system: SystemLike,
+    guess: ArrayLike | None,
+    with_error: bool = True,
+    section: Section | None = None,
+    settle: bool = True,
+    budget: Budget | None = None,
+    shortest: bool = True,
+) -> Orbit:
+    """As :func:`find_orbit`, on a section if given, within a budget of return maps: up to 60 are taken for every start
+    of Newton's method, and 100 for settling; without a section over the ``shortest`` period if wanted."""
     if guess is None:
         return from_known(system, known_state(system), with_error, budget=budget)
     whole = whole_orbit(guess, system)
     if whole is not None:
-        return _solved(system, whole, with_error, budget)
+        return near_orbit(system, whole, with_error, budget)
     x = finite_array(guess, (system.dimension,), "orbit")
     shortened = shortest and section is None
     duration = return_duration(system) if section is None else section.duration
     try:
-        found = _solved(system, Nodes(x[None], duration), with_error, budget, section)
+        found = near_orbit(system, Nodes(x[None], duration), with_error, budget, section)
         return _shortest(system, found, with_error, budget) if shortened else found
     except TooManySteps as error:
         allowed = "a guess closer to the orbit and its period, or method='implicit' for a stiff system"
@@ -190,39 +188,22 @@ def find_orbit(
             budget.take(_SETTLING)
         for nearer, careful in nearer_orbits(system, x):
             try:
-                found = _solved(system, nearer, with_error, budget, careful=careful)
+                found = near_orbit(system, nearer, with_error, budget, careful=careful)
                 return _shortest(system, found, with_error, budget) if shortened else found
             except AnalysisError:
                 continue
         raise failed
 
 
-def near_orbit(
-    system: SystemLike, x: Array, with_error: bool, section: Section | None, units: Array, budget: Budget
-) -> Orbit:
-    """The orbit near a state by Newton's method from there alone, with a section at right angles in given units."""
-    duration = return_duration(system) if section is None else section.duration
-    return _solved(system, Nodes(x[None], duration), with_error, budget, section, units=units)
-
-
-def _check_section(section: object, system: SystemLike) -> None:
-    if not isinstance(section, Section) or not is_autonomous(system):
-        allowed = "a Section, for a system that does not depend on time"
-        raise ParameterError("must be a section", field="section", value=section, allowed=allowed)
-    for name in ("point", "normal"):
-        finite_array(getattr(section, name), (system.dimension,), f"section.{name}")
-    positive("section.duration", section.duration)
-
-
 def find_large_orbit(system: Capabilities, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
     """As :func:`find_orbit`, for a large system: the return map on the orbit without its derivative as a matrix, and
-    the sizes of the states, shape (n,). If that method fails, :func:`find_orbit` takes over."""
+    the sizes of the states, shape (n,). If that method fails, :func:`searched_orbit` takes over."""
     x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
     exact = guess is None and not is_autonomous(system)
     try:
         image, size = closed_orbit(system, x, farthest=_KNOWN if exact else np.inf)
     except AnalysisError:
-        found = find_orbit(system, guess, with_error=False)
+        found = searched_orbit(system, guess, with_error=False)
         size = tangent_sizes(system, found.state, found.image.duration)
         return tangent_map(system, found.state, found.section), size
     with contextlib.suppress(AnalysisError):
@@ -240,7 +221,7 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
     while (parts := _parts(system, orbit.state, duration, sizes(system, orbit.state, duration))) > 1:
         duration /= parts
         try:
-            orbit = _solved(system, Nodes(orbit.state[None], duration), with_error, budget)
+            orbit = near_orbit(system, Nodes(orbit.state[None], duration), with_error, budget)
         except AnalysisError:
             break
         duration = orbit.image.duration
@@ -275,7 +256,7 @@ def from_known(
     """The orbit through the system's own state on it, corrected if that is not exact.
     The return map there may be given."""
     if is_autonomous(system):
-        return find_orbit(system, x, with_error, budget=budget)
+        return searched_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
     # No size is smaller than the state's value, unless the system gives the sizes.
@@ -286,7 +267,7 @@ def from_known(
     if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
         return Orbit(x, image, np.zeros(x.size))
     if off <= _KNOWN:
-        return _solved(system, Nodes(x[None], return_duration(system)), with_error, budget)
+        return near_orbit(system, Nodes(x[None], return_duration(system)), with_error, budget)
     said = f"must be a periodic orbit: one return moves the state by {float(moved.max()):.1e}"
     allowed = "a state on the orbit at time 0, or a first guess, which is then improved"
     raise AnalysisError(said, field="orbit", allowed=allowed)
@@ -296,7 +277,7 @@ def _relative(values: Array, size: Array) -> float:
     return float((np.abs(values) / size).max())
 
 
-def _solved(
+def near_orbit(
     system: SystemLike,
     start: Nodes,
     with_error: bool,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
-from numbers import Real
 
 import numpy as np
 
@@ -80,25 +79,12 @@ def checked_box(between: object) -> np.ndarray[tuple[int, ...], np.dtype[np.floa
 class Budget(Deadline):
     """Remaining flows over a return, and time, of a search.
 
-    Attributes
-    ----------
-    left
-        Remaining number of flows; never below zero.
-
-    Parameters
-    ----------
-    allowed
-        Number of flows.
-    seconds
-        Time from now, s. Inside a ``with`` block of the budget it also ends a running flow.
+    Inside a ``with`` block of the budget the time, s from now, also ends a running flow.
     """
 
     def __init__(self, allowed: float, seconds: float = math.inf) -> None:
         super().__init__(seconds)
-        given: object = allowed
-        if isinstance(given, bool) or not (isinstance(given, Real) and allowed >= 0):
-            raise ParameterError("must be a number", field="allowed", value=allowed, allowed="0 or more")
-        self.left = allowed
+        self.left = allowed  # remaining number of flows; never below zero
 
     @property
     def spent(self) -> bool:

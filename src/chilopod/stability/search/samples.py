@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
-from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state, near_orbit
+from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, searched_orbit
+from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.problem.arguments import Budget, SpentError, UserCode
 from chilopod.stability.problem.capabilities import Family, SystemLike, sizes
-from chilopod.stability.problem.returns import ReturnMap, Section, return_map, return_maps, section_at
+from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
 from chilopod.stability.search.checked_family import CheckedFamily
 from chilopod.stability.unit_circle.crossings import first_values
 
@@ -73,7 +74,7 @@ class Samples:
         self._allowed = _RETURNS * budget
         self.budget = Budget(self._allowed, seconds)
         with self.budget, UserCode("family", low):
-            self.first = find_orbit(self.family(low), guess, budget=self.budget)
+            self.first = searched_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
         self.budget.left = self._allowed
         self._exact = self.known and self.family.timed
@@ -172,7 +173,7 @@ class Samples:
 
         def own(settle: bool) -> Sample:
             with self.family.calling(value):
-                return _sample(value, find_orbit(system, known_state(system), settle=settle, budget=self.budget))
+                return _sample(value, searched_orbit(system, known_state(system), settle=settle, budget=self.budget))
 
         index = bisect.bisect(self._values, value)
         nearest = min(self._values[max(index - 1, 0) : index + 1], key=lambda v: abs(v - value))
@@ -185,18 +186,18 @@ class Samples:
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
         with self.family.calling(value):
-            section = self._section(system, near, beside.image.duration)
-            return _sample(value, near_orbit(system, near, self.known, section, self.size, self.budget))
+            start, section = self._start(system, near, beside.image.duration)
+            return _sample(value, near_orbit(system, start, self.known, self.budget, section, units=self.size))
 
-    def _section(self, system: SystemLike, near: Array, duration: float) -> Section | None:
-        """The section through a state, with the normal of the last one while the motion is across that: so the states
-        at time 0 are smooth in the parameter."""
+    def _start(self, system: SystemLike, near: Array, duration: float) -> tuple[Nodes, Section | None]:
+        """A state as a guess of the orbit, and the section there, with the normal of the last one while the motion is
+        across that: so the states at time 0 are smooth in the parameter."""
         section = section_at(system, near, self.size, duration)
         if section is None:
-            return None
+            return Nodes(near[None], return_duration(system)), None
         if self._normal is None or (section.normal * self.size) @ (self._normal * self.size) < _ACROSS:
             self._normal = section.normal
-        return replace(section, normal=self._normal)
+        return Nodes(near[None], duration), replace(section, normal=self._normal)
 
     def _between(self, value: float) -> Sample:
         """A sample between two others, from their orbits."""
