@@ -2,7 +2,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const by = (id) => document.getElementById(id);
-  const TOLERANCE = 1e-8, NUDGE = 0.001, DEGREE = Math.PI / 180, LONGEST_FRAME = 0.1;
+  const TOLERANCE = 1e-8, NUDGE = 0.001, DEGREE = Math.PI / 180, LONGEST_FRAME = 0.1, FINEST = 2;
   const [softest, stiffest] = data.range.map((each) => each / data.unit);
   const asked = new URLSearchParams(location.search);
   const robot = planarRobot(data, TOLERANCE);
@@ -125,21 +125,27 @@
   // -- pictures
   // -----------------------------------------------------------------------------------------------------------------
 
+  const COLORS = ["ink", "soft", "line", "grid", "paper", "body", "edge", "path", "target", "spring"];
+
   function colors() {
     const style = getComputedStyle(document.documentElement);
-    return Object.fromEntries(["ink", "soft", "line", "grid", "paper", "body", "edge", "path", "target", "spring"]
-      .map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    return Object.fromEntries(COLORS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 
+  // What changes only with the size or the colours of the page is drawn once, the rest of the plot when it looks otherwise.
+  let ink = colors(), still = null, drawn = null;
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { ink = colors(); still = null; });
+
   function prepared(canvas) {
-    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+    const ratio = Math.min(devicePixelRatio || 1, FINEST), width = canvas.clientWidth, height = canvas.clientHeight;
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
     }
-    const context = canvas.getContext("2d");
+    const context = canvas.getContext("2d", { alpha: false });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
+    context.fillStyle = ink.paper;
+    context.fillRect(0, 0, width, height);
     return { context, width, height };
   }
 
@@ -149,7 +155,7 @@
     return { left: camera.x - 0.5 * width / zoom, top: camera.y + 0.5 * height / zoom, zoom };
   }
 
-  function drawFloor(ink) {
+  function drawFloor() {
     const canvas = by("floor"), modules = robot.place();
     const middle = modules[Math.floor(data.modules / 2)];
     const far = Math.hypot(middle[0] - camera.x, middle[1] - camera.y) > 0.8, share = far ? 1 : 0.04;
@@ -233,8 +239,32 @@
     };
   }
 
-  function drawFork(ink) {
-    const { context } = prepared(fork), scale = forkScale(fork), { x, y } = scale, critical = data.pitchfork / data.unit;
+  function drawFork() {
+    const scale = forkScale(fork), { x, y } = scale, point = [robot.springs[0] / data.unit, robot.bend() / DEGREE];
+    const now = [cycles, Math.round(2 * x(point[0])), Math.round(2 * y(point[1])), fork.clientWidth, ink.paper].join();
+    if (drawn === now) return;
+    drawn = now;
+    const { context, width, height } = prepared(fork);
+    if (still?.width !== fork.width || still.height !== fork.height) {
+      still = Object.assign(document.createElement("canvas"), { width: fork.width, height: fork.height });
+      const below = still.getContext("2d");
+      below.setTransform(context.getTransform());
+      drawBranches(below, scale);
+    }
+    context.drawImage(still, 0, 0, width, height);
+    clip(context, scale);
+    context.globalAlpha = 0.5;
+    line(context, ink.path, 1.5, () => trail.forEach(([spring, bend]) => context.lineTo(x(spring), y(bend))));
+    context.globalAlpha = 1;
+    context.fillStyle = ink.path;
+    context.beginPath();
+    context.arc(x(point[0]), y(point[1]), 6, 0, 2 * Math.PI);
+    context.fill();
+    context.restore();
+  }
+
+  function drawBranches(context, scale) {
+    const { x, y } = scale, critical = data.pitchfork / data.unit;
     context.font = "12px system-ui, sans-serif";
     context.fillStyle = ink.soft;
     context.textAlign = "center";
@@ -254,10 +284,9 @@
     line(context, ink.edge, 3, () => segment(context, x(critical), y(0), x(stiffest), y(0)));
     line(context, ink.edge, 2, () => segment(context, x(0), y(0), x(critical), y(0)), [5, 4]);
     const { springs, bends, stable } = data.branch;
-    context.save();
-    context.beginPath();
-    context.rect(scale.left, scale.upper, scale.right - scale.left, scale.lower - scale.upper);
-    context.clip();
+    context.fillStyle = ink.ink;
+    context.fillText(`pitchfork ${critical.toFixed(2)}`, x(critical) + 6, y(0) - 8);
+    clip(context, scale);
     for (const side of [1, -1]) {
       for (let i = 1; i < springs.length; i++) {
         const solid = stable[i];
@@ -266,16 +295,14 @@
         ), solid ? [] : [5, 4]);
       }
     }
-    context.globalAlpha = 0.5;
-    line(context, ink.path, 1.5, () => trail.forEach(([spring, bend]) => context.lineTo(x(spring), y(bend))));
-    context.globalAlpha = 1;
-    context.fillStyle = ink.path;
-    context.beginPath();
-    context.arc(x(robot.springs[0] / data.unit), y(robot.bend() / DEGREE), 6, 0, 2 * Math.PI);
-    context.fill();
     context.restore();
-    context.fillStyle = ink.ink;
-    context.fillText(`pitchfork ${critical.toFixed(2)}`, x(critical) + 6, y(0) - 8);
+  }
+
+  function clip(context, { left, right, upper, lower }) {
+    context.save();
+    context.beginPath();
+    context.rect(left, upper, right - left, lower - upper);
+    context.clip();
   }
 
   function line(context, color, width, draw, dash = []) {
@@ -304,9 +331,9 @@
     const passed = last === null ? 0 : Math.min((now - last) / 1000, LONGEST_FRAME);
     last = now;
     if (!paused) walk(passed * Number(by("speed").value));
-    const ink = colors(), said = words();
-    drawFloor(ink);
-    drawFork(ink);
+    const said = words();
+    drawFloor();
+    drawFork();
     by("pause").textContent = paused ? "Go on" : "Pause";
     by("value").textContent = `${(robot.springs[0] / data.unit).toFixed(1)} N·mm/deg`;
     if (by("words").textContent !== said) by("words").textContent = said;
