@@ -131,8 +131,7 @@ _SYMMETRIES = {
 
 @functools.lru_cache(maxsize=16)
 def _compared(matrix: bytes, shift: float, times: bytes, base: bytes, period: float) -> tuple[Array, Array]:
-    """Times and states at which a symmetry is tested, states of all sizes at every time, and then their images, which
-    are the same for all systems of a family."""
+    """Times and states of all sizes at which a symmetry is tested, then their images: the same for a family."""
     origin, some = np.frombuffer(base), np.frombuffer(times)
     n = origin.size
     waves = np.cos(3.0 * np.arange(n)[:, None] + np.arange(1.0, 3.0))[:, None] * np.array(SIZES)[:, None]

@@ -45,8 +45,7 @@ class NotAnalytic(UserWarning):
 
 @dataclass(frozen=True)
 class CalledFlow:
-    """Flow and derivative of dx/dt = rhs(t, x, *args) from calls of the function, with tolerances relative to the
-    largest size of every state on the way."""
+    """Flow of dx/dt = rhs(t, x, *args) from calls, with tolerances relative to the largest size of every state."""
 
     # The derivative comes from a complex step if the function accepts it near the state, else from central differences.
     rhs: Callable[..., ArrayLike]

@@ -172,8 +172,7 @@ class RightHandSide:
 
 
 def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
-    """Flows by Taylor series, and by the implicit method from every state where the series take too many steps. Every
-    call decides anew."""
+    """Flows by Taylor series, or by the implicit method where these take too many steps. Every call decides anew."""
     latest: tuple[bytes, float, float] | None = None  # latest flow by Taylor series, to avoid a second computation
 
     def either(name: str) -> Callable[..., Any]:

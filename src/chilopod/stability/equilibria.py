@@ -1,9 +1,7 @@
-"""Equilibria of systems that do not depend on time: their state, stability, and the cycle that leaves one at a Hopf
-point.
+"""Equilibria of systems that do not depend on time: state, stability, and the cycle that leaves one at a Hopf point.
 
 Derivatives of the right-hand side f are exact if a system provides the Taylor coefficients of f along curves (as those
-of :func:`chilopod.stability.from_rhs` do); else they come from Chebyshev series of samples along the same curves, with
-errors.
+of :func:`chilopod.stability.from_rhs` do); else from Chebyshev series of samples along the same curves, with errors.
 """
 
 from __future__ import annotations
@@ -75,8 +73,7 @@ class Equilibrium(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """True if all eigenvalues lie left of the imaginary axis by more than their errors, False if one lies right of
-        it by more, else None."""
+        """True if all eigenvalues lie left of zero by more than their errors, False if one lies right, else None."""
         if (self.eigenvalues.real < -self.error_bounds).all():
             return True
         return False if (self.eigenvalues.real > self.error_bounds).any() else None
@@ -106,14 +103,7 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     system
         A system that does not depend on time.
     guess
-        A state near the equilibrium, shape (n,).
-
-    Raises
-    ------
-    ParameterError
-        If the system depends on time, or the guess does not have its shape.
-    AnalysisError
-        If no equilibrium is found near the guess.
+        A state near the equilibrium, shape (n,); an AnalysisError if none is found there.
     """
     checked = autonomous(system)
     x = finite_array(guess, (checked.dimension,), "guess")

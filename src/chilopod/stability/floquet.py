@@ -71,8 +71,7 @@ class Multipliers(Result, ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """True if all multipliers lie inside the unit circle by more than the error bounds, False if one lies outside
-        by more, else None."""
+        """True if all multipliers lie in the unit circle by more than bounds, False if one lies outside, or None."""
         return stable_within(self.values, self.error_bound, self.error_bounds)
 
     def _lines(self) -> list[str]:
@@ -160,18 +159,13 @@ def multipliers(
     system
         The periodic system.
     orbit
-        First guess of a state on the orbit at time 0; not needed if the system knows its orbit.
+        First guess of a state on the orbit at time 0; not needed if the system knows its orbit. An AnalysisError if
+        none is found.
     leading
         Number of largest multipliers, counted with multiplicity, or one more to complete a pair; all by default. For
-        100 states or more and a system with ``flow_tangents`` (any right-hand side that can be traced) they take no
-        derivative of the flow as a matrix.
+        100 states or more, a system with ``flow_tangents``, as any traced one, is not asked for the whole matrix.
     seconds
         Time, s, after which the search for the orbit, or for leading multipliers, ends.
-
-    Raises
-    ------
-    AnalysisError
-        If no orbit is found.
     """
     with Deadline(seconds):
         if leading is None:
@@ -201,8 +195,7 @@ def multipliers(
 
 
 def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[Multipliers]:
-    """Multipliers of many systems at their known orbits, on all cores if the systems allow it; a SpentError after
-    ``seconds``, the time in s."""
+    """Multipliers of many systems at their known orbits, on all cores if possible; a SpentError after ``seconds``."""
     if not isinstance(systems, Sequence):
         raise ParameterError("must be a list", field="systems", value=systems, allowed="a list of systems")
     for system in systems:
@@ -224,8 +217,7 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
 def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: float = math.inf) -> Exponents:
     """All Floquet exponents and modes, including strongly damped ones; arguments as for :func:`multipliers`.
 
-    The state space is split along the factors of the period, so a multiplier of 1e-60 has the same relative accuracy as
-    one of 0.5.
+    The state space is split along factors of the period: a multiplier of 1e-60 is relatively as accurate as one of 0.5.
     """
     with Deadline(seconds):
         found = find_orbit(system, orbit)

@@ -76,23 +76,15 @@ def locate_hopf(
     between
         The interval, ``low < high``.
     equilibrium
-        Guess of the equilibrium at ``low``, shape (n,), which is then followed through the interval. A fold ends the
-        search, with a remark.
+        Guess of the equilibrium at ``low``, shape (n,), which is then followed; a fold ends that, with a remark.
     budget, seconds
-        Limits as for :func:`chilopod.stability.locate`, with equilibria for orbits.
+        Limits as for :func:`chilopod.stability.locate`, with equilibria for orbits; so are the errors.
 
     Returns
     -------
     Hopf points by rising parameter, ``orbit`` the equilibrium, ``multiplier`` the eigenvalue i ``frequency``,
     ``coefficient`` the first Lyapunov coefficient along the unit ``mode``; other bifurcations of the equilibrium are
     remarks. :func:`chilopod.stability.switch` starts the cycles.
-
-    Raises
-    ------
-    ParameterError
-        If the interval or the guess is invalid, or the systems depend on time.
-    AnalysisError
-        If no equilibrium is found at the lower end of the interval, or ``family`` raises an exception there.
     """
     low, high = checked_interval(between)
     check_arguments(family=family, budget=budget)
@@ -291,8 +283,7 @@ def _hopf_point(
 def _rate(
     values: Array, found: list[Equilibrium], between: tuple[float, float], point: BifurcationPoint, duration: float
 ) -> tuple[complex, float]:
-    """Rate of the critical eigenvalue, left^H dA mode, which holds also near others, and its imaginary part, from the
-    equilibria on both sides of the point."""
+    """Rate of the critical eigenvalue, left^H dA mode, also near others, and its imaginary part, from both sides."""
     matrices = [each.jacobian for each in found]
     matrix = 0.5 * (matrices[0] + matrices[1])
     units = numerical_balance(matrix)

@@ -1,5 +1,4 @@
-"""Multipliers of largest modulus of a large system, without the derivative of its flow as a matrix, for
-``multipliers(leading=)``.
+"""Multipliers of largest modulus of a large system, without its derivative as a matrix, for ``multipliers(leading=)``.
 
 The derivative is applied to blocks of directions: a block resolves multiple multipliers, as of a ring, and the compiled
 flow carries several directions at nearly the cost of one. The subspace may grow to the whole space, where it is exact.

@@ -1,5 +1,4 @@
-"""Blocks of an orbit's return map by its spatial symmetries, and crossings of the unit circle in each
-block."""
+"""Blocks of an orbit's return map by its spatial symmetries, and crossings of the unit circle in each."""
 
 from __future__ import annotations
 

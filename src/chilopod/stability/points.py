@@ -112,8 +112,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     multiplicity
         Number of critical multipliers, counting both of a pair.
     modes
-        Unit critical eigenvectors if there are several, shape (n, modes): directions of new orbits with a symmetry,
-        else a basis of the critical space.
+        Unit critical eigenvectors if there are several, shape (n, modes): directions of new orbits, else a basis.
     symmetry
         Consequences of the orbit's spatial symmetries, if any.
     rate

@@ -97,8 +97,7 @@ class Step(NamedTuple):
 
 @fused_njit(error_model="numpy")
 def _solve(matrix: Any, columns: Any) -> bool:
-    """Solve linear equations for columns of shape (n, m), in place, by elimination with rows exchanged; False if the
-    matrix is singular or not finite."""
+    """Solve linear equations for columns, shape (n, m), in place; False for a singular or infinite matrix."""
     n, m = columns.shape
     for k in range(n):
         pivot = k
@@ -146,8 +145,7 @@ def _newton_matrix(weights: Any, h: float, jacobians: Any, matrix: Any) -> None:
 
 @fused_njit(error_model="numpy")
 def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
-    """Solve for the stages from the guess in ``moved``, with their ``columns``, ``slopes`` and ``jacobians``; False
-    without convergence."""
+    """Solve for the stages, from ``moved``, with ``columns``, ``slopes``, ``jacobians``; False if that fails."""
     nodes, weights, largest = method.nodes, method.weights, problem.largest
     moved, slopes = step.moved, step.slopes
     s, n = moved.shape

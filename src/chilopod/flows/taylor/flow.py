@@ -128,8 +128,7 @@ class TaylorFlow:
         other: bool = False,
         stepwise: bool = True,
     ) -> int:
-        """Carry one state, or several without derivatives, derivative and bound in place, by the second computation if
-        ``other``; return the steps of one."""
+        """Carry one state, or several without derivatives, in place, by the second way if ``other``; the steps."""
         from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
 
         (n, parameters), stop = self._shape, deadline.stop()

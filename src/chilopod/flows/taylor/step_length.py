@@ -74,8 +74,7 @@ def _unsaturated(tape: Any, values: Any, order: int, h: float) -> float:
 
 @fused_njit(error_model="numpy", inline="always")
 def step_size(tape: Any, series: Any, columns: int, order: int, h: float, epsilon: float) -> float:
-    """The largest step up to h at which states, switching functions and tangents are exact to epsilon, and no function
-    leaves saturation unseen."""
+    """The largest step up to h with series exact to epsilon, in which no function leaves saturation unseen."""
     values, tangents = series.values, series.tangents
     for i in range(tape.layout[0]):
         h = _allowed(values[i], order, h, epsilon)

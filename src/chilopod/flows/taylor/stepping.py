@@ -225,8 +225,7 @@ def _chosen(
 
 @fused_njit(error_model="numpy", inline="always")
 def _spent(control: Any, steps: int, done: float, whole: float) -> int:
-    """DONE if the time and the budget allow another step; the budget must last to the end of the interval, of which a
-    part is done."""
+    """DONE if time and budget allow another step; the budget must last to the end, of which a part is done."""
     if control.stop[0] != 0.0:
         return TIME_OVER
     check = control.patience

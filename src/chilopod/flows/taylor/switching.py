@@ -104,8 +104,7 @@ def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
 
 @fused_njit(error_model="numpy")
 def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any) -> int:
-    """Pass a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``; return the
-    status."""
+    """Pass a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``."""
     n, switches = tape.layout[0], tape.switches
     values, branches = motion.series.values, motion.series.branches
     g = switches[1, s]

@@ -153,8 +153,7 @@ def _verify(
 
 
 def evaluate(tape: Tape, nodes: Integers, t: Any, x: Any, params: Array) -> Array:
-    """Values of some nodes (not of resets), shape (nodes, ...), at times and states, shapes (...) and (n, ...), or one
-    of either."""
+    """Values of nodes (not of resets), shape (nodes, ...), at times (...) and states (n, ...), or one of either."""
     from chilopod.flows.tracing import series  # numba takes half a second to import
 
     # Copies, because numba would compile again for read-only arrays.

@@ -137,8 +137,7 @@ class Branch(Result):
         return picture(lambda axes: self.plot(axes, int(moved.argmax())), "branch of periodic orbits")
 
     def plot(self, axes: Axes | None = None, state: int = 0) -> Axes:
-        """Draw a state at time 0 over the parameter: stable stretches solid, unstable ones dashed, undecided ones
-        dotted, special points marked.
+        """Draw a state at time 0 over the parameter: stable parts solid, unstable ones dashed, undecided ones dotted.
 
         Parameters
         ----------
@@ -160,8 +159,7 @@ class Branch(Result):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """Dataset of the points over ``point``, in order along the curve; ``special`` is empty at ordinary points.
-        Multipliers belong to the full period."""
+        """Dataset over ``point``; ``special`` is empty at ordinary points. Multipliers are of the full period."""
         verdicts = [VERDICTS[None if point.special else point.stable] for point in self.points]
         values = columns(self.points, "value", "special", "period", "orbit", "multipliers")
         about = columns((each.bifurcation for each in self.points), "error_bound", "criticality", "coefficient")
@@ -184,7 +182,8 @@ def follow(
     seconds: float = math.inf,
     progress: Progress = lambda count, point: None,
 ) -> Branch:
-    """Follow a branch from a point along its tangent, or from the end of a branch that was followed before.
+    """Follow a branch from a point along its tangent, or from the end of a branch that was followed before; an
+    AnalysisError if no orbit is found at the start.
 
     The points of a continued branch equal those of a single run; for a system without a period of its own they are
     other points of the same curve, as the last section is rebuilt.
@@ -205,8 +204,7 @@ def follow(
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
     closely
-        True to compute the multipliers at nine places within every step, a flow each; otherwise only if the ends of
-        a step show an event.
+        True to compute multipliers at nine places within every step; else only if its ends show an event.
     precision
         Precision of orbits relative to the sizes of the states, limited by the accuracy of the flow.
     symmetric
@@ -216,14 +214,6 @@ def follow(
         Number of flows, beside those of normal forms, and time in s, after which the branch ends.
     progress
         Called with the number of points and the newest one.
-
-    Raises
-    ------
-    ParameterError
-        If the interval, ``points`` or a step is invalid, ``start`` is a bifurcation point, which needs :func:`switch`,
-        or a branch that leaves the interval.
-    AnalysisError
-        If no orbit is found at the start.
     """
     low, high = checked_interval(between)
     if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:

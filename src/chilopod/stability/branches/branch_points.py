@@ -28,8 +28,7 @@ class BranchPoint(ReadOnlyArrays):
     orbit
         State at time 0, shape (n,).
     multipliers
-        Multipliers of the full period, by falling modulus, shape (n,), or (n-1,) without the trivial one where the
-        system does not depend on time.
+        Multipliers of the full period, by falling modulus, shape (n,), or (n-1,) for a system without a period.
     tangent
         Unit tangent of the curve, shape (n+1,): state, then parameter, in ``units``.
     units
@@ -39,8 +38,7 @@ class BranchPoint(ReadOnlyArrays):
     period
         Full period of the orbit; None if not computed.
     error_bound
-        Bound on the absolute error of the multipliers that are not small (below 0.5, and below the largest), from the
-        errors of the flow and of the orbit.
+        Bound on the absolute error of the multipliers that are not small (below 0.5, and below the largest).
     bifurcation
         Bifurcation point with bound, mode, multiplier and normal form; None at ordinary points.
     periods
@@ -127,8 +125,7 @@ def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array 
 
 
 def within_space(space: Array | None, matrix: Array) -> Array:
-    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), restricted to a space of states, replaced
-    by a contraction across it."""
+    """The matrix of a curve, with or without its tangent, restricted to a space of states, a contraction across it."""
     if space is None:
         return matrix
     n = len(space)

@@ -101,23 +101,16 @@ def begin(
 
     Parameters
     ----------
-    family
-        ``family(value)`` is the system.
-    value
-        Value of the parameter.
+    family, value
+        The system is ``family(value)``.
     orbit
-        State on the orbit or near it, shape (n,), which is corrected. Not needed if the system knows its orbit.
+        State on the orbit or near it, shape (n,), or an AnalysisError; by default the system's known orbit.
     rising
         True to start towards rising parameters.
     periods, symmetric
         Number of the systems' periods in one period of the orbit, and True for one with the systems' symmetry in time.
     seconds
         Time, s, after which the search for the orbit ends.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no orbit near the guess, or ``family`` raises an exception.
     """
     check_arguments(family=family, rising=rising, periods=periods, symmetric=symmetric)
     value = float(finite_array(value, (), "value"))
@@ -156,7 +149,7 @@ def switch(
     periods: int | None = None,
     seconds: float = math.inf,
 ) -> tuple[Start, ...]:
-    """The starts of the branches that leave a bifurcation point.
+    """The starts of the branches that leave a bifurcation point; a ParameterError if none that can be followed does.
 
     Parameters
     ----------
@@ -177,11 +170,6 @@ def switch(
     point has one, at a small cycle on the side where cycles exist, towards larger ones. With several critical modes,
     due to a symmetry, these numbers hold for each of ``point.modes``. A collision at -1 is a period doubling,
     one at +1 a branch point.
-
-    Raises
-    ------
-    ParameterError
-        If no branch that can be followed leaves the point, or it is not a special point.
     """
     check_arguments(family=family, periods=1 if periods is None else periods)
     old, known = None, None

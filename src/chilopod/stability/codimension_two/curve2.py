@@ -155,8 +155,7 @@ class Curve2(Result):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """Dataset of the points over ``point``, in order along the curve; ``special`` is empty at ordinary points.
-        Multipliers belong to the return map."""
+        """Dataset over ``point``; ``special`` is empty at ordinary points. Multipliers are of the return map."""
         kinds = {"special": [getattr(point, "kind", None) for point in self.points]}
         names = ("values", "error_bound", "coefficient", "coefficient_error", "frequency", "orbit", "multipliers")
         first, last = (end.label for end in self.endings)

@@ -53,7 +53,8 @@ def switch2(
     family2, between
         Arguments of the :func:`chilopod.stability.follow2` that found the point.
     point
-        Generalised period doubling or degenerate pitchfork, among the ``special`` points of its curve.
+        Generalised period doubling or degenerate pitchfork, among the ``special`` points of its curve; an AnalysisError
+        if its coefficient of fifth order is zero within its error, or no fold is found near its prediction.
     budget, seconds
         Largest number of return maps with derivatives, and time in s.
 
@@ -61,13 +62,6 @@ def switch2(
     -------
     A generalised period doubling has one start, at a fold of orbits of twice the period; a degenerate pitchfork has
     two, at folds of the orbits that branch off along the critical mode and against it.
-
-    Raises
-    ------
-    ParameterError
-        If no curve of folds leaves a point of this kind.
-    AnalysisError
-        If the coefficient of fifth order is zero within its error, or no fold is found near its prediction.
     """
     box = checked_box(between)
     if not isinstance(point, SpecialPoint2):

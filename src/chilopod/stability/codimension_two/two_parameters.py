@@ -59,8 +59,7 @@ def follow2(
         Point from :func:`chilopod.stability.locate` in the family of p with q = ``second``; or start from
         :func:`chilopod.stability.switch2`, which contains its q.
     between
-        Intervals of both parameters: the box of the curve; the family is called for values inside only. Their widths
-        are the parameters' units.
+        Intervals of both parameters, in which the family is called; their widths are the parameters' units.
     second
         Value of q at the start.
     rising
@@ -76,13 +75,8 @@ def follow2(
     progress
         Called with the number of points and the newest one.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is out of range; for a Krein collision, and a pitchfork, transcritical or branch point that
-        neither a symmetry nor a known orbit preserves.
-    AnalysisError
-        If no point of a curve is found at the start.
+    A ParameterError refuses a Krein collision, and a pitchfork, transcritical or branch point that neither a symmetry
+    nor a known orbit preserves; an AnalysisError says that no point of a curve is found at the start.
     """
     box = checked_box(between)
     check_arguments(family2=family2, points=points, step=step, longest=longest, budget=budget, progress=progress)

@@ -76,8 +76,7 @@ class Course:
     beside: float  # distance from a place at which rates of change are computed
 
     def jacobians(self, crossing: Crossing) -> tuple[Array, Array, float]:
-        """Derivatives of the return map on both sides of a crossing, where known if near, and the distance of the
-        sides."""
+        """Derivatives of the return map on both sides of a crossing, at known places if near, and their distance."""
         place, (a, b) = crossing.value, crossing.around
         if not (a < place < b and self.beside <= b - a <= _NEAR * self.beside):
             a, b = max(place - self.beside, self.low), min(place + self.beside, self.high)

@@ -55,8 +55,7 @@ Fit = tuple[NormalFormStatus, Sampled, Term]
 
 
 def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | None:
-    """The terms at the amplitude, and with the bend of the curve, of the most accurate cubic coefficient, from a given
-    first amplitude; None if none is suitable."""
+    """The terms at the amplitude and bend of the most accurate cubic coefficient; None if none is suitable."""
     third: Powers = (3, 0) if at.real else (2, 1)
     manifold = Manifold(mapped, at, 3)
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one

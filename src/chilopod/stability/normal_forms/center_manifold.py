@@ -199,8 +199,7 @@ def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
 def solve_homological(
     at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
 ) -> ComplexArray:
-    """Solution w of (nu^i conj(nu)^j - A) w = r, both of shape (n,), without a part along the critical direction if the
-    factor is nu (``resonant``)."""
+    """Solution w of (nu^i conj(nu)^j - A) w = r, shape (n,), without a critical part if ``resonant``."""
     i, j = powers
     n = at.state.size
     factor = at.multiplier**i * at.multiplier.conjugate() ** j

@@ -22,8 +22,7 @@ _START = 0.1  # first amplitude of the search, relative to the scale of the stat
 
 @dataclass(frozen=True)
 class NormalForm:
-    """Leading coefficients of the map over one period of the orbit, or over two at a period doubling, on the critical
-    space.
+    """Leading coefficients on the critical space, of the map over one period, or over two at a period doubling.
 
     With a the amplitude along the unit critical mode: real multiplier +1, a -> a + quadratic a^2 + cubic a^3. A
     multiplier -1 of the return map: the same, with ``quadratic`` zero, of the first map that has +1 again: over one

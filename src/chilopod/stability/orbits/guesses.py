@@ -35,8 +35,7 @@ _STILL = 1e-3  # motion of a state, relative to the others, that counts as rest
 
 
 def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
-    """Nodes of a guess that is a whole orbit, in the forms of :func:`~chilopod.stability.find_orbit`; None for a single
-    state."""
+    """Nodes of a guess that is a whole orbit, as :func:`~chilopod.stability.find_orbit` takes it, or None."""
     if hasattr(guess, "coords") and "time" in guess.coords:
         guess = guess.coords["time"].values, guess.values
     n, whole = system.dimension, return_duration(system) * returns_per_period(system)

@@ -140,14 +140,7 @@ def find_orbit(
     settle
         True to let the motion settle if Newton's method fails: up to 330 returns, or 83 guessed periods.
     seconds
-        Time, s, after which the search ends.
-
-    Raises
-    ------
-    AnalysisError
-        If no start converges.
-    SpentError
-        If the time is spent.
+        Time, s, after which the search ends with a SpentError; it ends with an AnalysisError if no start converges.
     """
     check_system(system)
     check_arguments(with_error=with_error, settle=settle)
@@ -229,8 +222,7 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
 
 
 def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
-    """Number of times that a return closes within its duration, if every instant may be time 0; with the sizes of the
-    states for the shorter time."""
+    """Number of times that a return closes within its duration, with the sizes of the states for the shorter time."""
     if not is_autonomous(system):
         return 1
     counts = np.arange(_MOST_PARTS, 1, -1)
@@ -253,8 +245,7 @@ def from_known(
     image: ReturnMap | None = None,
     budget: Budget | None = None,
 ) -> Orbit:
-    """The orbit through the system's own state on it, corrected if that is not exact.
-    The return map there may be given."""
+    """The orbit through the system's own state, corrected if not exact; the return map there may be given."""
     if is_autonomous(system):
         return searched_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image

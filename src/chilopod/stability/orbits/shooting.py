@@ -226,8 +226,7 @@ class _Equations:
                 raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
 
     def _to_section(self, system: Autonomous, frame: _Frame) -> _Frame:
-        """Carry a single node until its motion returns to the section; if it does not, over the guessed time, with a
-        new section."""
+        """Carry a single node until its motion returns to the section, or over the time, to a new section."""
         x, duration = self.nodes.states[0], self.nodes.duration
         assert frame.section is not None
         if not frame.astray:
@@ -292,8 +291,7 @@ class _Equations:
         return Nodes(states, float(every[n]), float(every[n + 1]))
 
     def after(self, correction: Nodes, part: float) -> _Equations | None:
-        """The equations after that part of a correction, or less if states or the time would change much; None if the
-        motion ends before, for a given parameter."""
+        """The equations after part of a correction, or less; None if the motion ends, for a given parameter."""
         here = self.nodes
         part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
         frame = self.frame
@@ -344,8 +342,7 @@ class _Equations:
 
 
 def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, sizes: Array) -> Array:
-    """Solution of linear equations in units, within the ``shared`` states if given; the shortest one for families of
-    orbits."""
+    """Solution of linear equations in units, within ``shared`` states if given; the shortest for families."""
     if shared is not None:
         basis = np.linalg.qr(shared / sizes[:, None])[0]
         return np.asarray(basis @ _solution(basis.T @ matrix @ basis, basis.T @ right, cutoff, None, sizes))

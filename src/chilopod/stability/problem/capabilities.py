@@ -1,5 +1,4 @@
-"""Interfaces of a periodic system: required members (:class:`SystemLike`, :class:`Autonomous`), and optional ones; and
-sizes of its states.
+"""Interfaces of a periodic system: required members (:class:`SystemLike`, :class:`Autonomous`), others; and its sizes.
 
 The optional members are those of :class:`Capabilities`. A missing one and one that is None are the same, so instances
 of one class may differ (as those of :class:`chilopod.stability.PeriodicSystem`).
@@ -75,8 +74,7 @@ class Capabilities(Autonomous, Protocol):
 
     @property
     def orbit(self) -> Array | None:
-        """State on the orbit at time 0, so that no guess is needed. It is corrected if it does not return to
-        round-off."""
+        """State on the orbit at time 0, in place of a guess. It is corrected if it does not return to round-off."""
 
     @property
     def spatial_symmetry(self) -> Array | None:
@@ -103,8 +101,7 @@ class Capabilities(Autonomous, Protocol):
         """True if :meth:`flow_many` may take another system of this class along with this one."""
 
     def is_stiff(self, x: Array, t0: float, t1: float, /) -> bool:
-        """True if the derivative of the flow from state x at t0 to t1 does not resolve a direction that vanishes within
-        a step of the integration."""
+        """True if the derivative of the flow does not resolve a direction that vanishes within a step."""
 
     def flow_volume(self, x: Array, t0: float, t1: float, /) -> tuple[float, float]:
         """Logarithm of the growth of volume from state x at t0 to t1, and a bound on its error; for stiff systems."""
@@ -130,8 +127,7 @@ def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[Capabil
 
 
 def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error: bool = False) -> Any:
-    """The flow and its derivative of the right shapes, with the system's own bound on its error if wanted; a SpentError
-    after a time limit."""
+    """The flow and its derivative, checked, with the bound on its error if wanted; a SpentError after a limit."""
     deadline.check()
     name, n = "flow_with_error" if with_error else "flow", x.size
     with UserCode(name):

@@ -34,17 +34,12 @@ def from_map(
     Parameters
     ----------
     image
-        Function ``image(x)`` -> state after one iteration, shape (n,), and its derivative by x, shape (n, n).
+        Function ``image(x)`` -> state after one iteration, shape (n,), and its derivative by x, shape (n, n); refused
+        if that contradicts differences of the states at the first point.
     dimension
         Number of states n.
     orbit, spatial_symmetry, scale
         See :class:`PeriodicSystem`.
-
-    Raises
-    ------
-    ParameterError
-        If ``image`` is not a function, returns arrays of another shape, or a derivative that contradicts differences
-        of the states at the first point.
     """
     if not callable(image):
         raise ParameterError("must be a function", field="image", value=image, allowed="image(x)")

@@ -94,8 +94,7 @@ class ReturnMap(ReadOnlyArrays):
     jacobian
         dH/dx, shape (n, n).
     error
-        Bound on the error of every entry of ``jacobian``, shape (n, n), or one number for all; NaN if not
-        computed.
+        Bound on the error of every entry of ``jacobian``, shape (n, n), or of all; NaN if not computed.
     returns
         Number of returns in the full period.
     period
@@ -199,8 +198,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
 
 
 def return_map(system: SystemLike, x: Array, with_error: bool = True, section: Section | None = None) -> ReturnMap:
-    """The return map H and its derivative at a state, shape (n,), with an optional bound on the error, which may cost a
-    second computation.
+    """The return map H and its derivative at a state, shape (n,), with a bound on the error if wanted.
 
     If the system does not depend on time, a return ends on the section: by default across the motion at ``x``.
     """
@@ -311,8 +309,7 @@ def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
 
 
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
-    """States at t1 of those at t0, shape (states, n) both, by the cheapest capability of the system; a SpentError
-    after a time limit."""
+    """States at t1 of those at t0, shape (states, n) both, by the cheapest way; a SpentError after a limit."""
     deadline.check()
     if offers(system, "flow_states"):
         with UserCode("flow_states"):

@@ -40,15 +40,14 @@ class PeriodicSystem(ReadOnlyArrays):
     period
         Positive period T; None if the system does not depend on time and the period belongs to the orbit:
         ``velocity`` and ``guess_period`` are then needed.
-        flow
+    flow
         Function ``flow(x, t0, t1) -> (x1, dx1/dx)``.
     symmetry
         Optional S, shape (n, n), of finite order k (S applied k times is 1), with S f(t, x) = f(t + T/k, S x): then the
         orbits with S x(T/k) = x(0) are fixed points of the return map H = S flow(T/k), whose multipliers nu give those
         of the full period as nu^k.
     spatial_symmetry
-        Optional P, shape (n, n), of finite order, with P f(t, x) = f(t, P x), such as a reflection; or several, which
-        generate a finite group.
+        Optional P, shape (n, n), of finite order, with P f(t, x) = f(t, P x), or several, which generate a group.
     orbit
         State at time 0 on the periodic orbit, if known. It is corrected if it does not return exactly.
     scale
@@ -56,8 +55,7 @@ class PeriodicSystem(ReadOnlyArrays):
     velocity
         Function ``velocity(x)`` -> dx/dt, shape (n,), for a system that does not depend on time.
     guess_period
-        Approximate period of such a system's orbits; an orbit gets its shortest period even if the guess is nearer to
-        a multiple of it.
+        Approximate period of such a system's orbits, or a multiple of it; an orbit gets its shortest period.
     flow_with_error, flow_states, flow_tangents, flow_volume, is_stiff, velocity_series
         See :mod:`chilopod.stability.problem.capabilities`.
     concurrent
@@ -187,19 +185,17 @@ def from_rhs(
     ----------
     rhs
         Function ``rhs(t, x, *args)`` -> dx/dt, shape (n,); T-periodic in t.
-        dimension, period
+    dimension, period
         Number of states n, and T; None if ``rhs`` does not depend on t and the period belongs to the orbit.
     args
         Parameters of the right-hand side.
     events
-        Events at which the state jumps, or the right-hand side switches, on reaching a surface. They need functions
-        that can be traced.
+        Events at which the state jumps, or ``rhs`` switches, on reaching a surface, of functions that can be traced.
     switch_times
         Times in [0, T) at which ``rhs`` jumps or has a kink. A traced function needs none; others are evaluated
         strictly inside each interval, and undeclared jumps cost time and digits.
     symmetry, spatial_symmetry, orbit, scale, guess_period
-        See :class:`PeriodicSystem`. Without a period ``guess_period`` must be given, and ``orbit`` may be a
-        guess.
+        See :class:`PeriodicSystem`. Without a period ``guess_period`` is needed; ``orbit`` may be a guess.
     method
         "taylor" or "implicit", for functions that can be traced; "automatic": Taylor series, and the implicit method
         after these take too many steps, a second or two for every system. The implicit method suits smooth functions of

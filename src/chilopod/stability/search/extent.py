@@ -146,8 +146,7 @@ def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool
 
 
 def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
-    """True if the multiplier approaches +1 as the root of the distance, as in a fold; a crossing branch makes it
-    linear."""
+    """True if the multiplier approaches +1 as a root, as in a fold; at a crossing branch it does so linearly."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
     try:
@@ -159,8 +158,7 @@ def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool)
 
 
 def _at_rest(samples: Samples, last: Sample) -> bool:
-    """True if the motion nearly vanishes at the end of an orbit: an apparent fold is then the same orbit again, half a
-    period later."""
+    """True if the motion nearly vanishes at the end of an orbit: past a fold there the same orbit comes again."""
     if samples.family.timed:
         return False
     first = _moved(samples, samples.family(samples.low), samples.first.image)

@@ -129,8 +129,7 @@ def locate(
 ) -> Located:
     """Find every bifurcation of a periodic orbit in an interval of a parameter.
 
-    Spatial symmetries of the orbit split the return map into blocks, each of which is searched
-    separately.
+    Spatial symmetries of the orbit split the return map into blocks, which are searched separately.
 
     Parameters
     ----------
@@ -138,9 +137,9 @@ def locate(
         ``family(value)`` is the system at a value of the parameter.
     between
         Interval ``low < high``.
-        orbit
-        Guess of a state on the orbit at time 0 for ``low``, shape (n,); the orbit is then followed through the
-        interval. Not needed if the systems know their orbit.
+    orbit
+        Guess of a state on the orbit at time 0 for ``low``, shape (n,); by default what the system there gives. The
+        orbit is followed through the interval, unless systems that depend on time give it at every value.
     normal_form
         True to compute coefficients and verdicts as well.
     budget
@@ -151,17 +150,8 @@ def locate(
         Time, s, after which the search ends with its results so far. It includes the first orbit and running flows,
         but not compilation; the description of found points may take 0.7 s more.
 
-    Returns
-    -------
-    Points by rising parameter, with the status of the search.
-
-    Raises
-    ------
-    ParameterError
-        If the interval is empty, reversed or not finite.
-    AnalysisError
-        If no orbit is found at the lower end of the interval, or ``family`` raises an exception there. At any other
-        value an exception counts as a missing orbit and gives a remark.
+    An AnalysisError says that there is no orbit at the lower end of the interval, or ``family`` raises an exception
+    there. At any other value an exception counts as a missing orbit and gives a remark.
     """
     low, high = checked_interval(between)
     check_arguments(family=family, normal_form=normal_form, budget=budget)
@@ -287,8 +277,7 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:
-    """Error of the derivative, relative to its largest entry or a lower bound of that, in units that balance
-    the states."""
+    """Error of the derivative over its largest entry, or a lower bound of that, in units that balance the states."""
     # An entry of round-off gives no information on the units.
     units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
     largest = max(at_least, float(np.abs(image.jacobian * units / units[:, None]).max()))

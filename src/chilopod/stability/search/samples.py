@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable
+import contextlib
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,8 +19,6 @@ from chilopod.stability.problem.capabilities import Family, SystemLike, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
 from chilopod.stability.search.checked_family import CheckedFamily
 from chilopod.stability.unit_circle.crossings import first_values
-
-T = TypeVar("T")
 
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which the search may not resolve a fold."""
@@ -50,9 +47,9 @@ _JUMP = 0.3  # difference of prediction and correction, relative to the orbit's 
 class Samples:
     """Samples of a family between two values of its parameter, each computed once.
 
-    From a guess at the lower end (None if the systems know their orbits) the orbit is followed to the upper end, within
+    From a guess at the lower end, or the state that its system gives, the orbit is followed to the upper end, within
     ``budget`` orbits, twice as many return maps, and ``seconds``; as many return maps again serve the samples in
-    between.
+    between. Without a guess the orbits of systems that depend on time are known.
     """
 
     def __init__(
@@ -60,7 +57,6 @@ class Samples:
     ) -> None:
         self.family = CheckedFamily(family)
         self.low, self.high, self.width = low, high, high - low
-        self.known = guess is None  # the systems know their orbits
         self.spent = False  # the path ends because the budget was spent
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
         self.count = 0  # orbits computed
@@ -77,29 +73,29 @@ class Samples:
             self.first = searched_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
         self.budget.left = self._allowed
-        self._exact = self.known and self.family.timed
-        if not self._exact:
+        self.known = guess is None and self.family.timed
+        if not self.known:
             self._keep(_sample(low, self.first))
         with self.budget:
-            self.path = [] if guess is None else self._to_merging(self._followed())
+            self.path = [] if self.known else self._to_merging(self._followed())
         self.end = self.path[-1].value if self.path else high
         self.allow(self._allowed)
 
     def at(self, values: Array) -> list[Sample]:
-        """Samples at some values within the interval, together if the systems allow it; AnalysisError if one is
-        missing, while the others are kept."""
+        """Samples at values in the interval; an AnalysisError if one is missing, while the others are kept."""
         wanted = [float(value) for value in values]
         missing = sorted(set(wanted) - self._by_value.keys())
-        if len(missing) > 1 and self._exact:
-            _found(lambda: self._keep_known(missing))  # after a failure each is computed alone
+        if len(missing) > 1 and self.known:
+            with contextlib.suppress(AnalysisError):  # after a failure each is computed alone
+                self._keep_known(missing)
         for value in missing:
             if value in self._by_value or value in self._missing:
                 continue
             try:
-                if self._exact:
+                if self.known:
                     self._keep_known([value])
                 else:
-                    self._keep(self._of_itself(value) if self.known else self._between(value))
+                    self._keep(self._between(value))
             except AnalysisError as error:
                 self._missing[value] = error
         for value in missing:
@@ -166,28 +162,13 @@ class Samples:
         for value, system, state, image in zip(values, systems, states, images, strict=True):
             self._keep(_sample(value, from_known(system, state, image=image, budget=self.budget)))
 
-    def _of_itself(self, value: float) -> Sample:
-        """A sample of a system, from its own state on the orbit or near it, or from the neighbouring orbit."""
-        self.budget.take(0)
-        system = self.family(value)
-
-        def own(settle: bool) -> Sample:
-            with self.family.calling(value):
-                return _sample(value, searched_orbit(system, known_state(system), settle=settle, budget=self.budget))
-
-        index = bisect.bisect(self._values, value)
-        nearest = min(self._values[max(index - 1, 0) : index + 1], key=lambda v: abs(v - value))
-        beside = self._by_value[nearest]
-        found = _found(lambda: own(False)) or _found(lambda: self._sampled(value, beside.orbit, beside))
-        return found or own(True)
-
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
         """A sample near a state, with about the period of a neighbouring sample."""
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
         with self.family.calling(value):
             start, section = self._start(system, near, beside.image.duration)
-            return _sample(value, near_orbit(system, start, self.known, self.budget, section, units=self.size))
+            return _sample(value, near_orbit(system, start, False, self.budget, section, units=self.size))
 
     def _start(self, system: SystemLike, near: Array, duration: float) -> tuple[Nodes, Section | None]:
         """A state as a guess of the orbit, and the section there, with the normal of the last one while the motion is
@@ -225,8 +206,7 @@ class Samples:
         return [self._by_value[v] for v in (a, b, *beyond)]
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
-        """The orbit at a value by the polynomial through samples; by the straight line through the first two if that
-        differs much."""
+        """The orbit at a value by the polynomial through samples, or the line through two if that differs much."""
         if len(samples) == 1:
             return samples[0].orbit
         first, second = samples[:2]
@@ -287,8 +267,7 @@ class Samples:
         return None
 
     def _follow(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
-        """Samples from the last one to ``value``, by smaller steps where Newton's method fails. They end early with
-        the orbit, the budget, or the attempts."""
+        """Samples from the last one to ``value``, by smaller steps after failures; fewer where these end."""
         path, target = list(behind), value
         smallest = _SHORTEST * abs(value - path[-1].value)
         while path[-1].value != value:
@@ -316,11 +295,9 @@ class Samples:
         return path[len(behind) :]
 
     def _turns_back(self, behind: list[Sample], found: Sample) -> bool:
-        """True if a multiplier heads for +1 and is on the same side at the end of a step, where it should have passed
-        or is farther away.
+        """True if a multiplier heads for +1 and is on the same side after a step that should pass or come nearer.
 
-        The step may have gone over to an orbit that leaves at a pitchfork; shorter steps tell. Multipliers grow about
-        exponentially.
+        The orbit may be one that leaves at a pitchfork; shorter steps tell. Multipliers grow exponentially.
         """
         if len(behind) < 2 or found.value - behind[-1].value <= _TELLING * self.width:
             return False
@@ -371,14 +348,6 @@ class Samples:
 
 def _sample(value: float, orbit: Orbit) -> Sample:
     return Sample(value, orbit.state, orbit.image)
-
-
-def _found(compute: Callable[[], T]) -> T | None:
-    """Result of a function; None after an AnalysisError."""
-    try:
-        return compute()
-    except AnalysisError:
-        return None
 
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:

@@ -67,8 +67,7 @@ class Group(ReadOnlyArrays):
 
 
 def finite_group(generators: ArrayLike) -> Group:
-    """The group of all products of real matrices, shape (n, n) each, in any units; a ParameterError if there are too
-    many, or the matrices are invalid."""
+    """The group of all products of matrices, shape (n, n), in any units; a ParameterError for too many."""
     try:
         given = np.atleast_1d(np.array(generators, dtype=np.float64))
     except (TypeError, ValueError):  # also for matrices of several shapes

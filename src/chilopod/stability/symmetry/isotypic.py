@@ -1,5 +1,4 @@
-"""Symmetry-adapted bases: matrices that commute with a finite group become block-diagonal, with one block for each
-irreducible representation.
+"""Symmetry-adapted bases: matrices that commute with a finite group get one block for each irreducible representation.
 
 No tables of characters are needed: the eigenspaces of a generic symmetric matrix that commutes with the group are
 irreducible (a mean over the group of a random one is generic). Characters give their equivalence and type (Serre,
@@ -84,8 +83,7 @@ class Block(ReadOnlyArrays):
 
 
 def isotypic(group: Group) -> tuple[Block, ...]:
-    """The blocks of a finite group, the trivial one first; AnalysisError if its matrices are not exact enough, or a
-    representation is of quaternionic type."""
+    """The blocks of a finite group, the trivial one first; an AnalysisError if inexact or of quaternionic type."""
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
         blocks = _blocks(group, random)

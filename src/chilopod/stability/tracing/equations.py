@@ -89,8 +89,7 @@ class Step(Generic[A, S]):
         return float(self.start.tangent @ self.moved)
 
     def between(self, place: float) -> Guess:
-        """Displacement at a place (along the first tangent), by the cubic through both ends along their tangents, and
-        the matrix there by linear interpolation."""
+        """Displacement at a place by the cubic through both ends and tangents, and the matrix, interpolated."""
         t, size, first = place / self.size, self.size, self.start.tangent
         last = self.tangent / float(first @ self.tangent)
         moved = (
@@ -111,8 +110,7 @@ class OutsideBoxError(AnalysisError):
 
 
 class Plane(NamedTuple):
-    """The equation that ends a step, ``row . moved = target``; on an edge of the box the number of a parameter, and its
-    exact value there."""
+    """The equation that ends a step, ``row . moved = target``; on an edge of the box a parameter's number and value."""
 
     row: Array
     target: float
@@ -125,28 +123,17 @@ class Corrected(Generic[R]):
 
     moved: Array
     found: R
-    values: Array
     residual: Array
     inverse: Array
     corrections: int
 
 
 class Equations(ABC, Generic[A, S, R]):
-    """N equations with N+1 unknowns, in coordinates of an anchor.
+    """N equations with N+1 unknowns, in coordinates of an anchor."""
 
-    Attributes
-    ----------
-    box
-        Intervals of the parameters, shape (parameters, 2): all evaluations are inside.
-    budget
-        Budget of flows and time.
-    precision
-        Residual, in units of the parameters, that counts as zero.
-    """
-
-    box: Array
+    box: Array  # intervals of the parameters, shape (parameters, 2): all evaluations are inside
     budget: Budget
-    precision: float
+    precision: float  # residual, in units of the parameters, that counts as zero
 
     @abstractmethod
     def parameters(self, anchor: A) -> tuple[slice, Array]:
@@ -154,8 +141,7 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def residual(self, anchor: A, moved: Array, values: Array) -> tuple[R, Array]:
-        """Result of evaluating the equations at a displacement, with given values of the parameters, and the residual,
-        shape (N,)."""
+        """The equations evaluated at a displacement with values of the parameters, and the residual, shape (N,)."""
 
     @abstractmethod
     def off(self, found: R, residual: Array, move: Array) -> float:
@@ -163,20 +149,12 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def met(self, anchor: A, found: R, off: float, stalled: int, singular: bool) -> bool:
-        """True if the corrections end at this error, which the last few did not halve; ``singular``: along some
-        direction they cannot reduce it."""
+        """True if corrections end at this error, which the last few did not halve, or cannot (``singular``)."""
 
     @abstractmethod
     def step(self, anchor: A, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[A, S]:
-        """The solution near a guess, with tangent and matrix; ``bounded``: with the errors at its end.
-
-        Raises
-        ------
-        OutsideBoxError
-            If it lies outside the box.
-        AnalysisError
-            If no solution is found near the guess.
-        """
+        """The solution near a guess, with tangent and matrix; ``bounded``: with the errors at its end. An
+        OutsideBoxError if it lies outside the box, an AnalysisError if none is found near the guess."""
 
     @abstractmethod
     def arrived(self, step: Step[A, S]) -> Step[A, S]:
@@ -239,7 +217,7 @@ class Equations(ABC, Generic[A, S, R]):
             last, best, moved = residual, min(best, off), moved + move
             corrections += off > tolerances.COUNTED
         self._check_inside(strays, values, wanted, self.precision)
-        return Corrected(moved, found, values, residual, inverse, corrections)
+        return Corrected(moved, found, residual, inverse, corrections)
 
     @staticmethod
     def _check_inside(strays: Array, values: Array, wanted: Array, allowed: float) -> None:

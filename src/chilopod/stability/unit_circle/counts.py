@@ -47,8 +47,7 @@ class Report:
 
 
 class _Gap(NamedTuple):
-    """Roots between two neighbouring places at which the multipliers outside are counted, with the counts; a place is
-    None beyond the first or the last of them."""
+    """Roots between two counts of multipliers outside; a place is None beyond the first or the last of them."""
 
     x: float | None
     y: float | None

@@ -55,8 +55,7 @@ class SearchStatus(Labelled):
 
 @dataclass(frozen=True)
 class Crossings:
-    """Crossings by rising value, status of the search, remarks of a sentence each, and number of evaluated
-    values."""
+    """Crossings by rising value, status of the search, remarks of a sentence each, and number of evaluations."""
 
     crossings: tuple[Crossing, ...]
     status: SearchStatus
@@ -102,8 +101,7 @@ def first_values(low: float, high: float) -> Array:
 
 
 def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any]]:
-    """Ends of an interval in a coordinate with an even effect of the parameter, the logarithm over decades, and the
-    parameter at places there."""
+    """Ends of an interval in an even coordinate, over decades the logarithm, and the parameter at places there."""
     inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
     a, b = float(inward(low)), float(inward(high))
 
@@ -190,8 +188,7 @@ class _Finder:
         return int(sorted(numbers)[int(_MOSTLY * len(numbers))])
 
     def _probe(self) -> None:
-        """Evaluate matrices wherever a multiplier may cross the circle and come back: it approaches the circle from
-        both sides of a gap."""
+        """Evaluate matrices wherever a multiplier may reach the circle and come back: near it at both ends of a gap."""
         self.report.remarks.append("with many multipliers pairs are found by counting, not by zeros of a function")
         places = np.linspace(self.a, self.b, _PROBES)
         while places.size and self.spectra.left > places.size:

@@ -1,5 +1,4 @@
-"""Eigenvalues along a family of matrices, their errors from those of the matrices, and functions that vanish at
-critical ones."""
+"""Eigenvalues along a family of matrices, their errors, and functions that vanish at critical ones."""
 
 from __future__ import annotations
 
@@ -143,8 +142,7 @@ class Spectra:
         return any(low < value < high and nu is None for value, nu in self._known.items())
 
     def without_pair(self, low: float, high: float) -> bool:
-        """True if all complex multipliers are clear of the circle between two values, according to the known values in
-        between.
+        """True if all complex multipliers are clear of the circle between two values, judged by known values.
 
         The bialternate product also vanishes where two real multipliers have product 1.
         """

@@ -47,8 +47,7 @@ def interpolated(values: Array) -> tuple[Array, Array, Array]:
 
 @cache
 def _matrices(count: int) -> tuple[Array, Array, Array]:
-    """Coefficients from the values at the nodes among so many places, and values at the checks and at ``DENSE`` from
-    coefficients."""
+    """Coefficients from values at the nodes among places, and from these values at checks and ``DENSE``."""
     nodes = np.delete(MORE_PLACES[:count], _CHECKS)
     fit, checks, dense = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, MORE_PLACES[_CHECKS], DENSE))
     return np.asarray(np.linalg.inv(fit)), np.asarray(checks), np.asarray(dense)
@@ -144,8 +143,7 @@ class _Kind(Enum):
 
 
 class _Part(NamedTuple):
-    """A part of the interval, with its sign, if certain, or the logarithm of the polynomial's
-    error."""
+    """A part of the interval, with its sign, if certain, or the logarithm of the polynomial's error."""
 
     a: float
     b: float
