@@ -28,7 +28,6 @@ from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.problem.arguments import SpentError, UserCode, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, given_scale, offers
 from chilopod.stability.problem.system import PeriodicSystem
-from chilopod.stability.search.extent import Fold
 from chilopod.stability.search.locate import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
@@ -152,7 +151,7 @@ def _piece(
                 reason = error.problem
         return [f"no coefficient at {point.value:.9g}: {reason}", replace(point, multiplier=1j * point.frequency)]
 
-    def ended(fold: Fold) -> str:
+    def ended(fold: BifurcationPoint) -> str:
         where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
         return f"the equilibrium ends in a fold at {where}: it meets another one there"
 

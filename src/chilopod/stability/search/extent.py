@@ -12,10 +12,9 @@ from chilopod.stability.branches.branch import LONGEST, followed, opened
 from chilopod.stability.branches.branch_starts import begin
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.crossing_points.place import Sample
-from chilopod.stability.points import Kind
+from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import Budget, SpentError
-from chilopod.stability.problem.capabilities import Family, SystemLike
-from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.problem.capabilities import Family, returns_per_period
 from chilopod.stability.search.samples import NEAR_FOLD, Samples
 
 _BEFORE = 1e-6  # distance from a fold at which the search for crossings ends, relative to the interval
@@ -32,18 +31,9 @@ _STEPS = 40  # steps round a fold
 _STEP = 0.01  # the first of them, in units of the states' sizes and the parameter's scale
 
 
-@dataclass(frozen=True)
-class Fold:
-    """A fold of periodic orbits: an orbit ends along the parameter where it meets another one and both vanish."""
-
-    value: float  # value of the parameter
-    error_bound: float  # bound on its error
-    image: ReturnMap  # return map at the critical orbit
-
-
 def find_fold(
     family: Family, value: float, orbit: Array, scale: float, rising: bool = True, budget: Budget | None = None
-) -> Fold | None:
+) -> BifurcationPoint | None:
     """Follow an orbit, with the systems' symmetry in time, round the next fold; None without one.
 
     The orbit must not be in the fold: a curve that starts there does not pass it. The search extends as far as
@@ -56,10 +46,8 @@ def find_fold(
             start = begin(family, value, orbit, rising, symmetric=True)
             branch = followed(curve, *opened(curve, start, _STEP), LONGEST, _STEPS, False, until=Kind.FOLD)
             for fold in branch.special_points:
-                if fold.special is Kind.FOLD and fold.bifurcation is not None:
-                    section = curve.section_at(fold.orbit, fold.value, fold.period)
-                    image = curve.image(fold.orbit, fold.value, section)
-                    return Fold(fold.value, fold.bifurcation.error_bound, image)
+                if fold.special is Kind.FOLD:
+                    return fold.bifurcation
     except ChilopodError:
         pass
     return None
@@ -71,7 +59,7 @@ class Extent:
 
     start: float
     end: float
-    folds: tuple[Fold, ...] = ()  # folds at the ends of the orbit
+    folds: tuple[BifurcationPoint, ...] = ()  # folds at the ends of the orbit
     ending: str = ""  # sentence on another end before that of the interval
     shrinks: bool = False  # it ends in an equilibrium
     beside: float = 0.0  # distance of a fold from start and end
@@ -91,7 +79,7 @@ def extent(samples: Samples) -> Extent:
     if samples.spent:
         ending = f"the budget was spent before the orbit was followed beyond {last.value:.9g}"
         return Extent(first.value, last.value, ending=ending)
-    folds: tuple[Fold, ...] = ()
+    folds: tuple[BifurcationPoint, ...] = ()
     start = first.value
     if first.off_plus_one <= NEAR_FOLD:
         fold = _fold_beside(samples, first, path[1:], rising=False)
@@ -101,9 +89,9 @@ def extent(samples: Samples) -> Extent:
     if last.value == high and last.off_plus_one > NEAR_FOLD:
         return Extent(start, high, folds, beside=beside)
     fold = _fold_beside(samples, last, path[-2::-1], rising=True)
-    here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
-    if last.value != high and _at_rest(samples, here):
-        ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
+    here = (last.value, last.orbit, last.image.period) if fold is None else (fold.value, fold.orbit, fold.period)
+    if last.value != high and _at_rest(samples, *here):
+        ending = f"the orbit shrinks into an equilibrium near {here[0]:.9g}: a Hopf point"
         return Extent(start, last.value, folds, ending, shrinks=True, beside=beside)
     if fold is None:
         ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
@@ -117,7 +105,7 @@ def extent(samples: Samples) -> Extent:
     return Extent(start, end, folds + (fold,) * (fold.value <= high + fold.error_bound), beside=beside)
 
 
-def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising: bool) -> Fold | None:
+def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising: bool) -> BifurcationPoint | None:
     """The fold next to a sample, from the nearest of the others that is clear of it."""
     off = np.array([each.off_plus_one for each in [sample, *others]])
     clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
@@ -134,18 +122,18 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
     return None
 
 
-def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
+def _next_to(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: bool) -> bool:
     """True if a fold is just past a sample at either end, on the same orbit."""
     further = fold.value - sample.value if rising else sample.value - fold.value
     return (
         bool(np.isfinite(fold.error_bound))
         # In a fold Newton's method may converge to states that are not orbits.
         and -max(fold.error_bound, _BEFORE * samples.width) <= further <= _JUST_PAST * samples.width
-        and not samples.jumped(fold.image.state, sample.orbit)
+        and not samples.jumped(fold.orbit, sample.orbit)
     )
 
 
-def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
+def _comes_as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: bool) -> bool:
     """True if the multiplier approaches +1 as a root, as in a fold; at a crossing branch it does so linearly."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
@@ -157,17 +145,17 @@ def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool)
     return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
 
 
-def _at_rest(samples: Samples, last: Sample) -> bool:
+def _at_rest(samples: Samples, value: float, state: Array, period: float) -> bool:
     """True if the motion nearly vanishes at the end of an orbit: past a fold there the same orbit comes again."""
     if samples.family.timed:
         return False
-    first = _moved(samples, samples.family(samples.low), samples.first.image)
-    return _moved(samples, samples.family(last.value), last.image) < _AT_REST * first
+    first = _moved(samples, samples.low, samples.first.state, samples.first.period)
+    return _moved(samples, value, state, period) < _AT_REST * first
 
 
-def _moved(samples: Samples, system: SystemLike, image: ReturnMap) -> float:
+def _moved(samples: Samples, value: float, state: Array, period: float) -> float:
     """Extent of the motion within a return, relative to the sizes of the states."""
-    path = [image.state]
+    system, path = samples.family(value), [state]
     for _ in range(_PARTS - 1):
-        path.append(system.flow(path[-1], 0.0, image.duration / _PARTS)[0])
+        path.append(system.flow(path[-1], 0.0, period / returns_per_period(system) / _PARTS)[0])
     return float((np.ptp(np.array(path), axis=0) / samples.size).max())

@@ -21,7 +21,7 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import SpentError, UserCode, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap
-from chilopod.stability.search.extent import Fold, extent
+from chilopod.stability.search.extent import extent
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.shown import bounded as bounded_text
@@ -160,7 +160,7 @@ def locate(
         samples,
         lambda start, end: _crossings(samples, start, end, budget),
         lambda crossing, block: [_described(samples, crossing, block, normal_form)],
-        lambda fold: _fold(samples, fold, normal_form),
+        lambda fold: fold if normal_form else replace(fold, normal_form=None),
         _DESCRIBING,
     )
 
@@ -169,7 +169,7 @@ def located(
     samples: Samples,
     crossings: Callable[[float, float], list[tuple[Block | None, Crossings]]],
     described: Callable[[Crossing, Block | None], list[Found]],
-    fold: Callable[[Fold], Found],
+    fold: Callable[[BifurcationPoint], Found],
     returns: int,
 ) -> Located:
     """Find and describe the bifurcations along the samples of a family.
@@ -266,14 +266,6 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         value_text = bounded_text(point.value, point.error_bound)
         return f"at {value_text} a multiplier only touches the unit circle and goes back: nothing changes"
     return point
-
-
-def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPoint:
-    """The fold that a followed orbit begins or ends in."""
-    orbit = Orbit(fold.image.state, fold.image, np.zeros(fold.image.state.size))
-    crossing = Crossing(fold.value, (fold.value, fold.value), Event.PLUS, 1, 1, 1.0 + 0.0j)
-    system, place = samples.family(fold.value), (fold.value, fold.error_bound)
-    return described(system, place, orbit, crossing, None, kind=Kind.FOLD, with_normal_form=with_normal_form)
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:
