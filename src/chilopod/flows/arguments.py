@@ -144,8 +144,7 @@ def _compared(matrix: bytes, shift: float, times: bytes, base: bytes, period: fl
 def check_symmetry(
     field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
 ) -> None:
-    """Check that a right-hand side has a symmetry in time or space, or a period, as in :func:`_failure`: a wrong one
-    would give wrong multipliers without an error."""
+    """Check a symmetry in time or space, or a period, of a right-hand side: a wrong one gives wrong multipliers."""
     failed = _failure(matrix, shift, slopes, times, base, period)
     if failed is not None:
         what, allowed = _SYMMETRIES[field]

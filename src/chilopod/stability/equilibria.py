@@ -95,8 +95,7 @@ class HopfForm:
 def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     """An equilibrium, by damped Newton's method from a guess.
 
-    A step is shortened until the next one, by the same derivative, would be shorter (Deuflhard, *Newton Methods for
-    Nonlinear Problems*, section 3.3), a test without units.
+    A step is shortened until the next one, by the same derivative, would be shorter (Deuflhard, section 3.3).
 
     Parameters
     ----------
@@ -201,8 +200,7 @@ def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> A
 
 
 def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
-    """Taylor coefficients in s of f(x(s)) along curves x(s) = c0 + c1 s + ..., shape (curves, orders, n), and bounds on
-    their errors; at s = 1 a state has moved by about its size."""
+    """Taylor coefficients of f(x(s)) along x(s) = c0 + c1 s + ..., shape (curves, orders, n), and bounds of errors."""
     if offers(system, "velocity_series"):
         found = system.velocity_series(curves)
         return found, np.zeros_like(found)
@@ -275,8 +273,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
 
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
-    """A small cycle beside a Hopf point, with its parameter, and the displacement of its state from the equilibrium
-    over the root of that of the parameter, shape (n,)."""
+    """A small cycle beside a Hopf point, with its parameter, and its displacement over the root of the parameter's."""
     rate = point.rate
     if rate is None or point.criticality in (None, Criticality.UNDECIDED):
         said = "is a Hopf point whose coefficients leave the side of its cycles undecided"

@@ -79,8 +79,7 @@ class KrylovSubspace(ReadOnlyArrays):
 
 
 def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[KrylovSubspace]:
-    """Subspaces of a matrix, given by its products with directions, shape (n, any), from a first block, shape (n,
-    columns). Each is larger by an eighth or more; the last one is invariant."""
+    """Growing subspaces of a matrix, given by its products with directions, from a block; the last one is invariant."""
     block = _orthonormal(start, _ROUND_OFF * float(np.linalg.norm(start)), len(start))[0]
     first = block.shape[1]
     basis, matrix, coupling = block, np.zeros((0, 0)), np.zeros((first, 0))

@@ -234,8 +234,7 @@ def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple
 def _estimated(
     problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any
 ) -> float:
-    """The error of a step relative to the size of every state, its largest value so far or the effect of the others on
-    it within the step, and of the entries of the derivative, likewise."""
+    """The error of a step relative to the largest values of states and entries of the derivative so far."""
     largest, reached = problem.largest, step.reached
     s, n = step.moved.shape
     off, noise = _defects(x, h, method, step, derivative)
@@ -267,8 +266,7 @@ def _estimated(
 
 @fused_njit(error_model="numpy")
 def _predict(nodes: Any, ratio: float, last: Any, moved: Any) -> None:
-    """Guess the stages by extrapolating the polynomial of the previous step: Lagrange polynomials on 0 and its nodes.
-    ``ratio`` is the step over the previous one; 0 for the first step."""
+    """Guess the stages by the polynomial of the previous step; ``ratio``: the step over that one, 0 for the first."""
     s, n = moved.shape
     moved.fill(0.0)
     for i in range(s):

@@ -104,8 +104,7 @@ class TaylorFlow:
         return Passage(x, derivative, bound, steps)
 
     def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
-        """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number), without
-        any matrix of shape (n, n); raises the errors of :meth:`advance`."""
+        """State at t1, and the derivative by ``x`` times ``directions``, shape (n, any number), without a matrix."""
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         images = np.array(directions, dtype=np.float64, order="C")
         self._run(x, (t0, t1), params, images, stepwise=False)

@@ -55,8 +55,7 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
 
 @fused_njit(error_model="numpy")
 def _unsaturated(tape: Any, values: Any, order: int, h: float) -> float:
-    """The largest step up to h at which no function jumps from one saturated end over its transition: where tanh is 1
-    to round-off, its series does not tell that it changes farther on."""
+    """The largest step up to h at which no function jumps over a transition that its series at a flat end hides."""
     program = tape.program
     for i in range(tape.layout[3], tape.layout[4]):
         code = program[0, i]

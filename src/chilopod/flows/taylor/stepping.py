@@ -204,8 +204,7 @@ def _enlarge_scales(tape: Any, motion: Any, order: int, h: float) -> None:
 def _chosen(
     tape: Any, directions: Any, clock: Any, motion: Any, control: Any, when: Any, steps: int, work: Any
 ) -> tuple[float, int, float]:
-    """Length of a step, and the switch at its end as in :func:`_first_crossing`; ``when`` has the time, its unit, the
-    units that remain, and the units within which two instants are equal."""
+    """Length of a step, and the switch at its end; ``when``: time, its unit, units that remain, and equal ones."""
     t, unit, remaining, soon = when
     series, order = motion.series, control.order
     h = step_size(tape, series, motion.seeds.shape[1], order, remaining, control.epsilon)

@@ -87,8 +87,7 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
 
 
 def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> Any:
-    """The value with its floats replaced by those of an iterator, in the order of :func:`describe`, and numpy and math
-    by versions for traced numbers; without an iterator, floats stay."""
+    """The value with floats from an iterator, as in :func:`describe`, if given; numpy and math for traced ones."""
     value = python_function(value)
     if isinstance(value, float | np.floating):
         return value if source is None else next(source)

@@ -261,8 +261,7 @@ def compose(tape: Any, params: Any, t: float, curve: Any, branches: Any, found: 
 
 @fused_njit(error_model="numpy", inline="always")
 def expand_values(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
-    """Coefficients 0 to ``order`` of the states and of all operations up to ``stop``, in powers of the time since the
-    start over ``unit``, from those of order 0 of the states and the time."""
+    """Coefficients 0 to ``order`` of states and operations up to ``stop``, in powers of the time since the start."""
     values, first = series.values, tape.layout[3]
     values[tape.layout[0], 1] = unit
     values_at(tape.program, tape.terms, tape.slopes, (first, stop), order, unit, values, series.branches)

@@ -182,8 +182,7 @@ def follow(
     seconds: float = math.inf,
     progress: Progress = lambda count, point: None,
 ) -> Branch:
-    """Follow a branch from a point along its tangent, or from the end of a branch that was followed before; an
-    AnalysisError if no orbit is found at the start.
+    """Follow a branch from a point along its tangent, or from its end; an AnalysisError if no orbit is found there.
 
     The points of a continued branch equal those of a single run; for a system without a period of its own they are
     other points of the same curve, as the last section is rebuilt.
@@ -196,11 +195,9 @@ def follow(
         Start from :func:`begin` or :func:`switch`, a point of another branch, an orbit (or a guess) at the lower end of
         the interval, or a branch, which is continued in its own units, with its own ``symmetric``.
     between
-        Interval of the parameter; the branch ends at an end of it, and the family is called for values inside only.
-        Its width becomes the scale of a new branch.
+        Interval of the parameter, at whose ends the branch ends; its width becomes the scale of a new branch.
     points
-        Number of new ordinary points after which the branch ends; by default it continues to an end of the interval, or
-        until it is closed, lost, or out of budget.
+        Number of new ordinary points after which the branch ends; by default any number.
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
     closely
@@ -208,8 +205,7 @@ def follow(
     precision
         Precision of orbits relative to the sizes of the states, limited by the accuracy of the flow.
     symmetric
-        True to follow orbits with the systems' symmetry in time. By default the full period is used, since the orbits
-        of interest have usually lost that symmetry.
+        True to follow orbits with the systems' symmetry in time, which orbits of interest have usually lost.
     budget, seconds
         Number of flows, beside those of normal forms, and time in s, after which the branch ends.
     progress

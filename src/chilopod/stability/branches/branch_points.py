@@ -58,8 +58,7 @@ class BranchPoint(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """True if all multipliers lie inside the unit circle by more than the error bound, False if one lies outside by
-        more, else None, as at most special points."""
+        """True if all multipliers lie in the unit circle by more than the bound, False if one lies outside, or None."""
         return stable_within(self.multipliers, self.error_bound)
 
 

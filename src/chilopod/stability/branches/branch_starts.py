@@ -71,8 +71,7 @@ class Start(ReadOnlyArrays):
     bifurcation
         Bifurcation point of the start, if any.
     outward
-        Direction of the state, shape (n,), of a branch that starts at an orbit beside the bifurcation point;
-        ``rising`` is then the direction of the parameter. May be None.
+        Direction of the state, shape (n,), from the bifurcation point to a start beside it. May be None.
     """
 
     value: float
@@ -158,8 +157,7 @@ def switch(
     point
         Located point, special point on a branch, or Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
-        Number of the systems' periods in one period of the old branch's orbits; by default known from a special point
-        on a branch, or from a given period of the systems, else 1.
+        Number of the systems' periods in one period of the old branch's orbits, if the point does not tell.
     seconds
         Time, s, after which the search for an orbit ends.
 

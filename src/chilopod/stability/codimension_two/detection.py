@@ -268,8 +268,7 @@ def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.
 
 
 def _zero(test: Test, length: float) -> tuple[float, float, float] | None:
-    """Zero of a test function within a step, distance to places where it is known, and its largest value there if it is
-    undefined at the zero; None without a zero."""
+    """Zero of a test function in a step, distance to known places, and largest value there if undefined; or None."""
 
     def resolved(place: float) -> float:
         value, error = test(place)

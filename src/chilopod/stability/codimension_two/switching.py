@@ -123,8 +123,7 @@ class _Unfolding:
 
 
 def _across(spot: Spot, target: int) -> Array:
-    """Change of orbit and parameters, in coordinates of the frame, with the modulus of the multiplier, by the
-    shortest way; g changes by -(w . v) times the change of the multiplier."""
+    """Change of orbit and parameters with the multiplier's modulus; g changes by -(w . v) times the multiplier's."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.left[:, 0] @ spot.right[:, 0])
     orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])

@@ -192,8 +192,7 @@ def _modes(
     block: Block | None,
     symmetry: SymmetricCrossing | None,
 ) -> ComplexArray:
-    """Modes of several critical multipliers: along the axial branches if a symmetry makes them critical together, else
-    in any order; for real ones an orthonormal basis of their space."""
+    """Modes of several critical multipliers: along axial branches, if any; real ones are an orthonormal basis."""
     if block is None or symmetry is None or not symmetry.branches or critical.size > 2 * block.dimension:
         vectors = spec.right[:, critical]
         if event is Event.PAIR:

@@ -40,8 +40,7 @@ _MOST = 32
 
 
 class Nodes(NamedTuple):
-    """States at instants that divide a return evenly, shape (m, n), the first at time 0, the time of the return,
-    and the value of the parameter; or their changes in a correction."""
+    """States at even times of a return, shape (m, n), the first at 0, its time, and the parameter; or their changes."""
 
     states: Array
     duration: float
@@ -330,8 +329,7 @@ class _Equations:
         return max(states, abs(correction.duration) / self.nodes.duration)
 
     def cleared(self) -> _Equations:
-        """The orbit with the negligible states of its first node set to zero, if it remains an orbit. A remainder of
-        the guess would count as the size of the orbit."""
+        """The orbit with its negligible states, remainders of the guess, set to zero, if it remains an orbit."""
         x = self.nodes.states[0]
         small = (x != 0.0) & (np.abs(x) <= _NOTHING * self.frame.sizes)
         if not small.any():

@@ -90,12 +90,10 @@ class Capabilities(Autonomous, Protocol):
         """States at t1 of those at t0, shape (states, n) both, without derivatives."""
 
     def flow_tangents(self, x: Array, directions: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
-        """State at t1, shape (n,), and its derivative with respect to the state x at t0, times the directions, shape
-        (n, any number) as they, which suffices for large systems."""
+        """State at t1, shape (n,), and its derivative times the directions, shape (n, any number) as they."""
 
     def flow_many(self, systems: Sequence[Any], t0: float, t1: float, /) -> tuple[Array, Array]:
-        """Derivatives of the flow on the known orbits of systems of this class, for sweeps, shape (systems, n, n), and
-        bounds on their errors, shape (systems,)."""
+        """Derivatives on known orbits of systems of this class, shape (systems, n, n), and bounds, shape (systems,)."""
 
     def can_flow_with(self, other: Any, /) -> bool:
         """True if :meth:`flow_many` may take another system of this class along with this one."""

@@ -230,8 +230,7 @@ def on_section(
     duration: float,
     error: float | Array = np.nan,
 ) -> ReturnMap:
-    """The return map from a return within its duration, to a section if there is one, and from the derivative over this
-    duration; ``error`` bounds that of the flow without the symmetry."""
+    """The return map from a return, to a section if given, and its derivative; ``error`` bounds that of the flow."""
     check_finite(state, jacobian)
     count = returns_per_period(system)
     image = ReturnMap(state, jacobian, error, count, count * duration)
@@ -293,8 +292,7 @@ def _arrival(system: Autonomous, before: Array, section: Section, rest: float) -
 
 
 def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
-    """True if the motion jumps just after the start of a return, from state x, or just before its end: the derivative
-    of the flow then does not tend to 1 over shorter and shorter times."""
+    """True if the motion jumps at an end of a return: the derivative there does not tend to 1 over shorter times."""
     size, one = sizes(system, x, duration), np.eye(x.size)
 
     def change(start: float, part: float) -> float:

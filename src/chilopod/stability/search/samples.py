@@ -171,8 +171,7 @@ class Samples:
             return _sample(value, near_orbit(system, start, False, self.budget, section, units=self.size))
 
     def _start(self, system: SystemLike, near: Array, duration: float) -> tuple[Nodes, Section | None]:
-        """A state as a guess of the orbit, and the section there, with the normal of the last one while the motion is
-        across that: so the states at time 0 are smooth in the parameter."""
+        """A state as a guess, and the section there, with one normal while that serves, so that orbits are smooth."""
         section = section_at(system, near, self.size, duration)
         if section is None:
             return Nodes(near[None], return_duration(system)), None

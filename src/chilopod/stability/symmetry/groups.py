@@ -89,8 +89,7 @@ def finite_group(generators: ArrayLike) -> Group:
 
 
 def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
-    """The isotropy subgroup of a state, shape (n,), with a bound on its error: all P of a group with P x = x. By
-    uniqueness of the flow they leave its whole orbit invariant."""
+    """The isotropy subgroup of a state, with a bound on its error, shapes (n,): all P with P x = x."""
     moved = np.abs(group.elements @ x - x)
     allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (error + _SAME * np.abs(x))
     return _subgroup(group, np.all(moved <= allowed, axis=1), "orbit")
@@ -129,8 +128,7 @@ def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
 
 
 def _powers(matrix: Array, most: int) -> tuple[Array, Array]:
-    """Largest absolute value of each entry over the powers, shape (n, n), and the last one's difference from the
-    identity, which is round-off if the matrix generates a finite group."""
+    """Largest absolute value of each entry over the powers, and the last one less the identity, shapes (n, n)."""
     n = len(matrix)
     power, envelope = matrix, np.maximum(np.abs(matrix), np.eye(n))
     with np.errstate(over="ignore", invalid="ignore"):

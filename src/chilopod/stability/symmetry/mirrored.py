@@ -14,8 +14,7 @@ _LOOSE = 1e-6  # largest residual of a symmetry of a state, relative to the size
 
 
 def symmetric_states(system: SystemLike, state: Array, size: Array, near: float = _LOOSE) -> Array:
-    """Orthonormal basis, in units of the states' sizes, shape (n,), of the space of states with the spatial symmetries
-    of a state: those that change it by at most ``near``."""
+    """Orthonormal basis, in units of the sizes, of states with the symmetries of one: changed by ``near`` at most."""
     n, generators = size.size, spatial_symmetries(system)
     elements = _elements(np.stack(generators).tobytes(), n) if generators else np.empty((0, n, n))
     kept = (np.abs(elements @ state - state) <= near * size).all(axis=1)

@@ -1,5 +1,4 @@
-"""Points of a curve, steps between them, the predictor, the equations of a curve, and the corrector: Broyden's method
-for them, within the box of the parameters."""
+"""Points of a curve, steps, predictor, equations, and corrector: Broyden's method within the box of the parameters."""
 
 from __future__ import annotations
 

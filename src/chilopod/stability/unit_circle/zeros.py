@@ -37,8 +37,7 @@ _CHECKS = [DEGREE + 1, DEGREE + 2]
 
 
 def interpolated(values: Array) -> tuple[Array, Array, Array]:
-    """Chebyshev coefficients of the polynomial through the values of a function, or of several as columns, at
-    ``PLACES`` or ``MORE_PLACES``; its error; and its values at ``DENSE``."""
+    """Chebyshev coefficients of polynomials through values at ``PLACES`` or more, errors, and values at ``DENSE``."""
     fit, at_checks, at_dense = _matrices(len(values))
     coefficients: Array = fit @ np.delete(values, _CHECKS, axis=0)
     off = np.abs(at_checks @ coefficients - values[_CHECKS]).max(axis=0)
