@@ -18,6 +18,8 @@ BENCH := $(VENV)/.bench-installed
 # default they wait actively, and take the other processes' time.
 JOBS ?= 2
 ALONGSIDE := OPENBLAS_NUM_THREADS=1 OMP_WAIT_POLICY=passive
+# What is imported is compiled once, also where the environment lets Python write no bytecode: tests start many processes.
+export PYTHONDONTWRITEBYTECODE :=
 
 # Makes .venv with the first suitable Python, unless a working one is there.
 define make_venv
@@ -89,14 +91,13 @@ test-processors: $(DEV)  ## the numeric tests with the arithmetic of other proce
 
 # The core of the suite with other versions than the lock's, in an environment of its own. What has wheels counts; what
 # an old version does that is deprecated by now is its own affair.
-# Compiled once, since the tests start many processes, and some environments let Python write no bytecode.
 CORE := $(addprefix tests/,engine gym live paper/page planar show trials truth/test_duffing.py truth/test_hybrid.py twin) \
 	$(wildcard tests/test_cli_*.py) $(addprefix tests/test_,compiled.py dual.py integrate.py lanes.py notebook.py \
 	numba_internals.py output.py package.py record_file.py)
 OTHERS = $(VENV)-$(@:test-%=%)
 define test_core
 	@$(UV) venv --quiet --clear --no-python-downloads --python "$(or $(PYTHON),$(BIN)/python)" $(OTHERS)
-	@$(UV) pip install --quiet --no-config --compile-bytecode --python $(OTHERS) --only-binary :all: --no-binary chilopod $(1) -e '.[dev]'
+	@$(UV) pip install --quiet --no-config --python $(OTHERS) --only-binary :all: --no-binary chilopod $(1) -e '.[dev]'
 	$(ALONGSIDE) $(OTHERS)/bin/python -m pytest -n $(JOBS) --dist loadfile --benchmark-disable $(2) $(CORE) $(ARGS)
 endef
 

@@ -65,7 +65,8 @@ def started(**environment):
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
     with subprocess.Popen(
         [sys.executable, "-c", RUNS],
-        env={**kept, **environment},
+        # Bytecode of Python would not see a change of equal size and time.
+        env={**kept, "PYTHONDONTWRITEBYTECODE": "1", **environment},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -91,8 +91,8 @@ def test_code_that_cannot_be_compiled_is_refused_in_one_line(name, value, shown)
     code = "from chilopod.cli import main; raise SystemExit(main(['stability', 'aoi2022-planar']))"
     done = _python(code, **{f"NUMBA_{name}": value})
     assert done.returncode == 2
-    assert done.stderr.startswith(f"error: NUMBA_{name} = {shown}: ")
-    assert done.stderr.count("\n") == 1
+    (error,) = [each for each in done.stderr.splitlines() if not each.startswith("stability: ")]  # of a loaded machine
+    assert error.startswith(f"error: NUMBA_{name} = {shown}: ")
 
 
 @pytest.mark.parametrize(

