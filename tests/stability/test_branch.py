@@ -61,6 +61,7 @@ def test_in_pieces_as_in_one():
     assert [point.value for point in pieces.points] == [point.value for point in whole.points]
     assert [point.orbit.tolist() for point in pieces.points] == [point.orbit.tolist() for point in whole.points]
     assert [point.special for point in pieces.points] == [point.special for point in whole.points]
+    assert [point.error_bound for point in pieces.points] == [point.error_bound for point in whole.points]
 
 
 def test_a_branch_that_left_goes_on_in_a_wider_interval():
@@ -131,19 +132,6 @@ def test_a_step_out_of_what_the_system_can_have_is_shortened():
     assert 0.19 < branch.points[-1].value < 0.2
 
 
-def test_a_branch_begins_at_a_known_orbit():
-    start = begin(gentle, 0.1, [np.sqrt(0.1)], rising=False)
-    branch = follow(gentle, start, (0.02, 0.2), step=0.02)
-    assert branch.points[-1].value == 0.02
-    assert branch.points[1].value < 0.1
-
-
-def test_bad_arguments_are_named():
-    start = begin(gentle, 0.1, [np.sqrt(0.1)], rising=True)
-    with pytest.raises(ParameterError, match="between"):
-        follow(gentle, start, (0.2, 0.1))
-
-
 @pytest.mark.parametrize("start", [-0.5, -0.6, 0.5])
 @pytest.mark.parametrize("longest", [0.15, 0.3])
 def test_a_fold_without_damping(start, longest):
@@ -177,12 +165,6 @@ def test_a_real_double_multiplier_is_no_pair():
     assert point.value == pytest.approx(1.1976250148166, abs=1e-9)
     assert point.bifurcation.multiplicity == 2
     assert not branch.remarks
-
-
-@pytest.mark.parametrize("periods", [0, -1, 1.5, True])
-def test_a_number_of_periods_is_a_whole_number(periods):
-    with pytest.raises(ParameterError, match="periods"):
-        begin(gentle, 0.1, [np.sqrt(0.1)], periods=periods)
 
 
 def driven(size):

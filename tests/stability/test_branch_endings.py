@@ -126,13 +126,6 @@ def test_a_budget_ends_a_branch_and_keeps_what_was_found():
     assert max(point.error_bound for point in on.points) < 1e-8  # the last one's, too
 
 
-def test_bounds_are_the_same_in_pieces():
-    whole = follow(circle, begin(circle, 0.0, [0.5]), (-1.0, 1.0), points=6)
-    start = follow(circle, begin(circle, 0.0, [0.5]), (-1.0, 1.0), points=3)
-    pieces = follow(circle, start, (-1.0, 1.0), points=3)
-    assert [point.error_bound for point in pieces.points] == [point.error_bound for point in whole.points]
-
-
 def test_a_guess_and_an_orbit_start_a_branch():
     by_guess = follow(linear, [0.1], (0.0, 1.0))
     by_orbit = follow(linear, find_orbit(linear(0.0), [0.1]), (0.0, 1.0))

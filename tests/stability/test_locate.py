@@ -49,25 +49,10 @@ def test_an_interval_without_a_crossing_has_no_points():
         assert found.complete
 
 
-@pytest.mark.parametrize(
-    "roots",
-    [(0.3,), (0.11, 0.13, 0.62), (0.11, 0.13, 0.62, 0.91), (0.2, 0.21, 0.22, 0.9, 0.91)],
-    ids=str,
-)
-def test_one_multiplier_that_crosses_several_times(roots):
-    assert_found(locate(diagonal(with_roots(*roots, scale=20.0), decaying), (0.0, 1.0)), roots)
-
-
 @pytest.mark.parametrize("roots", [(0.3, 0.32), (0.43, 0.445), (0.05, 0.9), (0.41, 0.48)], ids=str)
 @pytest.mark.parametrize("scale", [-0.1, -1.0, -100.0, 1.0])
 def test_out_and_in_again_within_a_small_part_of_the_interval(roots, scale):
     assert_found(locate(diagonal(with_roots(*roots, scale=scale), decaying), (0.0, 1.0)), roots)
-
-
-def test_a_bump():
-    bump = diagonal(lambda mu: -1.0 + 1.2 * np.exp(-(((mu - 0.44) / 0.08) ** 2)), lambda mu: -2.0)
-    half = 0.08 * np.sqrt(np.log(1.2))
-    assert_found(locate(bump, (0.0, 1.0)), (0.44 - half, 0.44 + half))
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])

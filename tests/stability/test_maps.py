@@ -8,6 +8,7 @@ import pytest
 from chilopod.errors import ParameterError
 from chilopod.stability import (
     PeriodicSystem,
+    begin,
     find_orbit,
     follow,
     from_map,
@@ -66,9 +67,14 @@ def test_the_derivative_is_within_its_bound():
             for b in (-1, 0, 2.5, "x", None, math.inf, [])
         ),
         *(
+            (lambda k=k: begin(logistic, 2.5, [0.6], periods=k), r"periods.*: must be a whole number; allowed: 1 ")
+            for k in (0, -1, 1.5, True)
+        ),
+        *(
             (lambda o=o: follow(logistic, [0.6], (2.5, 3.2), **o), f"{next(iter(o))}.*: must be {said}")
             for o, said in (
                 ({"budget": -1}, "a whole number"),
+                *(({"points": points}, "a whole number; allowed: 1 ") for points in (0, 2.5, "all", True)),
                 ({"progress": 3}, "a function"),
                 ({"precision": 0}, "positive"),
                 ({"step": "1"}, "a number"),
@@ -82,6 +88,7 @@ def test_the_derivative_is_within_its_bound():
         (lambda: multipliers(logistic(2.5), [[0.6], [0.7, 0.8]]), r"orbit = .*: must be numbers"),
         (lambda: multipliers(logistic(2.5), [10**400]), r"orbit = .*: must be numbers"),
         (lambda: PeriodicSystem(1, "1", lambda x, t0, t1: x), r"period = '1': must be a number"),
+        (lambda: PeriodicSystem(1, 0.0, lambda x, t0, t1: x), r"period = 0.0: must be positive"),
         (lambda: multipliers(PeriodicSystem(1, 1.0, lambda x, t0, t1: None), [0.5]), r"flow = 'NoneType': must return"),
         (lambda: sweep(3), r"systems = 3: must be a list"),
         (

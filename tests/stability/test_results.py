@@ -303,12 +303,6 @@ def test_a_branch_covers_its_interval():
     assert follow(folding, part, between, longest=0.02).points[-1].value == 1.0
 
 
-@pytest.mark.parametrize("points", [0, -1, 2.5, "all", True])
-def test_a_number_of_points_that_is_none_is_refused(points):
-    with pytest.raises(ParameterError, match=r"^points = .*must be a whole number; allowed: 1 "):
-        follow(folding, begin(folding, -1.0, [-1.3]), (-1.0, 1.0), points=points)
-
-
 def test_remarks_of_a_search_name_values_as_they_are_shown():
     def matrices(values):
         angle = np.where(values < 0.3, 0.5, 1.5)

@@ -188,15 +188,8 @@ class CalledFlow:
         if not np.isfinite(y).all():
             raise AnalysisError("the state is not finite", field="rhs")
         # scipy takes no rtol below 100 eps; a small atol keeps the digits of small states and tangents.
-        answer = solve_ivp(
-            finite,
-            (a, b),
-            y,
-            method="DOP853",
-            rtol=max(tolerance, 2.3e-14),
-            atol=smallest,
-            max_step=longest_step(self.fast, float(self.edges[-1]), a, b),
-        )
+        rtol, longest = max(tolerance, 2.3e-14), longest_step(self.fast, float(self.edges[-1]), a, b)
+        answer = solve_ivp(finite, (a, b), y, "DOP853", rtol=rtol, atol=smallest, max_step=longest)
         if not answer.success:
             said = f"the integration from {a:g} to {b:g} stopped: the motion is singular, or jumps with the state"
             raise AnalysisError(said, field="rhs")

@@ -75,11 +75,8 @@ def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array,
             raise ParameterError("is zero at all states", field=name, allowed="a function that passes zero")
         for j, other in known.items():
             if np.array_equal(values, other, equal_nan=True) and event.direction * events[j].direction != -1:
-                raise ParameterError(
-                    f"must differ from that of events[{j}]: of events at one instant only the first happens",
-                    field=name,
-                    allowed="one event with a reset that does both",
-                )
+                said = f"must differ from that of events[{j}]: of events at one instant only the first happens"
+                raise ParameterError(said, field=name, allowed="one event with a reset that does both")
         known[i] = values
 
 

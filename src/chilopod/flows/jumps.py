@@ -75,11 +75,8 @@ def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> 
                 found.append(at)
     if found:
         listed = ", ".join(f"{t:.9g}" for t in sorted(found)[:6]) + (" ..." if len(found) > 6 else "")
-        warnings.warn(
-            f"the right-hand side jumps at t = {listed}, not among switch_times: that costs digits and time",
-            UndeclaredSwitch,
-            stacklevel=4,
-        )
+        said = f"the right-hand side jumps at t = {listed}, not among switch_times: that costs digits and time"
+        warnings.warn(said, UndeclaredSwitch, stacklevel=4)
 
 
 def _fourth_differences(samples: Array) -> Array:

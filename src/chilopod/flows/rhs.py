@@ -98,7 +98,11 @@ class RightHandSide:
             )
         except Untraceable as reason:
             self._refuse_calls(reason)
-            slopes, members = self._called(str(reason))
+            slopes = sampled(self.rhs, self.args, self.dimension)
+            warn_of_jumps(slopes, self.dimension, self.edges, self.start)
+            fast = fast_parts(slopes, self.base, self.edges)
+            called = CalledFlow(self.rhs, self.args, self.edges, fast, self.times, str(reason), self.tolerance)
+            members: Members = {name: getattr(called, name) for name in _FLOWS}
         else:
             slopes, members = self._traced(traced)
         if self.autonomous:
@@ -116,13 +120,6 @@ class RightHandSide:
         if self.method != "automatic":
             said = f"needs a function that can be traced: {reason}"
             raise ParameterError(said, field="method", value=self.method, allowed="automatic") from None
-
-    def _called(self, reason: str) -> tuple[Slopes, Members]:
-        slopes = sampled(self.rhs, self.args, self.dimension)
-        warn_of_jumps(slopes, self.dimension, self.edges, self.start)
-        fast = fast_parts(slopes, self.base, self.edges)
-        called = CalledFlow(self.rhs, self.args, self.edges, fast, self.times, reason, self.tolerance)
-        return slopes, {name: getattr(called, name) for name in _FLOWS}
 
     def _traced(self, traced: Trace) -> tuple[Slopes, Members]:
         tape, params = traced.tape, traced.params

@@ -200,14 +200,10 @@ def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
 
 
 def closed_orbit(
-    system: Capabilities,
-    x: Array,
-    section: Section | None = None,
-    farthest: float = np.inf,
-    budget: Budget | None = None,
+    system: Capabilities, x: Array, section: Section | None = None, limit: float = np.inf, budget: Budget | None = None
 ) -> tuple[TangentMap, Array]:
     """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,); an
-    AnalysisError without one. The first return may displace the guess by ``farthest``, relative to the sizes."""
+    AnalysisError without one. The first return may displace the guess by ``limit``, relative to the sizes."""
     size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
     best = np.inf
@@ -225,9 +221,9 @@ def closed_orbit(
             if section is not None:
                 image = tangent_map(system, x, section_at(system, x, size, image.duration))
             return image, size
-        if off > farthest or (rounds > 4 and off > _WORSE * best):
+        if off > limit or (rounds > 4 and off > _WORSE * best):
             break
-        best, farthest = min(best, off), np.inf
+        best, limit = min(best, off), np.inf
         move, slowest = _move(image, residual, size, slowest, float(np.clip(off, _FINE, _COARSE)))
         x = x - size * move
         if not np.isfinite(x).all():

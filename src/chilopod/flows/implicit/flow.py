@@ -45,12 +45,9 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def __post_init__(self) -> None:
         if not can_be_implicit(self.tape):
-            raise ParameterError(
-                "does not support events or switches in the state",
-                field="method",
-                value="implicit",
-                allowed="'taylor', or a right-hand side that is smooth in the state",
-            )
+            allowed = "'taylor', or a right-hand side that is smooth in the state"
+            said = "does not support events or switches in the state"
+            raise ParameterError(said, field="method", value="implicit", allowed=allowed)
         super().__post_init__()
 
     @functools.cached_property

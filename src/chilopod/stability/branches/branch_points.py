@@ -13,7 +13,7 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.spectrum.eigenvalues import stable_within
-from chilopod.stability.symmetry.mirrored import symmetric_states
+from chilopod.stability.symmetry.groups import symmetric_states
 from chilopod.stability.tracing.equations import Before
 
 

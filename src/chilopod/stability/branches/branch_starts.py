@@ -142,11 +142,7 @@ def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
 
 
 def switch(
-    family: Family,
-    point: BifurcationPoint | BranchPoint,
-    *,
-    periods: int | None = None,
-    seconds: float = math.inf,
+    family: Family, point: BifurcationPoint | BranchPoint, *, periods: int | None = None, seconds: float = math.inf
 ) -> tuple[Start, ...]:
     """The starts of the branches that leave a bifurcation point; a ParameterError if none that can be followed does.
 

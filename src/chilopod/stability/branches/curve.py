@@ -39,6 +39,7 @@ _SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, 
 _SHRUNK = 10.0  # motion, relative to the largest so far, that counts as shrunk, in cube roots of the precision
 _NOT_SMALL = 0.5  # modulus of a multiplier that is not small
 _PARTS = 64  # parts of a period at which states on an orbit are sampled
+_SHRINKS = "the orbit shrinks into an equilibrium: a Hopf point"
 _SAME_PERIOD = 1e-3  # relative difference of the periods of the same orbit
 
 
@@ -164,7 +165,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         the precision. ``bounded``: with a bound on the error of the multipliers at its end."""
         last, n, space = anchor.last, anchor.last.orbit.size, anchor.space
         self.steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
-        timed = self._timed(anchor, float(np.linalg.norm(guess.moved)))
+        timed = anchor
+        if anchor.section is not None:  # the duration of a return, extrapolated from those of the last two points
+            longer = 1.0 + min(max(anchor.lengthening * float(np.linalg.norm(guess.moved)), -_SOONER), _LATER)
+            timed = replace(anchor, section=replace(anchor.section, duration=anchor.section.duration * longer))
         count = node_count(guess.matrix[:n, :n] + np.eye(n), np.ones(n)) if space is None else 0
         off, weakest, corrections = self.precision, 0.0, 0
         if count >= _MANY_NODES:
@@ -280,12 +284,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         # A small cycle is smaller than its velocity in any state times its period.
         path = self._path(found.x, found.value, found.image.duration)
         extent = float(np.linalg.norm((path - found.x) / self.units(velocity.size)[:-1], axis=1).max())
-        raise AnalysisError(
-            "the orbit shrinks into an equilibrium: a Hopf point"
-            if extent <= motion
-            else "the motion nearly stops in the section, and the next step has no direction",
-            field="orbit",
-        )
+        said = "the motion nearly stops in the section, and the next step has no direction"
+        raise AnalysisError(_SHRINKS if extent <= motion else said, field="orbit")
 
     def _path(self, x: Array, value: float, duration: float) -> Array:
         """States on an orbit, at even times over some duration, shape (times, n)."""
@@ -335,10 +335,3 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         sizes = self.units(velocity.size)[:-1]
         normal = section.normal * sizes
         return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)
-
-    def _timed(self, anchor: Anchor, ahead: float) -> Anchor:
-        """An anchor with the duration of a return extrapolated from those of the last two points."""
-        if anchor.section is None:
-            return anchor
-        longer = 1.0 + min(max(anchor.lengthening * ahead, -_SOONER), _LATER)
-        return replace(anchor, section=replace(anchor.section, duration=anchor.section.duration * longer))

@@ -92,12 +92,6 @@ class FamilyReturns:
         other = in_parts(system, x, image.duration)
         return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
-    def _parameter_step(self, value: float, steepness: float) -> float:
-        """A small exact change of the parameter that stays within the interval."""
-        step = _PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP)
-        step = max(step, 8.0 * float(np.spacing(abs(value))))
-        return (value + step) - value if value + step <= self.between[1] else (value - step) - value
-
     def by_parameter(self, x: Array, value: float, section: Section | None, mapped: Array | None = None) -> Array:
         """dH/dp at a state, per scale, shape (n,), from H there if it is known.
 
@@ -106,7 +100,8 @@ class FamilyReturns:
         units, steepness = self.units(x.size)[:-1], self.steepness
         mapped = self.mapped(x, value, section) if mapped is None else mapped
         for last in (False, True):
-            step = self._parameter_step(value, steepness)
+            step = max(_PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP), 8.0 * float(np.spacing(abs(value))))
+            step = (value + step) - value if value + step <= self.between[1] else (value - step) - value  # exact
             try:
                 beside = self.mapped(x, value + step, section)
             except AnalysisError:

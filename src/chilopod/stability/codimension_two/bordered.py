@@ -28,7 +28,7 @@ from chilopod.stability.orbits.orbit import from_known, known_state
 from chilopod.stability.problem.arguments import Budget, system_of
 from chilopod.stability.problem.capabilities import SystemLike, given_scale, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
-from chilopod.stability.symmetry.mirrored import symmetric_states
+from chilopod.stability.symmetry.groups import symmetric_states
 from chilopod.stability.tracing.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 

@@ -52,19 +52,10 @@ class Point2(ReadOnlyArrays):
         Values of both parameters, shape (2,).
     error_bound
         Bounds on the errors of both, shape (2,), at right angles to the curve (in units of the box).
-    orbit
-        State on the critical orbit at time 0, shape (n,).
-    mode
-        Unit critical eigenvector, shape (n,), complex for Neimark-Sacker.
-    multiplier
-        Critical multiplier of the return map.
+    orbit, mode, multiplier, frequency, coefficient, coefficient_error
+        As of a :class:`BifurcationPoint`; the coefficient is the quadratic one at a fold or a transcritical point.
     multipliers
-        All multipliers, by falling modulus.
-    frequency
-        Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
-    coefficient, coefficient_error
-        Coefficient of the normal form and its error, for the map of a :class:`BifurcationPoint`: the quadratic one at
-        a fold or a transcritical point, else the cubic one; None if undefined or not computed.
+        All multipliers of the return map, by falling modulus.
     """
 
     values: Array

@@ -26,7 +26,7 @@ from chilopod.stability.normal_forms.normal_form import NormalForm, Quintic, nor
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import spectrum
-from chilopod.stability.symmetry.mirrored import reverses
+from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.tracing.equations import Step
 from chilopod.stability.tracing.tracer import Parts
 from chilopod.stability.unit_circle.spectra import TARGETS, Event

@@ -22,7 +22,7 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import Budget, check_arguments, checked_box, system_of
 from chilopod.stability.problem.capabilities import known_orbit, sizes
 from chilopod.stability.problem.returns import return_duration, whole_period
-from chilopod.stability.symmetry.mirrored import reverses
+from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.tracing.equations import Step
 from chilopod.stability.tracing.tracer import Ending, trace
 
@@ -113,13 +113,8 @@ def follow2(
             before.ending = Ending.CLOSED
         elif outward is None and rising is None:
             before.trace(first.towards(math.copysign(1.0, -ahead)), steps, points)
-    return Curve2(
-        start.kind,
-        (*reversed(before.points), origin.point, *after.points),
-        (before.ending, after.ending),
-        (before.reason, after.reason),
-        periods,
-    )
+    found, endings = (*reversed(before.points), origin.point, *after.points), (before.ending, after.ending)
+    return Curve2(start.kind, found, endings, (before.reason, after.reason), periods)
 
 
 def over_periods(family2: Family2, periods: int) -> Family2:

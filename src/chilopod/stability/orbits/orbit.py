@@ -43,7 +43,7 @@ from chilopod.stability.problem.returns import (
     turned,
 )
 from chilopod.stability.shown import Shown
-from chilopod.stability.symmetry.mirrored import symmetric_states
+from chilopod.stability.symmetry.groups import symmetric_states
 
 _RESTS = 1e-8  # motion, relative to the sizes at the guess, that counts as rest
 _RETURNED = 1e-12  # relative residual of a known orbit that is exact
@@ -194,7 +194,7 @@ def find_large_orbit(system: Capabilities, guess: ArrayLike | None = None) -> tu
     x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
     exact = guess is None and not is_autonomous(system)
     try:
-        image, size = closed_orbit(system, x, farthest=_KNOWN if exact else np.inf)
+        image, size = closed_orbit(system, x, limit=_KNOWN if exact else np.inf)
     except AnalysisError:
         found = searched_orbit(system, guess, with_error=False)
         size = tangent_sizes(system, found.state, found.image.duration)
@@ -239,11 +239,7 @@ def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
 
 
 def from_known(
-    system: SystemLike,
-    x: Array,
-    with_error: bool = True,
-    image: ReturnMap | None = None,
-    budget: Budget | None = None,
+    system: SystemLike, x: Array, with_error: bool = True, image: ReturnMap | None = None, budget: Budget | None = None
 ) -> Orbit:
     """The orbit through the system's own state, corrected if not exact; the return map there may be given."""
     if is_autonomous(system):

@@ -299,11 +299,8 @@ class _Equations:
             motion = self._linear[0, :, -3] * here.duration / frame.sizes
             farthest = _CAREFUL * min(1.0, float(np.linalg.norm(motion)))
         part = min(part, farthest / max(float(np.abs(correction.states / frame.reach).max()), 1e-300))
-        there = Nodes(
-            here.states + part * correction.states,
-            here.duration + part * correction.duration,
-            here.value + part * correction.value,
-        )
+        states, time, value = correction
+        there = Nodes(here.states + part * states, here.duration + part * time, here.value + part * value)
         # The states may just be growing.
         astray, reach = frame.astray and self.residual > _NEAR, frame.reach * (1.0 if frame.astray else _FARTHER)
         try:

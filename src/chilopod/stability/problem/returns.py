@@ -223,23 +223,18 @@ def return_map(system: SystemLike, x: Array, with_error: bool = True, section: S
 
 
 def on_section(
-    system: SystemLike,
-    section: Section | None,
-    state: Array,
-    jacobian: Array,
-    duration: float,
-    error: float | Array = np.nan,
+    system: SystemLike, section: Section | None, state: Array, matrix: Array, time: float, error: float | Array = np.nan
 ) -> ReturnMap:
     """The return map from a return, to a section if given, and its derivative; ``error`` bounds that of the flow."""
-    check_finite(state, jacobian)
+    check_finite(state, matrix)
     count = returns_per_period(system)
-    image = ReturnMap(state, jacobian, error, count, count * duration)
+    image = ReturnMap(state, matrix, error, count, count * time)
     turned_across = None if system.symmetry is None else np.abs(system.symmetry)
     if section is not None and is_autonomous(system):
         image = replace(image, velocity=_velocity(system, state), normal=section.normal)
         across = np.abs(image.across)
         turned_across = across if turned_across is None else across @ turned_across
-        image = replace(image, jacobian=image.across @ jacobian)
+        image = replace(image, jacobian=image.across @ matrix)
     if turned_across is None:
         return image
     error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())

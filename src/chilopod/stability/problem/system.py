@@ -35,11 +35,9 @@ class PeriodicSystem(ReadOnlyArrays):
 
     Parameters
     ----------
-    dimension
-        Number of states n.
-    period
-        Positive period T; None if the system does not depend on time and the period belongs to the orbit:
-        ``velocity`` and ``guess_period`` are then needed.
+    dimension, period
+        Number of states n, and period T > 0; None if the system does not depend on time and the period belongs to the
+        orbit: ``velocity`` and ``guess_period`` are then needed.
     flow
         Function ``flow(x, t0, t1) -> (x1, dx1/dx)``.
     symmetry
@@ -214,15 +212,10 @@ def from_rhs(
     length = positive("guess_period" if autonomous else "period", guess_period if autonomous else period)
     given = RightHandSide(rhs, dimension, length, autonomous, args, events, switch_times, orbit, method, tolerance)
     slopes, members = given.flows()
-    members |= {"scale": scale, "symmetry": symmetry, "spatial_symmetry": spatial_symmetry}
-    system = PeriodicSystem(
-        dimension=given.dimension,
-        period=None if autonomous else length,
-        velocity=(lambda x: slopes(np.zeros(1), x[:, None])[:, 0]) if autonomous else None,
-        guess_period=length if autonomous else None,
-        orbit=given.start,
-        **members,
-    )
+    members |= {"scale": scale, "symmetry": symmetry, "spatial_symmetry": spatial_symmetry, "orbit": given.start}
+    if autonomous:
+        members |= {"velocity": lambda x: slopes(np.zeros(1), x[:, None])[:, 0], "guess_period": length}
+    system = PeriodicSystem(given.dimension, None if autonomous else length, **members)
     if not autonomous:
         check_symmetry("period", np.eye(given.dimension), length, slopes, _TIMES * length, given.base, np.inf)
     if not given.events:  # a symmetry would also have to hold for these

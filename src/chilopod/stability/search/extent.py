@@ -113,11 +113,9 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
         budget = Budget(_FLOWS * samples.orbits, samples.budget.remaining)
         fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising, budget)
         # Close to it a step may land on another curve with another fold.
-        if (
-            fold is not None
-            and _next_to(samples, sample, fold, rising)
-            and _comes_as_a_root(samples, sample, fold, rising)
-        ):
+        if fold is None or not _next_to(samples, sample, fold, rising):
+            continue
+        if _comes_as_a_root(samples, sample, fold, rising):
             return fold
     return None
 

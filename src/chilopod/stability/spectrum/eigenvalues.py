@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
@@ -36,13 +35,6 @@ def stable_within(values: ComplexArray, bound: float, bounds: Array | float | No
     if (modulus < 1.0 - bound).all():
         return True
     return False if (modulus > 1.0 + (bound if bounds is None else bounds)).any() else None
-
-
-def falling_order(values: ComplexArray) -> NDArray[np.intp]:
-    """Order by falling modulus within round-off; the two of a pair stand together, positive frequency first."""
-    modulus = np.abs(values)
-    relative = np.round(modulus / max(float(modulus.max()), 1e-300), 12)
-    return np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -relative))
 
 
 def disturbed(matrix: Array, error: Array, draws: int = DRAWS) -> Array:
@@ -84,7 +76,9 @@ def eigensystem(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray
     """Eigenvalues by falling modulus, unit right eigenvectors as columns, and left ones with left[:, i]^H right[:, i] =
     1; these are infinite for a defective matrix, whose conditions give no bound."""
     values, right = np.linalg.eig(matrix)
-    order = falling_order(values)
+    relative = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
+    # The two of a pair stand together, positive frequency first.
+    order = np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -relative))
     values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
     try:
         return values, right, np.linalg.inv(right).conj().T

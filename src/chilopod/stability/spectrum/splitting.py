@@ -167,11 +167,8 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
         vectors.append(bases[0] @ columns)
     log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
     order = np.argsort(-log_all.real, kind="stable")
-    return (
-        log_all[order],
-        vec_all[:, order],
-        _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, logarithms)[order],
-    )
+    moved = _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, logarithms)
+    return log_all[order], vec_all[:, order], moved[order]
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:

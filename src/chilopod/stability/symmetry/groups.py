@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,8 @@ from scipy.sparse.csgraph import connected_components
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.balance import numerical_balance
-from chilopod.frozen import Array, ReadOnlyArrays, read_only
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, read_only
+from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 
 _PROBES = 3  # probe vectors: a single one may by chance lie close to a mirror plane
 _SAME = 1e-7  # two elements of a cyclic group of ten thousand are 6e-4 apart; round-off of as many products is 1e-11
@@ -31,6 +32,7 @@ _MIXED = 1e-11  # least entry, relative to elements of order one, that mixes two
 _CHANCE = 1e-12  # entry that is round-off, relative to the coupling of two coordinates through a third
 _LEVELLED = 0.125  # exponent that makes a weight of 1e-17 one of 0.7 %
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
+_LOOSE = 1e-6  # largest residual of a symmetry of a state or a mode, relative to the size of the states
 _INFINITE = "generate an infinite group, or too large a one"
 
 
@@ -245,3 +247,26 @@ def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Arr
                         return None
                     elements.append(product)
     return needed if len(needed) else generators[:1], np.array(elements)
+
+
+def symmetric_states(system: SystemLike, state: Array, size: Array, near: float = _LOOSE) -> Array:
+    """Orthonormal basis, in units of the sizes, of states with the symmetries of one: changed by ``near`` at most."""
+    n, generators = size.size, spatial_symmetries(system)
+    elements = _elements(np.stack(generators).tobytes(), n) if generators else np.empty((0, n, n))
+    kept = (np.abs(elements @ state - state) <= near * size).all(axis=1)
+    _, values, right = np.linalg.svd((elements[kept] * size / size[:, None] - np.eye(n)).reshape(-1, n))
+    return np.asarray(right[int((values > _LOOSE).sum()) :].T)
+
+
+@lru_cache(maxsize=8)
+def _elements(generators: bytes, n: int) -> Array:
+    """Elements of the group of some generators, shape (order, n, n)."""
+    return finite_group(np.frombuffer(generators).reshape(-1, n, n)).elements
+
+
+def reverses(system: SystemLike, mode: ComplexArray, size: Array) -> bool:
+    """True if a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
+    own = np.abs(mode / size).max()
+    return any(
+        bool((np.abs(matrix @ mode + mode) / size).max() <= _LOOSE * own) for matrix in spatial_symmetries(system)
+    )

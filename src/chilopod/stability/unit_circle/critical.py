@@ -34,19 +34,14 @@ class Root(NamedTuple):
 
 
 def rooted(
-    spectra: Spectra,
-    function: Callable[[float], float],
-    low: float,
-    high: float,
-    event: Event | None,
-    within: float = 0.0,
+    spectra: Spectra, function: Callable[[float], float], a: float, b: float, event: Event | None, within: float = 0.0
 ) -> Root:
     """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
     most = min(200, max(spectra.left, 1))
     finest = max(within, 5e-324)
-    place = float(brentq(function, low, high, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
+    place = float(brentq(function, a, b, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
     reach = within + 4.0 * _EPSILON * abs(place)
-    return Root(place, max(place - reach, low), min(place + reach, high), event, known=(low, high))
+    return Root(place, max(place - reach, a), min(place + reach, b), event, known=(a, b))
 
 
 @dataclass(frozen=True)
