@@ -25,7 +25,7 @@ SECONDS: Final = {
     "undulation": (12, 12),
     "turning": (5, 3),
     "robot-movies": (50, 25),
-    "robot-walks": (200, 50),
+    "robot-walks": (200, 27),
     "robot-turning": (36, 16),
     "identification": (40, 14),
     "robot-spread": (180, 60),

@@ -81,7 +81,7 @@ def test_nothing_of_the_page_is_missing_or_empty(tiny):
         elif not address.startswith("data:"):
             assert (tiny.folder / address).stat().st_size > 100, address
     assert re.findall(r"<(?:td|th|p|h\d|figcaption|li|dd)\b[^>]*>\s*</", html) == []
-    assert re.findall(r"\bnan\b|\binf\b|None", page.text) == []
+    assert re.findall(r"\bnan\b|\binf\b|None|\b[A-Z]\w+\(\w+=", page.text) == []
 
 
 @pytest.mark.parametrize("name", REPLAYS)

@@ -73,10 +73,10 @@ def walks(study: CurvedStudy) -> Panel:
             "The open diamonds in D are the two radii that the paper prints of its robot, placed by their springs' "
             "share of the robot's own critical one. They are the robot's, not the model's: the model bends "
             f"{listing(tighter)} times as tightly there.",
-            "The paper sees its trials scatter more as the spring gets softer. Here that is "
-            f"{wider} at {number(softest, 2)} than at {spring(stiffest)}: uneven feet leave a straight walk straight "
-            "and only move the critical spring of a trial a little, and the bend depends on that most where it rises "
-            "steeply, beside the critical spring.",
+            "The paper sees its trials scatter more as the spring gets softer. Here the scatter at "
+            f"{number(softest, 2)}, beside that at {spring(stiffest)}, is {wider}: uneven feet leave a straight walk "
+            "straight and only move the critical spring of a trial a little, and the bend depends on that most where "
+            "it rises steeply, beside the critical spring.",
         )
         if here.any()
         else ("No trial ended in a curve.",),

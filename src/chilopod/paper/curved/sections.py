@@ -72,8 +72,7 @@ def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
     curving = here.any(axis=1)
     angles = np.where(here, np.abs(trials.mean_angle.sel(joint=1).values), np.nan)
     rising = increases(list(angles[curving & np.isfinite(angles).any(axis=1)])[::-1])
-    spreads, softest, stiffest = fluctuation(trials)
-    wider = spreads.above().words()
+    wider, softest, stiffest = fluctuation(trials)
     curved = f"curved up to {max(springs[curving]):g} N*mm/deg, {left} to the left and {right} to the right"
     words = [
         OfPlanar(statements.STRAIGHT, Result(f"straight from {min(springs[~curving]):g} N*mm/deg up")),

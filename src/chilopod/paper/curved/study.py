@@ -21,7 +21,7 @@ from chilopod.paper.measures import example_walks
 from chilopod.paper.section import Context
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.statistics import Estimate, means, spread_difference
+from chilopod.statistics import means, spread_difference
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
 
@@ -93,12 +93,13 @@ def bend_order(trials: xr.Dataset) -> tuple[int, ...]:
     return tuple(int(joint) + 1 for joint in np.argsort(-angles))
 
 
-def fluctuation(trials: xr.Dataset) -> tuple[Estimate, float, float]:
-    """Ratio of the scatter of joint 1 among trials at the softest spring to that at the stiffest spring that curves,
+def fluctuation(trials: xr.Dataset) -> tuple[str, float, float]:
+    """Scatter of joint 1 among trials at the softest spring beside that at the stiffest spring that curves, in words,
     and these springs, N*mm/deg."""
     curved = trials.isel(spring=is_curved(trials).any(axis=1))
     angles = np.where(is_curved(curved), np.abs(curved.mean_angle.sel(joint=1).values), np.nan)
-    return spread_difference(angles[0], angles[-1]), float(curved.spring[0]), float(curved.spring[-1])
+    wider = spread_difference(angles[0], angles[-1]).above().words()
+    return wider, float(curved.spring[0]), float(curved.spring[-1])
 
 
 def fitted(trials: xr.Dataset, joint: int = 1) -> SquareRootFit:

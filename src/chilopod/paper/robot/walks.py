@@ -68,10 +68,11 @@ class RobotWalks:
 
 
 def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
-    """All walks of the paper by the whole robot; if quick, those of the base series only."""
+    """All walks of the paper by the whole robot; if quick, half of those of the base series only."""
     robot, folder, size = context.whole, context.folder, context.size
     quick = size is Size.QUICK
-    repeats, fewer, fewest = size.cut((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (1, 1, 1))
+    usual = VARIANT_REPEATS if quick else REPEATS
+    repeats, fewer, fewest = size.cut((usual, VARIANT_REPEATS, UNIFORM_REPEATS), (1, 1, 1))
     springs, uniform_springs = size.cut((VARIANT_SPRINGS, UNIFORM_SPRINGS), (VARIANT_SPRINGS[1::4], (8.7, 13.0)))
     duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (12.0, 8.0))
     share = part(progress, 0.0, 1.0 if quick else 0.31, "as built")
