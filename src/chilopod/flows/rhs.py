@@ -11,15 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
-from chilopod.flows.arguments import (
-    LARGEST,
-    Slopes,
-    check_shape,
-    check_timeless,
-    checked_count,
-    finite_array,
-    sampled,
-)
+from chilopod.flows.arguments import LARGEST, Slopes, check_shape, check_timeless, checked_count, finite_array, sampled
 from chilopod.flows.called import CalledFlow
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.events import Event, check_events, checked_events

@@ -21,14 +21,7 @@ from chilopod.stability.orbits.orbit import Orbit, near_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.problem.arguments import UserCode, check_system, system_of
-from chilopod.stability.problem.capabilities import (
-    Autonomous,
-    Family,
-    SystemLike,
-    given_scale,
-    is_autonomous,
-    offers,
-)
+from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, given_scale, is_autonomous, offers
 from chilopod.stability.problem.returns import section_at
 from chilopod.stability.spectrum.eigenvalues import SAFETY, disturbed, eigenvalue_errors, phased
 
@@ -53,16 +46,12 @@ class Equilibrium(ReadOnlyArrays):
 
     Attributes
     ----------
-    state
-        State, shape (n,).
-    error
-        Bound on the error of the state, shape (n,); infinite where the derivative is singular.
+    state, error
+        State, and bound on its error, which is infinite where the derivative is singular, shape (n,) both.
     jacobian
         Derivative of the right-hand side there, shape (n, n).
-    eigenvalues
-        Eigenvalues of the derivative, by falling real part, shape (n,), in 1/s.
-    error_bounds
-        Bound on the error of each eigenvalue, shape (n,).
+    eigenvalues, error_bounds
+        Eigenvalues of the derivative, by falling real part, in 1/s, and bounds on their errors, shape (n,) both.
     """
 
     state: Array

@@ -53,10 +53,8 @@ class Multipliers(Result, ReadOnlyArrays):
         Bound on the absolute error of every multiplier of modulus above 1e-6.
     error_bounds
         Bounds on the absolute errors of all, in the shape of ``values``; invalid for those below 1e-6.
-    orbit
-        State on the orbit at time 0.
-    period
-        Period of the orbit.
+    orbit, period
+        State on the orbit at time 0, and its period.
     remarks
         Remarks, a sentence each, such as a note on leading multipliers.
     """

@@ -52,22 +52,7 @@ class Criticality(Labelled):
 WITHOUT_CRITICALITY = (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT, Kind.COLLISION, Kind.KREIN_COLLISION)
 """Kinds of points without a decisive cubic coefficient."""
 
-_CLEAR = 3.0  # least quadratic coefficient, relative to its error, of a transcritical point
 _REAL = 1e-9  # largest imaginary part of a mode that is shown as real
-_NEGLIGIBLE = 0.3  # largest negligible error of the quadratic term, relative to the cubic one as sampled
-
-
-def kind_at_plus_one(form: NormalForm) -> Kind:
-    """Kind at a real multiplier +1 if the orbit continues: transcritical with a significant quadratic term, pitchfork
-    without one but with a cubic one, branch point if the errors leave that open."""
-    if form.status is not NormalFormStatus.FOUND:
-        return Kind.BRANCH_POINT
-    if abs(form.quadratic) > _CLEAR * form.quadratic_error:
-        return Kind.TRANSCRITICAL
-    cubic = abs(form.cubic) * form.amplitude
-    if abs(form.cubic) > form.cubic_error and form.quadratic_error <= _NEGLIGIBLE * cubic:
-        return Kind.PITCHFORK
-    return Kind.BRANCH_POINT
 
 
 def criticality(form: NormalForm) -> Criticality:
@@ -87,10 +72,8 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     ----------
     kind
         Kind of the point.
-    value
-        Value of the parameter.
-    error_bound
-        Bound on the error of ``value``: that of the critical multiplier over its rate of change, and the root finder's.
+    value, error_bound
+        Value of the parameter, and a bound on its error: that of the critical multiplier over its rate of change.
     orbit
         State on the critical orbit at time 0, or the equilibrium, shape (n,).
     mode

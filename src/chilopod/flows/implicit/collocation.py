@@ -303,16 +303,9 @@ def _take(x: Any, step: Any, last: Any, result: Any) -> None:
 @fused_njit(error_model="numpy")
 def _room(n: int, s: int) -> Any:
     """An empty step of s stages of n states."""
-    return Step(
-        np.empty(n),
-        np.empty((n, n)),
-        np.zeros((s, n)),
-        np.empty((s, n)),
-        np.empty((s, n, n)),
-        np.empty((s * n, s * n)),
-        np.empty((s * n, n)),
-        np.empty((s, n, n)),
-    )
+    jacobians, reached = np.empty((s, n, n)), np.empty((s, n, n))
+    matrix, columns = np.empty((s * n, s * n)), np.empty((s * n, n))
+    return Step(np.empty(n), np.empty((n, n)), np.zeros((s, n)), np.empty((s, n)), jacobians, matrix, columns, reached)
 
 
 @fused_njit(error_model="numpy", nogil=True)

@@ -1,8 +1,7 @@
 """Dependencies of a Python function besides its arguments: sorted by kind, and replaced by traced versions.
 
 The floats among a function's arguments, defaults, closure and globals become parameters of the tape; whole numbers,
-strings and the code itself are part of the tape's cache key. So a family of lambdas over a parameter is traced once,
-and a changed global gives a new tape.
+strings and the code itself are part of its cache key: a family of lambdas is traced once, a changed global anew.
 """
 
 from __future__ import annotations

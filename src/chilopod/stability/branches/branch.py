@@ -65,16 +65,12 @@ class Branch(Result):
     ----------
     points
         Points along the curve, special points included.
-    ending
-        Reason for its end.
+    ending, reason
+        Reason for its end, and details if the curve was lost, else empty.
     step
         Next step along the curve.
-    periods
-        Number of the systems' periods in one period of its orbits.
-    symmetric
-        True if its orbits have the systems' symmetry in time.
-    reason
-        Reason for the loss of the curve; empty if it was not lost.
+    periods, symmetric
+        Number of the systems' periods in one period of its orbits; True if these have the systems' symmetry in time.
     remarks
         Sentences on events that remained undecided.
     """

@@ -10,10 +10,10 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.problem.capabilities import SystemLike
 from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.spectrum.eigenvalues import stable_within
-from chilopod.stability.symmetry.groups import symmetric_states
+from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.tracing.equations import Before
 
 
@@ -23,24 +23,20 @@ class BranchPoint(ReadOnlyArrays):
 
     Attributes
     ----------
-    value
-        Value of the parameter.
-    orbit
-        State at time 0, shape (n,).
+    value, orbit
+        Value of the parameter, and state at time 0, shape (n,).
     multipliers
         Multipliers of the full period, by falling modulus, shape (n,), or (n-1,) for a system without a period.
     tangent
         Unit tangent of the curve, shape (n+1,): state, then parameter, in ``units``.
     units
         Sizes of the states and scale of the parameter, the units of the tangent, shape (n+1,).
-    special
-        Kind of the bifurcation here; None at ordinary points.
+    special, bifurcation
+        Kind of the bifurcation here, and its point with bound, mode, multiplier and normal form; None at ordinary ones.
     period
         Full period of the orbit; None if not computed.
     error_bound
         Bound on the absolute error of the multipliers that are not small (below 0.5, and below the largest).
-    bifurcation
-        Bifurcation point with bound, mode, multiplier and normal form; None at ordinary points.
     periods
         Number of the systems' periods in one period of the orbit.
     """
@@ -116,11 +112,9 @@ def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array 
     In this space the branch is regular where symmetry-breaking branches leave it (Golubitsky, Stewart & Schaeffer,
     *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
     """
-    if system.symmetry is not None or not spatial_symmetries(system):
-        return None
     x = state if mode is None else state + sizes * mode / np.linalg.norm(mode)
-    basis = symmetric_states(system, x, sizes)
-    return basis @ basis.T if basis.shape[1] < x.size else None
+    basis = symmetric_basis(system, x, sizes)
+    return None if basis is None else basis @ basis.T
 
 
 def within_space(space: Array | None, matrix: Array) -> Array:

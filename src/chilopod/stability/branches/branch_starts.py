@@ -24,7 +24,7 @@ from chilopod.stability.problem.capabilities import (
     SystemLike,
     given_scale,
     is_autonomous,
-    known_orbit,
+    offers,
     returns_per_period,
     sizes,
 )
@@ -64,10 +64,8 @@ class Start(ReadOnlyArrays):
         True if the leaving branch also has a component along the parameter (transcritical).
     old
         Tangent of the old branch, shape (n+1,), in the states' and the parameter's own units, if known.
-    periods
-        Number of the systems' periods in one period of its orbits.
-    period
-        Full period of the old orbit, if the system does not depend on time.
+    periods, period
+        Number of the systems' periods in one period of its orbits, and period of the old orbit of one without its own.
     bifurcation
         Bifurcation point of the start, if any.
     outward
@@ -352,7 +350,7 @@ def _old_tangent(curve: Curve, start: Start, units: Array) -> Array:
     if start.old is not None:
         old = start.old / units
         return np.asarray(old / np.linalg.norm(old))
-    if known_orbit(curve.system(start.value)) is None:
+    if not offers(curve.system(start.value), "orbit"):
         return np.eye(units.size)[-1]
     beside = np.clip(start.value + _BESIDE * curve.scale * np.array([-1.0, 1.0]), *curve.between).tolist()
     low, high = (np.append(known_state(curve.system(value)), value) / units for value in beside)

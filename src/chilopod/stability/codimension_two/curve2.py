@@ -99,10 +99,8 @@ class Curve2(Result):
         Kind of the bifurcation along it.
     points
         Points in order, those of codimension two included.
-    endings
-        Reasons for the end at its first point and at its last.
-    reasons
-        Details of a lost curve, else empty: one for each end.
+    endings, reasons
+        Reasons for the end at its first point and at its last, and details of a lost curve there, else empty.
     periods
         Number of the systems' periods in one period of its orbits.
     """

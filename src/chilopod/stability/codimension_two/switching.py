@@ -21,7 +21,7 @@ from chilopod.stability.codimension_two.two_parameters import BUDGET, over_perio
 from chilopod.stability.normal_forms.center_manifold import displacements
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import Budget, check_arguments, checked_box, system_of
-from chilopod.stability.problem.capabilities import known_orbit
+from chilopod.stability.problem.capabilities import offers
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
 _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
@@ -88,7 +88,7 @@ class _Unfolding:
         system = system_of(family2, *point.values.tolist())
         targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
         target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
-        self._equations = curve = CriticalCurve(family2, target, known_orbit(system) is not None, box, budget)
+        self._equations = curve = CriticalCurve(family2, target, offers(system, "orbit"), box, budget)
         # For a point on the edge of the box the other side is used.
         curve.box = box + 2.0 * _FARTHEST * curve.widths[:, None] * [-1.0, 1.0]
         self.spot = spot = curve.begin(Place(point.orbit, point.values, 0.0))

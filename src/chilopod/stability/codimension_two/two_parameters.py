@@ -20,7 +20,7 @@ from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Po
 from chilopod.stability.codimension_two.detection import Detector, Station
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import Budget, check_arguments, checked_box, system_of
-from chilopod.stability.problem.capabilities import known_orbit, sizes
+from chilopod.stability.problem.capabilities import offers, sizes
 from chilopod.stability.problem.returns import return_duration, whole_period
 from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.tracing.equations import Step
@@ -130,7 +130,7 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     if start.kind in (Kind.KREIN_COLLISION, Kind.HOPF):
         said, allowed = f"is of the kind {start.kind.label}, which is not followed", "a point of another kind"
         raise ParameterError(said, field="start", value=start.value, allowed=allowed)
-    known = known_orbit(system) is not None and start.kind is not Kind.FOLD
+    known = offers(system, "orbit") and start.kind is not Kind.FOLD
     if start.kind is Kind.NEIMARK_SACKER:
         return 0, known
     target = 1 if start.multiplier.real > 0.0 else -1

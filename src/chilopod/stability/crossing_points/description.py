@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import SpentError
@@ -17,14 +16,7 @@ from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits.orbit import Orbit
-from chilopod.stability.points import (
-    WITHOUT_CRITICALITY,
-    BifurcationPoint,
-    Criticality,
-    Kind,
-    kind_at_plus_one,
-    with_coefficients,
-)
+from chilopod.stability.points import WITHOUT_CRITICALITY, BifurcationPoint, Criticality, Kind, with_coefficients
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, sizes
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
@@ -39,6 +31,8 @@ _SETTLED = 1e-7  # change of the mean from half as many parts; its error is abou
 
 _ASIDE, _ROUNDS = 0.05, 20  # distance of a second orbit, in sizes of the states, and number of its corrections
 _CRITICAL = 1e-6  # distance from one of a critical multiplier, and relative singular value of its direction
+_CLEAR = 3.0  # least quadratic coefficient, relative to its error, of a transcritical point
+_NEGLIGIBLE = 0.3  # largest negligible error of the quadratic term, relative to the cubic one as sampled
 _VANISHES = 1e-9  # residual, relative to the distance, that counts as zero
 
 
@@ -101,7 +95,7 @@ def described(
     period = orbit.period
     point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, period=period, **about)
     if not simple:
-        return replace(point, modes=_modes(spec, critical, crossing.event, orbit, block, symmetry))
+        return replace(point, modes=_modes(spec, crossing, orbit, block, symmetry))
     return with_coefficients(point, form) if form is not None and with_normal_form else point
 
 
@@ -185,17 +179,13 @@ def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: Sym
 
 
 def _modes(
-    spec: Spectrum,
-    critical: NDArray[np.intp],
-    event: Event,
-    orbit: Orbit,
-    block: Block | None,
-    symmetry: SymmetricCrossing | None,
+    spec: Spectrum, crossing: Crossing, orbit: Orbit, block: Block | None, symmetry: SymmetricCrossing | None
 ) -> ComplexArray:
     """Modes of several critical multipliers: along axial branches, if any; real ones are an orthonormal basis."""
+    critical = critical_multipliers(spec, crossing)
     if block is None or symmetry is None or not symmetry.branches or critical.size > 2 * block.dimension:
         vectors = spec.right[:, critical]
-        if event is Event.PAIR:
+        if crossing.event is Event.PAIR:
             return vectors
         real = np.linalg.svd(np.hstack([vectors.real, vectors.imag]))[0][:, : critical.size]
         return real.astype(np.complex128)
@@ -203,3 +193,16 @@ def _modes(
     eigenvector = vectors[:, np.abs(values - spec.values[critical[0]]).argmin()]
     modes = phased(np.stack([block.mode(eigenvector, branch.direction) for branch in symmetry.branches], axis=1))
     return np.asarray(modes / np.linalg.norm(modes, axis=0))
+
+
+def kind_at_plus_one(form: NormalForm) -> Kind:
+    """Kind at a real multiplier +1 if the orbit continues: transcritical with a significant quadratic term, pitchfork
+    without one but with a cubic one, branch point if the errors leave that open."""
+    if form.status is not NormalFormStatus.FOUND:
+        return Kind.BRANCH_POINT
+    if abs(form.quadratic) > _CLEAR * form.quadratic_error:
+        return Kind.TRANSCRITICAL
+    cubic = abs(form.cubic) * form.amplitude
+    if abs(form.cubic) > form.cubic_error and form.quadratic_error <= _NEGLIGIBLE * cubic:
+        return Kind.PITCHFORK
+    return Kind.BRANCH_POINT

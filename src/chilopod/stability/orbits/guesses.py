@@ -65,32 +65,21 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
 
 
 def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
-    """Further starts after Newton's method has failed at a guessed state, each with a flag for careful steps. The first
-    is the guess itself if the period belongs to the orbit, since an orbit with a strongly stable direction is reached
-    from a section only by guesses on its stable manifold."""
-    if is_autonomous(system):
-        yield Nodes(x[None], return_duration(system)), True
-    for start in (_magnified, _onward, _settled):
-        for nodes in start(system, x):
-            yield nodes, False
-
-
-def _magnified(system: SystemLike, x: Array) -> Iterator[Nodes]:
-    """Several nodes on the motion from a state, where a return magnifies deviations too much for one."""
+    """Further starts after Newton's method has failed at a guessed state, each with a flag for careful steps."""
     duration = return_duration(system)
+    if is_autonomous(system):
+        # An orbit with a strongly stable direction is reached from a section only by guesses on its stable manifold.
+        yield Nodes(x[None], duration), True
     with contextlib.suppress(AnalysisError, np.linalg.LinAlgError):
         count = node_count(checked_flow(system, x, 0.0, duration)[1], sizes(system, x, duration))
-        if count >= _FEWEST_NODES:
-            yield nodes_along(system, x, duration, count)
-
-
-def _onward(system: SystemLike, x: Array) -> Iterator[Nodes]:
-    """A state further along the motion, if every state may be time 0: the guess may lie at an event, such as an impact,
-    and round-off decides whether a motion that ends there is before or after it."""
+        if count >= _FEWEST_NODES:  # a return magnifies deviations too much for one
+            yield nodes_along(system, x, duration, count), False
     if is_autonomous(system):
-        duration = return_duration(system)
+        # At an event, such as an impact, round-off decides whether a motion that ends there is before or after it.
         with contextlib.suppress(AnalysisError):
-            yield Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration)
+            yield Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration), False
+    for nodes in _settled(system, x):
+        yield nodes, False
 
 
 def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:

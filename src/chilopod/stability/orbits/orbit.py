@@ -25,10 +25,8 @@ from chilopod.stability.problem.capabilities import (
     given_scale,
     is_autonomous,
     is_stiff,
-    known_orbit,
     offers,
     sizes,
-    spatial_symmetries,
 )
 from chilopod.stability.problem.returns import (
     REPEATED,
@@ -43,7 +41,7 @@ from chilopod.stability.problem.returns import (
     turned,
 )
 from chilopod.stability.shown import Shown
-from chilopod.stability.symmetry.groups import symmetric_states
+from chilopod.stability.symmetry.groups import symmetric_basis
 
 _RESTS = 1e-8  # motion, relative to the sizes at the guess, that counts as rest
 _RETURNED = 1e-12  # relative residual of a known orbit that is exact
@@ -102,7 +100,7 @@ class Orbit(Shown, ReadOnlyArrays):
 
 def known_state(system: SystemLike) -> Array:
     """The system's own state on its orbit; an AnalysisError if it has none."""
-    orbit = known_orbit(system)
+    orbit = getattr(system, "orbit", None)
     if orbit is None:
         said = "this system has no known periodic orbit"
         raise AnalysisError(said, field="orbit", allowed="a first guess of the orbit")
@@ -276,33 +274,21 @@ def near_orbit(
     """The orbit near some nodes, the first on the section: by default across the motion there. The section across the
     orbit is at right angles in ``units`` of the states, shape (n,), by default their sizes."""
     x, duration = start.states[0], start.duration
-    size = sizes(system, x, duration)
+    size, end, closed = sizes(system, x, duration), None, None
     section = section or section_at(system, x, size, duration)
     if system.dimension >= LARGE and offers(system, "flow_tangents") and len(start.states) == 1:
         with contextlib.suppress(AnalysisError):
-            closed, _ = closed_orbit(system, x, section, budget=budget)
-            return _found(system, closed.point, closed.duration, size, with_error)
-    if len(start.states) > 1:  # all nodes give better sizes than the first one
-        largest = np.abs(start.states).max(axis=0)
-        size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
-    shared = _shared(system, x, size)
-    found = shot(lambda _: system, start, size, section, None, shared, budget, careful)
-    end = found.end, found.jacobian
-    return _found(system, found.nodes.states[0], found.nodes.duration, found.sizes, with_error, end, units)
-
-
-def _found(
-    system: SystemLike,
-    x: Array,
-    duration: float,
-    size: Array,
-    with_error: bool,
-    end: tuple[Array, Array] | None = None,
-    units: Array | None = None,
-) -> Orbit:
-    """The orbit through a state on it, with the section across its own motion; ``size`` belongs to the states, and
-    ``units`` to the section. The end of a return there may be given, with its derivative without the change of the
-    time."""
+            closed = closed_orbit(system, x, section, budget=budget)[0]
+            x, duration, units = closed.point, closed.duration, None
+    if closed is None:
+        if len(start.states) > 1:  # all nodes give better sizes than the first one
+            largest = np.abs(start.states).max(axis=0)
+            size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
+        # In the space of the orbit's symmetries H - 1 is regular also where a symmetry-breaking mode is critical.
+        basis = symmetric_basis(system, x, size, _SYMMETRIC)
+        shared = None if basis is None else size[:, None] * basis
+        found = shot(lambda _: system, start, size, section, None, shared, budget, careful)
+        x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
@@ -313,23 +299,12 @@ def _found(
     return Orbit(x, image, np.full(x.size, np.nan))
 
 
-def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
-    """Basis of the states with the spatial symmetries of a state, shape (n, k); None if it has none.
-
-    In this space H - 1 is regular also where a symmetry-breaking mode is critical.
-    """
-    if system.symmetry is not None or not spatial_symmetries(system):
-        return None
-    basis = symmetric_states(system, x, size, _SYMMETRIC)
-    return size[:, None] * basis if basis.shape[1] < x.size else None
-
-
 def bounded(system: SystemLike, x: Array, duration: float, error: Array | None = None) -> Orbit:
     """The orbit through a state on it, shape (n,), with the section across its motion and with error bounds, by the
     approximate ``duration`` of a return; ``error`` is a bound on the state's error, shape (n,), if known."""
     size = sizes(system, x, duration)
-    shared, given = _shared(system, x, size), x
-    basis = np.eye(x.size) if shared is None else shared / size[:, None]
+    shared, given = symmetric_basis(system, x, size, _SYMMETRIC), x
+    basis = np.eye(x.size) if shared is None else shared
     x = size * (basis @ (basis.T @ (x / size))) if shared is not None else x
     section = section_at(system, x, size, duration)
     image = return_map(system, x, True, section)

@@ -144,11 +144,6 @@ def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error:
     return state, derivative, error if error.ndim else float(error)
 
 
-def known_orbit(system: SystemLike) -> Array | None:
-    """The system's own state on its orbit or None."""
-    return getattr(system, "orbit", None)
-
-
 def given_scale(system: SystemLike) -> Array | None:
     """The system's own sizes of its states or None."""
     return getattr(system, "scale", None)

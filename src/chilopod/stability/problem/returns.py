@@ -70,10 +70,8 @@ class Section(ReadOnlyArrays):
 
     Attributes
     ----------
-    point
-        State on the section, shape (n,).
-    normal
-        Normal vector, with normal . (x - point) = 0 on the section, shape (n,).
+    point, normal
+        State on the section, and normal vector, with normal . (x - point) = 0 on the section, shape (n,) both.
     duration
         Approximate duration of a return.
     """
@@ -89,20 +87,14 @@ class ReturnMap(ReadOnlyArrays):
 
     Attributes
     ----------
-    state
-        H(x), shape (n,).
-    jacobian
-        dH/dx, shape (n, n).
+    state, jacobian
+        H(x), shape (n,), and dH/dx, shape (n, n).
     error
         Bound on the error of every entry of ``jacobian``, shape (n, n), or of all; NaN if not computed.
-    returns
-        Number of returns in the full period.
-    period
-        Full period.
-    velocity
-        Velocity dx/dt at H(x), shape (n,), if the system does not depend on time; else None.
-    normal
-        Normal of the section, likewise.
+    returns, period
+        Number of returns in the full period, and that period.
+    velocity, normal
+        dx/dt at H(x), and normal of the section, shape (n,) both, if the system does not depend on time; else None.
     """
 
     state: Array

@@ -145,15 +145,13 @@ def _comes_as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, r
 
 def _at_rest(samples: Samples, value: float, state: Array, period: float) -> bool:
     """True if the motion nearly vanishes at the end of an orbit: past a fold there the same orbit comes again."""
-    if samples.family.timed:
-        return False
-    first = _moved(samples, samples.low, samples.first.state, samples.first.period)
-    return _moved(samples, value, state, period) < _AT_REST * first
 
+    def moved(value: float, state: Array, period: float) -> float:
+        """Extent of the motion within a return, relative to the sizes of the states."""
+        system, path = samples.family(value), [state]
+        for _ in range(_PARTS - 1):
+            path.append(system.flow(path[-1], 0.0, period / returns_per_period(system) / _PARTS)[0])
+        return float((np.ptp(np.array(path), axis=0) / samples.size).max())
 
-def _moved(samples: Samples, value: float, state: Array, period: float) -> float:
-    """Extent of the motion within a return, relative to the sizes of the states."""
-    system, path = samples.family(value), [state]
-    for _ in range(_PARTS - 1):
-        path.append(system.flow(path[-1], 0.0, period / returns_per_period(system) / _PARTS)[0])
-    return float((np.ptp(np.array(path), axis=0) / samples.size).max())
+    first = samples.low, samples.first.state, samples.first.period
+    return not samples.family.timed and moved(value, state, period) < _AT_REST * moved(*first)

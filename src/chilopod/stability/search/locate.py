@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, overload
 
@@ -59,10 +59,8 @@ class Located(Result, Sequence[BifurcationPoint]):
         Remarks, a sentence each.
     evaluations
         Number of orbits computed.
-    searched
-        Interval in which the orbit was followed and searched: less than that asked for if it ended early.
-    ending
-        Reason for an early end, which is also the first remark; empty if the whole interval was searched.
+    searched, ending
+        Interval in which the orbit was followed and searched, and the reason for an early end, also the first remark.
     """
 
     points: tuple[BifurcationPoint, ...]
@@ -86,9 +84,6 @@ class Located(Result, Sequence[BifurcationPoint]):
 
     def __len__(self) -> int:
         return len(self.points)
-
-    def __iter__(self) -> Iterator[BifurcationPoint]:
-        return iter(self.points)
 
     def _lines(self) -> list[str]:
         many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"

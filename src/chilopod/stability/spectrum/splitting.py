@@ -155,8 +155,9 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
     # Eigenvalues of one modulus in slanted directions can show a false gap for a while; their spaces do not converge.
     settled = np.maximum(slow_motion, fast_motion[::-1]) < _AT_REST
     borders = [0, *(1 + np.flatnonzero((growth[:-1] - growth[1:] > _GAP) & settled)).tolist(), n]
-    groups = [
-        [_intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
+    both = list(zip(slow, fast, strict=True))
+    groups = [  # bases of the intersections
+        [one[:, :b] @ np.linalg.svd(one[:, :b].T @ other[:, : n - a])[0][:, : b - a] for one, other in both]
         for a, b in itertools.pairwise(borders)
     ]
     logarithms, vectors = [], []
@@ -199,12 +200,6 @@ def _iterate(factors: Sequence[Array] | Array, n: int) -> tuple[list[Array], Arr
     turned = bases[0].T @ basis
     motion = np.array([np.linalg.norm(turned[j:, :j]) for j in range(1, n)])
     return bases, np.array(stretches[-_AVERAGED * len(factors) :]), motion
-
-
-def _intersection(one: Array, other: Array, dimension: int) -> Array:
-    """Orthonormal basis of the intersection of two column spaces, of the given dimension."""
-    left = np.linalg.svd(one.T @ other)[0]
-    return one @ left[:, :dimension]
 
 
 def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:

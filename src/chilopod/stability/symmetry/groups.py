@@ -258,6 +258,14 @@ def symmetric_states(system: SystemLike, state: Array, size: Array, near: float 
     return np.asarray(right[int((values > _LOOSE).sum()) :].T)
 
 
+def symmetric_basis(system: SystemLike, state: Array, size: Array, near: float = _LOOSE) -> Array | None:
+    """As :func:`symmetric_states`; None if that are all states, or the system has a symmetry in time."""
+    if system.symmetry is not None or not spatial_symmetries(system):
+        return None
+    basis = symmetric_states(system, state, size, near)
+    return basis if basis.shape[1] < state.size else None
+
+
 @lru_cache(maxsize=8)
 def _elements(generators: bytes, n: int) -> Array:
     """Elements of the group of some generators, shape (order, n, n)."""

@@ -10,16 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chilopod.stability.unit_circle.critical import (
-    LOST,
-    UNKNOWN,
-    Crossing,
-    Root,
-    critical_at,
-    outside_near,
-    rooted,
-    tolerances,
-)
+from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Crossing, Root, critical_at, rooted, tolerances
 from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
 
@@ -159,7 +150,7 @@ class Accounts:
             return [replace(crossings[0], change=gap.change)]
         a, b = gap.x, gap.y
         near = [
-            (each, outside_near(self._spectra, each, b) - outside_near(self._spectra, each, a)) for each in crossings
+            (each, _outside_near(self._spectra, each, b) - _outside_near(self._spectra, each, a)) for each in crossings
         ]
         return [replace(each, change=change) for each, change in near]
 
@@ -322,3 +313,13 @@ def _without_shadows(roots: list[Root]) -> list[Root]:
         if not root.touch
         or not any(abs(place - root.place) <= _SHADOW * (root.right - root.left) for place in crossings)
     ]
+
+
+def _outside_near(spectra: Spectra, crossing: Crossing, place: float) -> int:
+    """Number of the multipliers nearest to the critical ones outside the circle, at a place beside a crossing."""
+    nu, number = spectra.at(np.array([place]))[0], crossing.multiplicity
+    times = 2 if crossing.event is Event.PAIR else 1
+    if times == 2:
+        nu = nu[nu.imag > 0.0]
+    nearest = np.argsort(np.abs(nu - crossing.multiplier))[: number // times]
+    return times * int((np.abs(nu[nearest]) > 1.0).sum())

@@ -123,13 +123,3 @@ def _meeting(upper: ComplexArray) -> ComplexArray:
     first, second = np.triu_indices(upper.size, 1)
     nearest = int(np.abs(upper[first] - upper[second]).argmin())
     return upper[[first[nearest], second[nearest]]]
-
-
-def outside_near(spectra: Spectra, crossing: Crossing, place: float) -> int:
-    """Number of the multipliers nearest to the critical ones outside the circle, at a place beside a crossing."""
-    nu, number = spectra.at(np.array([place]))[0], crossing.multiplicity
-    times = 2 if crossing.event is Event.PAIR else 1
-    if times == 2:
-        nu = nu[nu.imag > 0.0]
-    nearest = np.argsort(np.abs(nu - crossing.multiplier))[: number // times]
-    return times * int((np.abs(nu[nearest]) > 1.0).sum())
