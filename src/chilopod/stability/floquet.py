@@ -157,8 +157,7 @@ def multipliers(
     system
         The periodic system.
     orbit
-        First guess of a state on the orbit at time 0; not needed if the system knows its orbit. An AnalysisError if
-        none is found.
+        First guess of a state on the orbit at time 0, or an AnalysisError; by default the system's known orbit.
     leading
         Number of largest multipliers, counted with multiplicity, or one more to complete a pair; all by default. For
         100 states or more, a system with ``flow_tangents``, as any traced one, is not asked for the whole matrix.

@@ -71,8 +71,7 @@ def _first_crossing(
     """Time, number and sign of the slope of the first switch that leaves its branch; number -1 if none does.
 
     Among switches within a time ``soon`` of each other, whose order is round-off, the first of the list counts. Events
-    of guards that depend on time only belong to the next interval if they happen that shortly before the end of the
-    ``remaining`` time.
+    of guards that depend on time only belong to the next interval if they happen that shortly before the end.
     """
     switches, branches = tape.switches, series.branches
     found, crossing, direction = h, -1, 0.0

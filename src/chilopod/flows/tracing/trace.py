@@ -52,8 +52,7 @@ def trace(
 
     Floats in ``args``, alone or in arrays, tuples and lists, are parameters of the tape, or numbers if the function
     needs their values, as in a branch. ``events`` are pairs of a guard and a reset or None; the tape is compared with
-    the function between some times and around a state ``base``. Raises Untraceable if the function is not a fixed
-    sequence of known operations, or disagrees with the tape.
+    the function around a state ``base``. Raises Untraceable if it is no fixed sequence of known operations.
     """
     functions = (rhs, *(part for event in events for part in event))
     floats: list[float] = []

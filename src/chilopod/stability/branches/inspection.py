@@ -104,8 +104,7 @@ def _confirmed(within: Within, place: Place) -> bool:
     """True if the critical multiplier changes sides at a place by more than the errors of the multipliers.
 
     Two that meet at +1 or -1 and leave along the circle, as without damping, may be on any side: the product of their
-    distances shows a passage. Beside a branch point a multiplier is critical within its error, and rounding makes it
-    cross.
+    distances shows a passage. Beside a branch point a multiplier is critical within its error: rounding may cross.
     """
     crossing = place.crossing
     if crossing.collision or crossing.change == 0:

@@ -52,8 +52,7 @@ def described(
 ) -> BifurcationPoint:
     """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added.
 
-    The critical multipliers belong to the whole return map; their block is given if spatial symmetries split it, and
-    the kind of the point if known.
+    The critical multipliers belong to the whole return map; their block and the kind of the point are given if known.
     """
     value, error_bound = place
     spec = spectrum(orbit.image)

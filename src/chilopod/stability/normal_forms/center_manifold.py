@@ -270,8 +270,7 @@ class Manifold:
 
     def coefficient(self, found: Sampled, powers: Powers) -> Term:
         """Coefficient of a resonant monomial of odd order, and a bound on its error, which includes the difference of
-        the sampled curve from the centre manifold: curves disturbed as much, with random signs, are sampled as
-        well."""
+        the sampled curve from the centre manifold: curves disturbed as much at random are sampled too."""
         at, (value, error) = self._at, found.term(powers)
         n = at.state.size
         if n == (1 if at.real else 2):

@@ -122,8 +122,7 @@ def find_orbit(
     period that branches off at a period doubling does not close earlier.)
 
     If Newton's method fails at the guess, it is tried from a state further along the motion, provided that every state
-    may be time 0, and then after the motion has settled on an attracting orbit. A guess whose motion takes too many
-    steps of the integration is refused at once.
+    may be time 0, and then after the motion has settled. A guess whose motion takes too many steps is refused.
 
     Parameters
     ----------

@@ -102,8 +102,7 @@ def shot(
     ``sizes`` of the states, shape (n,), grow with these while the parameter is given. The first state has a ``section``
     if the system has no period of its own. ``free`` is the equation for the parameter, None for a given one. ``shared``
     is a basis of the space of the first state's corrections, shape (n, k). Every evaluation takes a return of the
-    budget. With ``careful`` the steps are short and the return time is free until the motion nearly closes; a single
-    node's motion then need not return to the section.
+    budget. With ``careful`` steps are short, the return time is free and the section not needed until it nearly closes.
     """
     equations = _Equations(
         _Problem(system_at, free, shared, budget, careful), start, _Frame(sizes, sizes, section, careful)

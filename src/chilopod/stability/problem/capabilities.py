@@ -83,8 +83,7 @@ class Capabilities(Autonomous, Protocol):
 
     def flow_with_error(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array, float | Array]:
         """As :meth:`SystemLike.flow`, and a bound on the absolute error of the derivative: of every entry, shape
-        (n, n), or one number for all of them, which is wide where states have different units. Else a second
-        computation estimates it."""
+        (n, n), or one number for all, which is wide where units differ. Else a second computation estimates it."""
 
     def flow_states(self, states: Array, t0: float, t1: float, /) -> Array:
         """States at t1 of those at t0, shape (states, n) both, without derivatives."""
@@ -179,8 +178,7 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     of the return when the others are disturbed by their own sizes.
 
     So the coupling gives the size of a state that passes through zero or rests there. (At the end of the return
-    strongly damped states would not depend on the others.) For an orbit that is zero throughout, only the ratios have a
-    meaning.
+    strongly damped states would not depend on the others.) Of an orbit that is zero throughout only ratios matter.
     """
     given = given_scale(system)
     if given is not None:

@@ -169,8 +169,7 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float | Array]:
     """The flow with an error bound, the system's own or an estimate from a computation in parts: a step-controlled
-    integrator makes independent errors in the two computations, and one with fixed steps should provide its own
-    bound."""
+    integrator makes independent errors in the two; one with fixed steps should provide its own bound."""
     if offers(system, "flow_with_error"):
         state, derivative, error = checked_flow(system, x, t0, t1, with_error=True)
         return state, derivative, error

@@ -170,8 +170,7 @@ def located(
     """Find and describe the bifurcations along the samples of a family.
 
     ``crossings(start, end)`` searches every block of the return map; ``described(crossing, block)`` gives the point,
-    remarks, or both, within a number of return maps; ``fold(fold)`` a point or a remark for a fold at an end of the
-    orbit.
+    remarks, or both, within a number of return maps; ``fold(fold)`` a point or a remark for a fold at an end.
     """
     with samples.budget:
         here = extent(samples)

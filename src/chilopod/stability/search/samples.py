@@ -232,8 +232,7 @@ class Samples:
         return path
 
     def _to_merging(self, path: list[Sample]) -> list[Sample]:
-        """The path up to a pitchfork where the orbit meets another one, which the corrector then follows: a multiplier
-        comes to +1 from one side and leaves it to the same side."""
+        """The path up to a pitchfork where the orbit meets another one: a multiplier comes to +1 and turns back."""
         i = 1
         while i < len(path) - 2:
             if not _touches(*path[i - 1 : i + 3]):

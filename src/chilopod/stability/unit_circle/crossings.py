@@ -2,8 +2,7 @@
 
 Two methods are combined. Zeros of functions that are analytic in the parameter (:mod:`.spectra`) show events however
 close they lie, but not two equal ones together. The number of eigenvalues outside the circle, known at every evaluated
-matrix, must change by the crossings found in between: if it does not, the crossing multiplier is followed by its rank,
-which is continuous for any multiplicities.
+matrix, must change by the crossings in between: if not, the crossing multiplier is followed by its continuous rank.
 """
 
 from __future__ import annotations
@@ -75,8 +74,7 @@ def find_crossings(
     """Every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
     Matrices are evaluated at up to ``budget`` values, or ``affordable()`` more if their cost decides. Remarks show a
-    value as ``shown(value)``. Raises ParameterError if the interval is empty, reversed or not finite, or the budget too
-    small to begin.
+    value as ``shown(value)``. A ParameterError refuses an empty or infinite interval, or a budget too small to begin.
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")

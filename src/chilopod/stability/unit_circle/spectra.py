@@ -52,8 +52,7 @@ class Spectra:
     Errors come from random changes of M within its errors (:mod:`chilopod.stability.spectrum.eigenvalues`). The
     relative error of an entry multiplies the geometric mean of the largest entries of its row and column, in units that
     balance M: this does not depend on the units, and keeps a small multiplier beside a huge one if the matrix separates
-    them. M is evaluated at up to ``budget`` values, twice where errors matter, or ``affordable()`` more if its cost
-    decides.
+    them. M is evaluated at up to ``budget`` values, twice where errors matter, or ``affordable()`` more.
     """
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:

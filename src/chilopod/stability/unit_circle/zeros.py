@@ -5,8 +5,7 @@ small part of its size there (the idea of Chebfun: Battles & Trefethen, SIAM J. 
 error. So every piece
 consists of parts with a certain sign and narrow parts where the function may vanish. Between opposite signs such a part
 contains one zero, if the polynomial is monotonic there and the function has these signs at both ends. Any other part,
-which may contain no zero, two, or a double one, is refined on its own scale, until the function has a sign there or is
-zero within its error.
+which may contain no zero, two, or a double one, is refined until it has a sign or is zero within its error.
 """
 
 from __future__ import annotations
