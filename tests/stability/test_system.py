@@ -179,7 +179,12 @@ def test_no_orbit_to_be_found():
 
 def test_a_defective_matrix_has_a_useless_but_honest_bound():
     """A Jordan block: a perturbation e moves its eigenvalues by sqrt(e)."""
-    system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (x, np.array([[1.0, t1 - t0], [0.0, 1.0]])), orbit=np.zeros(2))
+
+    def flow(x, t0, t1):
+        derivative = np.array([[1.0, t1 - t0], [0.0, 1.0]])
+        return derivative @ x, derivative
+
+    system = PeriodicSystem(2, 1.0, flow, orbit=np.zeros(2))
     found = multipliers(system)
     assert np.abs(found.values - 1).max() <= found.error_bound
     assert found.error_bound > 1e-8

@@ -91,7 +91,7 @@ def test_half_period_gives_the_principal_logarithm_of_the_full_period():
 
 
 def test_a_singular_flow_is_refused():
-    system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (0 * x, np.diag([1.0, 0.0])), orbit=np.zeros(2))
+    system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (np.diag([1.0, 0.0]) @ x, np.diag([1.0, 0.0])), orbit=np.zeros(2))
     with pytest.raises(AnalysisError, match="contracts too strongly"):
         exponents(system)
 
@@ -99,7 +99,9 @@ def test_a_singular_flow_is_refused():
 @pytest.mark.parametrize("last", [0.0, 1e-310])
 def test_a_singular_map_is_refused(last):
     """A map has no parts that could be halved."""
-    system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (0 * x, np.diag([0.5, last])), orbit=np.zeros(2))
+    system = PeriodicSystem(
+        2, 1.0, lambda x, t0, t1: (np.diag([0.5, last]) @ x, np.diag([0.5, last])), orbit=np.zeros(2)
+    )
     with pytest.raises(AnalysisError, match="contracts too strongly"):
         exponents(system)
 

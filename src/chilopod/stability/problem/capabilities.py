@@ -19,6 +19,7 @@ from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers, shape_of
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import Array
+from chilopod.stability.problem.derivatives import compare, is_new
 
 
 @runtime_checkable
@@ -127,16 +128,18 @@ def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error:
     """The flow and its derivative, checked, with the bound on its error if wanted; a SpentError after a limit."""
     deadline.check()
     name, n = "flow_with_error" if with_error else "flow", x.size
+    function = getattr(system, name)
     with UserCode(name):
-        found: Any = getattr(system, name)(np.array(x), t0, t1)  # a system may write into its argument
+        found: Any = function(np.array(x), t0, t1)  # a system may write into its argument
     if not (isinstance(found, tuple | list) and len(found) == 2 + with_error):
         what = "(state, derivative, error)" if with_error else "(state, derivative)"
         raise ParameterError(f"must return {what}", field="flow", value=type(found).__name__)
     state, derivative = found[:2]
     usual = type(state) is type(derivative) is np.ndarray and state.dtype == derivative.dtype == np.float64
-    if usual and not with_error and state.shape == (n,) and derivative.shape == (n, n):
-        return found
-    state, derivative = numbers(state, (n,), name), numbers(derivative, (n, n), name)
+    if not (usual and state.shape == (n,) and derivative.shape == (n, n)):
+        state, derivative = numbers(state, (n,), name), numbers(derivative, (n, n), name)
+    if is_new(function) and _is_long(system, t1 - t0):
+        compare(function, lambda x: checked_flow(system, x, t0, t1, with_error)[0], x, state, derivative, name)
     if not with_error:
         return state, derivative
     error = numbers(found[2], (n, n) if shape_of(found[2]) else (), name)
@@ -161,6 +164,12 @@ def returns_per_period(system: SystemLike) -> int:
     if system.symmetry is None:
         return 1
     return int(getattr(system, "symmetry_order", 2))
+
+
+def _is_long(system: SystemLike, duration: float) -> bool:
+    """True for half of a return or more, which has its events."""
+    period = system.guess_period if is_autonomous(system) else system.period
+    return period is not None and 2.0 * duration * returns_per_period(system) >= period
 
 
 _PART = 1.0 / 16.0  # part of a return

@@ -7,18 +7,17 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.flows.arguments import LARGEST, UserCode, checked_count, numbers
 from chilopod.frozen import Array
+from chilopod.stability.problem.derivatives import compare, is_new
 from chilopod.stability.problem.system import PeriodicSystem
 
 _SHAKE = 2.0**-52
 _OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _ROUNDING = 8.0 * float(np.finfo(float).eps)
-_STEPS = 1e-5, 1e-7, 1e-9  # steps of differences, relative to each state
-_CONTRADICTS = 1e-3  # least relative error of a derivative that is refused
 
 
 def from_map(
@@ -44,7 +43,6 @@ def from_map(
     if not callable(image):
         raise ParameterError("must be a function", field="image", value=image, allowed="image(x)")
     n = checked_count("dimension", dimension, LARGEST)
-    unchecked = [True]  # until the first image
 
     def applied(x: Array) -> tuple[Array, Array]:
         with UserCode("image"):
@@ -58,9 +56,8 @@ def from_map(
         derivative, reach = np.eye(n), np.eye(n)
         for _ in range(math.ceil(t1) - math.ceil(t0)):
             start, (x, factor) = x, applied(x)
-            if unchecked:
-                unchecked.clear()
-                _check_derivative(lambda x: applied(x)[0], start, x, factor)
+            if is_new(image):
+                compare(image, lambda x: applied(x)[0], start, x, factor, "image")
             derivative, reach = factor @ derivative, np.abs(factor) @ reach
         return x, derivative, reach
 
@@ -80,33 +77,3 @@ def from_map(
         scale=scale,  # type: ignore[arg-type]
         flow_with_error=flow_with_error,
     )
-
-
-def _check_derivative(mapped: Callable[[Array], Array], x: Array, state: Array, derivative: Array) -> None:
-    """Check a derivative against differences: along one direction and, if these contradict it, entry by entry.
-
-    Those to both sides differ by curvature, noise or a kink: a smaller error is not refused.
-    """
-    steps = np.where(x != 0.0, np.abs(x), float(np.abs(x).max()) or 1.0)
-
-    def compared(shift: Array) -> tuple[NDArray[np.bool_], Array]:
-        with np.errstate(all="ignore"):
-            up, down = mapped(x + shift), mapped(x - shift)
-        change = 0.5 * (up - down)
-        uncertain = 4.0 * np.abs(up - 2.0 * state + down) + _ROUNDING * x.size * (np.abs(up) + np.abs(down))
-        terms = np.abs(derivative) @ np.abs(shift) + np.abs(change)
-        return np.abs(change - derivative @ shift) > uncertain + _CONTRADICTS * terms, change
-
-    try:
-        if not compared(_STEPS[0] * steps * np.cos(3.0 * np.arange(x.size) + 1.0))[0].any():
-            return
-        columns = [[compared(step * shift) for step in _STEPS] for shift in np.diag(steps)]
-    except ChilopodError:  # an edge of the map's domain
-        return
-    for j, column in enumerate(columns):
-        wrong = np.all([each for each, _ in column], axis=0)
-        if wrong.any():
-            i = int(wrong.argmax())
-            given, other = derivative[i, j], column[0][1][i] / (_STEPS[0] * steps[j])
-            said = f"derivative entry ({i}, {j}) is {given:g}, but a difference gives {other:g}"
-            raise ParameterError(said, field="image", value=x.tolist(), allowed="d state[i] / d x[j]")
