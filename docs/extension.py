@@ -30,6 +30,7 @@ from chilopod.robot import load_robot
 from chilopod.show.play import play
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+_PARAMETERS = re.compile(r"<dl>(\s*(?:<dd><em class=\"sig-param\">.*</dd>\s*)+)</dl>")
 _LITERAL = re.compile(r"(``.*?``|`.*?`)")
 
 
@@ -123,11 +124,19 @@ def scraped(block: tuple[Any, ...], block_vars: dict[str, Any], gallery_conf: di
     return matplotlib_scraper(block, block_vars, gallery_conf)
 
 
-def levels(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
-    """Give captions of contents, which Sphinx marks as headings, the level that a heading needs."""
+def accessible(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
+    """Mend what screen readers stumble over: captions of contents, which Sphinx marks as headings, get the level that a
+    heading needs; parameters on lines of their own are no list of descriptions, and a list within a list is an item."""
     for part in ("furo_navigation_tree", "body"):
         if part in context:
             context[part] = context[part].replace('role="heading">', 'role="heading" aria-level="2">')
+    if "body" in context:
+        body = _PARAMETERS.sub(r"<div>\1</div>", context["body"])
+        body = re.sub(r'<dd>(<em class="sig-param">.*)</dd>', r'<div class="line">\1</div>', body)
+        if page == "_modules/index":
+            body = re.sub(r"</li>\s*<ul>", "<ul>", body)
+            body = re.sub(r"</ul>(?=\s*(?:</ul>|<li>))", "</ul></li>", body)
+        context["body"] = body
 
 
 def play_page(app: Sphinx, failure: Exception | None) -> None:
@@ -149,6 +158,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("viewcode-follow-imported", source_of)
     app.connect("doctree-read", lead_to_gallery)
     app.connect("missing-reference", resolve)
-    app.connect("html-page-context", levels, priority=900)  # behind the theme
+    app.connect("html-page-context", accessible, priority=900)  # behind the theme
     app.connect("build-finished", play_page)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
