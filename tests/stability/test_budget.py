@@ -89,8 +89,12 @@ def test_a_larger_budget_finds_more():
     def family(k):
         return stuart_landau(1.0, 1.0 + 0.3 * math.sin(20.0 * k), math.sin(20.0 * k))
 
-    few, many = (locate(family, (0.01, 1.0), [1.0, 0.0, 0.0], False, budget) for budget in (40, 3000))
-    assert few.status is SearchStatus.BUDGET
+    *fewest, few, many = (
+        locate(family, (0.01, 1.0), [1.0, 0.0, 0.0], False, budget) for budget in (1, 2, 20, 40, 3000)
+    )
+    for each in (*fewest, few):
+        assert each.status is SearchStatus.BUDGET
+        assert any("(`budget`) were spent" in remark for remark in each.remarks)
     assert len(few) < len(many) == 6
     np.testing.assert_allclose([point.value for point in many], np.pi / 20.0 * np.arange(1, 7), rtol=1e-9)
 

@@ -284,7 +284,7 @@ def test_many_multipliers_are_counted():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "budget"), [(1.0, 0.0, 100), (0.0, 0.0, 100), (0.0, np.inf, 100), (np.nan, 1.0, 100), (0.0, 1.0, 3)]
+    ("low", "high", "budget"), [(1.0, 0.0, 100), (0.0, 0.0, 100), (0.0, np.inf, 100), (np.nan, 1.0, 100)]
 )
 def test_bad_arguments_are_one_line(low, high, budget):
     with pytest.raises(ParameterError) as error:

@@ -66,6 +66,7 @@ def test_the_derivative_is_within_its_bound():
             (lambda b=b: locate(logistic, (2.5, 3.2), [0.6], budget=b), r"budget.*: must be a whole number")
             for b in (-1, 0, 2.5, "x", None, math.inf, [])
         ),
+        (lambda: begin(logistic, 2.5, [0.6], periods=4), r"periods = 4: are more than the orbit has; allowed: 1"),
         *(
             (lambda k=k: begin(logistic, 2.5, [0.6], periods=k), r"periods.*: must be a whole number; allowed: 1 ")
             for k in (0, -1, 1.5, True)

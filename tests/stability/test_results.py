@@ -3,7 +3,7 @@
 import inspect
 import io
 import typing
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 
 import matplotlib.axes
@@ -211,7 +211,7 @@ def test_a_dataset_has_types_units_and_names_and_can_be_kept(result, tmp_path):
 @RESULTS
 def test_a_table_as_text_has_the_numbers_to_the_last_bit(result, tmp_path):
     data = result().to_dataset()
-    path = tmp_path / "new" / "table.csv"
+    path = tmp_path / "table.csv"
     text = result().to_csv(path)
     assert path.read_text(encoding="utf-8") == text
     header, *lines = (line.split(",") for line in text.splitlines() if not line.startswith("#"))
@@ -220,8 +220,10 @@ def test_a_table_as_text_has_the_numbers_to_the_last_bit(result, tmp_path):
         found = columns[name] if each.ndim == 1 else [columns[f"{name}[{i}]"] for i in range(each.shape[1])]
         np.testing.assert_array_equal(np.array(found).astype(each.dtype).T, each.values)
     assert all(f"# {name}: " in text for name in (*data.attrs, *data.data_vars))
-    with pytest.raises(OutputError):
-        result().to_csv(tmp_path)
+    for wrong in (tmp_path, tmp_path / "new" / "table.csv"):
+        with pytest.raises(OutputError):
+            result().to_csv(wrong)
+    assert not wrong.parent.exists()
 
 
 def test_special_points_are_marked_in_tables():
@@ -363,4 +365,10 @@ def test_every_type_that_users_receive_can_be_imported():
         if part.__module__.startswith("chilopod.") and part not in exported
     }
     assert not missing
+    # A comparison of fields that are arrays would raise.
+    results = [
+        each for each in exported if is_dataclass(each) and any("Array" in str(one.type)[:12] for one in fields(each))
+    ]
+    assert [each for each in results if each.__eq__ is not object.__eq__] == []
+    assert len(results) > 10
     assert {"NormalForm", "NormalFormStatus", "SearchStatus", "SymmetricCrossing"} <= set(stability.__all__)

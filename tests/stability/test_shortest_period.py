@@ -5,6 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from chilopod.errors import ParameterError
 from chilopod.stability import begin, find_orbit, from_rhs, locate, multipliers, switch
 
 OMEGA = 1.7
@@ -66,10 +67,10 @@ def test_a_doubling_is_found_and_left(turns):
 
 
 def test_periods_that_were_asked_for():
-    """Two of them are two, also of an orbit that closes after one."""
-    for u in (0.2, 0.0):
-        start = begin(twisted, 0.15, [1.0, 0.0, u, 0.0], periods=2)
-        assert start.period == pytest.approx(2.0 * PERIOD, rel=1e-12)
+    start = begin(twisted, 0.15, [1.0, 0.0, 0.2, 0.0], periods=2)
+    assert start.period == pytest.approx(2.0 * PERIOD, rel=1e-12)
+    with pytest.raises(ParameterError, match="periods = 2: are more than the orbit has; allowed: 1"):
+        begin(twisted, 0.15, [1.0, 0.0, 0.0, 0.0], periods=2)
 
 
 @pytest.mark.parametrize(("order", "turns"), [(2, 3), (2, 5), (3, 4), (4, 5)])

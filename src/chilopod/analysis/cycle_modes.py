@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CycleMode(ReadOnlyArrays):
     """A mode of a walk: its multiplier over one gait cycle, half the interval of 95 %, and its yaw joints, front to
     rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
@@ -52,7 +52,7 @@ class CycleMode(ReadOnlyArrays):
         return which, shown, f"{self.error:.1e}", f"{abs(self.multiplier):.6f}", shape, angles
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CycleMultipliers(Summary, ReadOnlyArrays):
     """Leading multipliers and modes of a walk in MuJoCo."""
 

@@ -30,7 +30,7 @@ _ENOUGH = 100  # modules
 _LONGEST = 3600.0  # s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StraightWalk(Summary, ReadOnlyArrays):
     """Stability of the straight walk.
 
@@ -100,7 +100,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
         return self.exponents.multipliers.plot(axes)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WalkBifurcation(Summary, ReadOnlyArrays):
     """A bifurcation of the straight walk as one parameter of the robot changes.
 

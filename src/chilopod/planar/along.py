@@ -74,7 +74,7 @@ class FollowedModel(PlanarModel):
         return batch
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WalkMeans(ReadOnlyArrays):
     """Means of periodic walks over one period.
 

@@ -40,7 +40,7 @@ _FIRST = 1e-4, 1e-6  # cubic terms of the first cycle, relative to the frequency
 _MISSED = 0.3  # largest error of the predicted first cycle, relative to its amplitude
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Equilibrium(ReadOnlyArrays):
     """An equilibrium of a system that does not depend on time.
 

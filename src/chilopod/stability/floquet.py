@@ -37,7 +37,7 @@ _SAME_ANGLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Multipliers(Result, ReadOnlyArrays):
     """Floquet multipliers of a periodic orbit.
 
@@ -99,7 +99,7 @@ class Multipliers(Result, ReadOnlyArrays):
         return dataset("multiplier", {**values, "half_period": half}, **about)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Exponents(Shown, ReadOnlyArrays):
     """Floquet exponents and modes.
 

@@ -110,7 +110,8 @@ def locate_hopf(
     remarks = [remark for each in pieces for remark in each.remarks]
     if last.value == at < high and not pieces[-1].ending:
         status = SearchStatus.BUDGET
-        remarks.append(f"the budget was spent before the orbit was followed beyond {at:.9g}")
+        limited = "the time (`seconds`) was" if limit.late else "the equilibria (`budget`) were"
+        remarks.append(f"{limited} spent before the orbit was followed beyond {at:.9g}")
     points: list[BifurcationPoint] = []
     for each in pieces:  # a point on the border of two is found in both
         points += [

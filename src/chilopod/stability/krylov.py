@@ -58,7 +58,7 @@ _SAFETY = 4.0  # factor on a norm estimated from eight or more random components
 _BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class KrylovSubspace(ReadOnlyArrays):
     """A subspace V with A V = V H + Q R; every round applies A to the last block only, and Q continues V."""
 
@@ -111,7 +111,7 @@ def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Arr
     return left[:, :count], values[:count, None] * right[:count]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TangentMap(ReadOnlyArrays):
     """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`), its derivative H' as a product."""
 

@@ -64,7 +64,7 @@ def criticality(form: NormalForm) -> Criticality:
     return Criticality.SUPERCRITICAL if form.cubic < 0 else Criticality.SUBCRITICAL
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BifurcationPoint(Shown, ReadOnlyArrays):
     """A located bifurcation.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chilopod.errors import OutputError
 from chilopod.labels import Labelled
 from chilopod.notebook import Shown as Shown
 from chilopod.notebook import aligned, picture
@@ -64,7 +65,7 @@ class Result(Shown):
         Parameters
         ----------
         path
-            File to write to, if any; an existing one is replaced.
+            File to write to, if any, in an existing folder; an existing file is replaced.
 
         Returns
         -------
@@ -83,6 +84,8 @@ class Result(Shown):
                 table |= {f"{name}[{i}]": values for i, values in enumerate(each.values.T.tolist())}
         csv.writer(text, lineterminator="\n").writerows([list(table), *zip(*table.values(), strict=True)])
         if path is not None:
+            if not Path(path).absolute().parent.is_dir():
+                raise OutputError("has no folder", source=str(path), allowed="a file in an existing folder")
             write_atomic(path, text.getvalue())
         return text.getvalue()
 

@@ -24,7 +24,7 @@ class Outcome(Labelled):
     FAILED = "failed", "did not walk to the end"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Criteria(ReadOnlyArrays):
     """Criteria of turning tasks, one entry for each walk.
 

@@ -12,7 +12,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array, ReadOnlyArrays
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RadiusLaw(ReadOnlyArrays):
     """Radius of the stable curved walks below the pitchfork, as long as it falls with the parameter.
 

@@ -21,7 +21,7 @@ from chilopod.steering.target import ARRIVAL_RADIUS
 _AHEAD = 2.0  # modules
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SpringLaw(ReadOnlyArrays):
     """Steering law that compares the bend of the body with the bend of the circle to the target.
 

@@ -31,7 +31,7 @@ _SHAKE = 2.0**-52
 _ROUNDING = 2.0**-49
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ImplicitFlow(ReadOnlyArrays):
     """Flow of a stiff tape without events and switches in the state."""
 

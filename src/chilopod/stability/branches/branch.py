@@ -57,7 +57,7 @@ _NARROWEST = 1e-9  # least width of an interval, relative to its values
 Progress = Callable[[int, BranchPoint], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Branch(Result):
     """A followed branch.
 
@@ -66,7 +66,7 @@ class Branch(Result):
     points
         Points along the curve, special points included.
     ending, reason
-        Reason for its end, and details if the curve was lost, else empty.
+        Reason for its end, and details if the curve was lost or a limit spent, else empty.
     step
         Next step along the curve.
     periods, symmetric

@@ -17,7 +17,7 @@ from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.tracing.equations import Before
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BranchPoint(ReadOnlyArrays):
     """A periodic orbit on a branch.
 
@@ -58,7 +58,7 @@ class BranchPoint(ReadOnlyArrays):
         return stable_within(self.multipliers, self.error_bound)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Anchor(ReadOnlyArrays):
     """A point from which steps start: see :class:`chilopod.stability.tracing.equations.Anchor`."""
 

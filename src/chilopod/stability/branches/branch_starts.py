@@ -16,7 +16,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
-from chilopod.stability.orbits.orbit import bounded, known_state, searched_orbit
+from chilopod.stability.orbits.orbit import Orbit, bounded, known_state, searched_orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.arguments import UserCode, check_arguments, system_of
 from chilopod.stability.problem.capabilities import (
@@ -28,11 +28,12 @@ from chilopod.stability.problem.capabilities import (
     returns_per_period,
     sizes,
 )
-from chilopod.stability.problem.returns import Section, returned_states, whole_period
+from chilopod.stability.problem.returns import Section, carried, returned_states, whole_period
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
 
+_CLOSES = 1e-6  # distance, relative to the sizes, at which an orbit closes
 _RESTS = 0.01  # distance, relative to each state, within which a failed guess counts as an equilibrium
 _BESIDE = 1e-3  # step of second differences, in units
 _SINGULAR = 1e-9  # singular value, relative to the largest, below which another curve crosses
@@ -48,7 +49,7 @@ _LEFT_BY_NONE = {
 """Kinds of points without a branch to switch to, with the reason."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start(ReadOnlyArrays):
     """Start of a branch, with its direction.
 
@@ -120,8 +121,18 @@ def begin(
         except AnalysisError:
             _check_moving(system, guess)
             raise
+        _check_periods(studied, found, periods)
     period = found.period if is_autonomous(system) else None
     return Start(value, found.state, rising, periods=periods, period=period)
+
+
+def _check_periods(system: SystemLike, found: Orbit, periods: int) -> None:
+    """Check that an orbit over several periods does not close after fewer."""
+    x, size = found.state, sizes(system, found.state, found.period)
+    for count in (each for each in range(1, periods) if periods % each == 0):
+        back = carried(system, x[None], 0.0, found.period * count / periods)[0]
+        if (np.abs(back - x) <= _CLOSES * size).all():
+            raise ParameterError("are more than the orbit has", field="periods", value=periods, allowed=f"{count}")
 
 
 def _check_moving(system: SystemLike, guess: ArrayLike) -> None:

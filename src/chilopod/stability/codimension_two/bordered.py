@@ -39,7 +39,7 @@ _STEP = 1e-6  # step of differences, in units of the frame: it affects only the 
 _STALLED = 3  # corrections that did not halve a small residual, as Broyden's method may stall that long
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Place(ReadOnlyArrays):
     """Unknowns: ``state``, shape (n,), ``values`` of both parameters, shape (2,), and the cosine of a pair (else 0)."""
 
@@ -48,7 +48,7 @@ class Place(ReadOnlyArrays):
     cosine: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame(ReadOnlyArrays):
     """Units and borders of the equations, for m directions of the orbit (0 if known) and k critical multipliers."""
 
@@ -85,7 +85,7 @@ class Frame(ReadOnlyArrays):
         return slice(m, m + 2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evaluated(ReadOnlyArrays):
     """The equations at a place."""
 
@@ -105,7 +105,7 @@ class Evaluated(ReadOnlyArrays):
         return None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spot(Evaluated):
     """Point of a curve from which steps start (:class:`~chilopod.stability.tracing.equations.Anchor`), in its frame."""
 

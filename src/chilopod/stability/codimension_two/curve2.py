@@ -42,7 +42,7 @@ class CodimensionTwo(Labelled):
     SEVERAL_CRITICAL = "several critical", "another multiplier becomes critical as well"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Point2(ReadOnlyArrays):
     """A bifurcation point on a curve.
 
@@ -69,7 +69,7 @@ class Point2(ReadOnlyArrays):
     coefficient_error: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SpecialPoint2(Point2):
     """A point of codimension two on a curve.
 
@@ -89,7 +89,7 @@ class SpecialPoint2(Point2):
     next_coefficient_error: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve2(Result):
     """A curve of bifurcation points.
 
@@ -100,7 +100,7 @@ class Curve2(Result):
     points
         Points in order, those of codimension two included.
     endings, reasons
-        Reasons for the end at its first point and at its last, and details of a lost curve there, else empty.
+        Reasons for the end at its first point and at its last, and details of a lost curve or spent limit, else empty.
     periods
         Number of the systems' periods in one period of its orbits.
     """
@@ -152,7 +152,7 @@ class Curve2(Result):
         return dataset("point", columns(self.points, *names) | kinds, **about)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start2(ReadOnlyArrays):
     """Start of a curve that leaves a point of codimension two.
 

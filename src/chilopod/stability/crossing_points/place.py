@@ -36,7 +36,7 @@ _AT_HOME = 0.01  # largest distance from the root finder's place, relative to th
 _EPSILON = float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample(ReadOnlyArrays):
     """The return map on the orbit at a value of the parameter."""
 
@@ -167,7 +167,7 @@ Bounded = Callable[[float, Array, Array, float], Orbit]
 """The orbit at a place, with error bounds, from an interpolated one with its error, and the duration of a return."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Regular(ReadOnlyArrays):
     """An interpolated singular orbit: place, error bound, ``orbit`` of a sample there, and the orbit itself."""
 

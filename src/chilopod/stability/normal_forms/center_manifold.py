@@ -41,7 +41,7 @@ def radii() -> Array:
     return np.cos((2 * np.arange(RADII) + 1) * np.pi / (4 * RADII))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Series(ReadOnlyArrays):
     """Chebyshev coefficients over [-1, 1] of functions that are even or odd."""
 
@@ -119,7 +119,7 @@ _SURE = 2.0  # factor on the effect of the worst of them
 _WRONG = 0.3  # size of their disturbance, relative to the motion of the states
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CriticalOrbit(ReadOnlyArrays):
     """A fixed point of a return map, with its critical multiplier."""
 

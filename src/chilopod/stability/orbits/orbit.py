@@ -56,7 +56,7 @@ _SYMMETRIC = 1e-12  # residual, relative to the sizes of the states, of a symmet
 _BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Orbit(Shown, ReadOnlyArrays):
     """A periodic orbit.
 

@@ -47,7 +47,7 @@ class Nodes(NamedTuple):
     value: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Closed(ReadOnlyArrays):
     """Corrected orbit: nodes, sizes of the states, shape (n,), and return of the last node.
 

@@ -76,6 +76,9 @@ def checked_box(between: object) -> np.ndarray[tuple[int, ...], np.dtype[np.floa
     return box
 
 
+_SPENT = "the flows (`budget`) were spent"
+
+
 class Budget(Deadline):
     """Remaining flows over a return, and time, of a search.
 
@@ -87,14 +90,14 @@ class Budget(Deadline):
         self.left = allowed  # remaining number of flows; never below zero
 
     @property
-    def spent(self) -> bool:
-        """True if nothing is left."""
-        return self.left <= 0 or self.late
+    def spent(self) -> str:
+        """The limit that is reached, in words; empty before."""
+        return "the time (`seconds`) was spent" if self.late else _SPENT if self.left <= 0 else ""
 
     def take(self, count: int = 1) -> None:
         """Count flows before they are computed; a SpentError if too few are left."""
         if self.left <= 0:
-            raise SpentError("the budget of flows is spent", field="budget")
+            raise SpentError(_SPENT)
         if self.late:
             raise over()
         self.left = max(self.left - count, 0)

@@ -64,7 +64,7 @@ RETURN = Rule(8e-16, 1e-10)  # for a return: a flow may err by a thousand times 
 NODES = Rule(1e-13, 1e-9)  # for any node of an orbit: with many nodes and long flows the residual is larger
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Section(ReadOnlyArrays):
     """Hyperplane that the orbit of a system without a period of its own crosses once in a return, along the normal.
 
@@ -81,7 +81,7 @@ class Section(ReadOnlyArrays):
     duration: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReturnMap(ReadOnlyArrays):
     """One evaluation of the return map H at a state.
 

@@ -27,7 +27,7 @@ _SAME = 1e-8  # difference of equal matrices, relative to their size
 _ROUND_OFF = 1e-7  # relative to the largest entry, in units that balance the matrix: with the above, some last digits
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PeriodicSystem(ReadOnlyArrays):
     """A periodic system defined by its flow.
 

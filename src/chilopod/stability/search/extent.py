@@ -77,7 +77,7 @@ def extent(samples: Samples) -> Extent:
         return Extent(samples.low, high)
     first, last, beside = path[0], path[-1], _BEFORE * samples.width
     if samples.spent:
-        ending = f"the budget was spent before the orbit was followed beyond {last.value:.9g}"
+        ending = f"{samples.spent} before the orbit was followed beyond {last.value:.9g}"
         return Extent(first.value, last.value, ending=ending)
     folds: tuple[BifurcationPoint, ...] = ()
     start = first.value

@@ -22,7 +22,7 @@ from chilopod.stability.problem.arguments import SpentError, UserCode, check_arg
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.extent import extent
-from chilopod.stability.search.samples import Samples
+from chilopod.stability.search.samples import SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.shown import bounded as bounded_text
 from chilopod.stability.symmetry.isotypic import Block
@@ -45,7 +45,7 @@ Found = BifurcationPoint | str
 """A point, or a remark."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Located(Result, Sequence[BifurcationPoint]):
     """Bifurcations as a sequence of points by rising parameter, with the status of the search.
 
@@ -179,6 +179,7 @@ def located(
     if here.ending:
         status = SearchStatus.BUDGET if samples.spent else SearchStatus.INCOMPLETE
     results: list[Found] = []
+    spent = samples.budget.spent or SPENT
     samples.budget.prolong(_GRACE)
     for block, found in searched:
         status = status.worst(found.status)
@@ -194,6 +195,8 @@ def located(
                 status = status.worst(SearchStatus.INCOMPLETE)
                 results.append(f"the crossing at {crossing.value:.9g} could not be described: {error}")
     results += [fold(each) for each in here.folds]
+    if status is SearchStatus.BUDGET and not here.ending:
+        remarks.append(spent)
     if samples.family.remarks:
         status = status.worst(SearchStatus.INCOMPLETE)
     points = sorted((each for each in results if isinstance(each, BifurcationPoint)), key=lambda point: point.value)

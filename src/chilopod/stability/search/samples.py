@@ -23,6 +23,10 @@ from chilopod.stability.unit_circle.crossings import first_values
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which the search may not resolve a fold."""
 
+SPENT = "the orbits (`budget`) were spent"
+"""Remark of a search that computed as many orbits as it may."""
+
+_FIRST = 400  # least number of return maps allowed for the first orbit
 _SHORTEST = 2.0**-11  # shortest step of a followed orbit, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
@@ -57,7 +61,7 @@ class Samples:
     ) -> None:
         self.family = CheckedFamily(family)
         self.low, self.high, self.width = low, high, high - low
-        self.spent = False  # the path ends because the budget was spent
+        self.spent = ""  # the limit that ended the path
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
         self.count = 0  # orbits computed
         self._taken = 0.0  # return maps of those before :meth:`allow`, without the first
@@ -68,7 +72,7 @@ class Samples:
         self._normal: Array | None = None  # of the section of the last orbit
         self.orbits = budget
         self._allowed = _RETURNS * budget
-        self.budget = Budget(self._allowed, seconds)
+        self.budget = Budget(max(self._allowed, _FIRST), seconds)
         with self.budget, UserCode("family", low):
             self.first = searched_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
@@ -227,7 +231,7 @@ class Samples:
                 self._keep(sample)
             path += reached
             if path[-1].value != value:
-                self.spent = self.budget.spent or self.count >= self.orbits
+                self.spent = self.budget.spent or (SPENT if self.count >= self.orbits else "")
                 break
         return path
 

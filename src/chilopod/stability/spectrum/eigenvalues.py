@@ -58,7 +58,7 @@ def eigenvalue_errors(values: ComplexArray, matrix: Array, error: Array) -> Arra
     return np.asarray(SAFETY * np.maximum(nearest_other.max(axis=0), nearest_value.max()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spectrum(ReadOnlyArrays):
     """Eigenvalues of a return map with left and right eigenvectors."""
 

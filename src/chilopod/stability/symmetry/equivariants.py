@@ -36,7 +36,7 @@ class SymmetricKind(Labelled):
     SYMMETRIC_NEIMARK_SACKER = "symmetric Neimark-Sacker", "oscillations at a second frequency branch off as waves"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AxialBranch(ReadOnlyArrays):
     """Line of directions in a block along which new orbits branch off, one of each class of conjugate lines.
 

@@ -36,7 +36,7 @@ _LOOSE = 1e-6  # largest residual of a symmetry of a state or a mode, relative t
 _INFINITE = "generate an infinite group, or too large a one"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Group(ReadOnlyArrays):
     """A finite group of matrices; :func:`finite_group` makes one."""
 

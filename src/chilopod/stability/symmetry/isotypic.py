@@ -24,7 +24,7 @@ _DISTINCT = 1e-7  # distance of eigenvalues of a random matrix of norm one that 
 _EXACT = 1e-6  # distance of entries of orthogonal matrices and numbers from 0 and from whole numbers
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Block(ReadOnlyArrays):
     """An irreducible real representation of a group, of dimension d, with all its m copies in the space of states."""
 

@@ -29,7 +29,7 @@ class Ending(Labelled):
     CLOSED = "closed", "the curve came back to where it started"
     RESONANCE = "resonance", "the two multipliers of the pair meet: here the curve ends indeed"
     ENOUGH_POINTS = "enough points", "as many points as were asked for"
-    BUDGET = "budget", "as many flows as were allowed, or all of the time, were spent"
+    BUDGET = "budget", "as many flows, or as much time, as were allowed were spent"
     LOST = "lost", "the step became too small: the curve could not be followed further"
 
 
@@ -44,7 +44,7 @@ def trace(
     look: Callable[[Step[A, S], Ending | None], tuple[F, Ending | None]],
     keep: Callable[[F, int], None],
 ) -> tuple[Ending, str, float]:
-    """Follow a curve from its first point; return the ending, the reason if it was lost, and the size of the next step.
+    """Follow a curve from its first point; return the ending, the reason or spent limit, and the size of the next step.
 
     The ``sizes`` are the first and the longest step, ``points`` the largest number of steps, None for any.
     ``look(step, ending)`` finds the events within a step, and the ending if the curve ends there, or raises a
@@ -57,7 +57,7 @@ def trace(
         shortened = False
         while True:
             if equations.budget.spent:
-                return Ending.BUDGET, "", size
+                return Ending.BUDGET, equations.budget.spent, size
             try:
                 step, ending = _taken(equations, anchor, size, count)
                 found, ending = look(step, ending)

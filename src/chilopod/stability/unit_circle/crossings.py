@@ -74,13 +74,12 @@ def find_crossings(
     """Every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
     Matrices are evaluated at up to ``budget`` values, or ``affordable()`` more if their cost decides. Remarks show a
-    value as ``shown(value)``. A ParameterError refuses an empty or infinite interval, or a budget too small to begin.
+    value as ``shown(value)``. A ParameterError refuses an empty or infinite interval.
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")
-    least = 2 * first_places(0.0, 1.0).size
-    if budget < least:
-        raise ParameterError("is too small to begin", field="budget", value=budget, allowed=f"{least} or more")
+    if budget < (least := 2 * first_places(0.0, 1.0).size):
+        return Crossings((), SearchStatus.BUDGET, (f"a search takes {least} matrices or more (`budget`)",), 0)
     a, b, parameter = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
