@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import begin, find_orbit, from_rhs, locate, multipliers, switch
+from chilopod.stability import begin, find_orbit, follow2, from_rhs, locate, multipliers, switch
 
 OMEGA = 1.7
 PERIOD = 2.0 * pi / OMEGA
 DAMPING = 0.1
 
 
-def twisted(strength, turns=1.0):
+def twisted(strength, turns=1.0, damping=DAMPING):
     """A circle x^2 + y^2 = 1, and across it a pair that turns by 180 degrees a round: in its frame u' = (strength -
     damping) u and v' = -(strength + damping) v, less their cube.
 
@@ -21,18 +21,18 @@ def twisted(strength, turns=1.0):
     of two rounds as well, at u^2 = strength - damping.
     """
 
-    def rhs(t, state, strength):
+    def rhs(t, state, strength, damping):
         x, y, p, q = state
         pull, cube = 1.0 - x * x - y * y, p * p + q * q
         half = 0.5 * OMEGA
         return [
             pull * x - OMEGA * y,
             pull * y + OMEGA * x,
-            strength * (x * p + y * q) - half * q - (DAMPING + cube) * p,
-            strength * (y * p - x * q) + half * p - (DAMPING + cube) * q,
+            strength * (x * p + y * q) - half * q - (damping + cube) * p,
+            strength * (y * p - x * q) + half * p - (damping + cube) * q,
         ]
 
-    return from_rhs(rhs, 4, None, args=(strength,), guess_period=turns * PERIOD)
+    return from_rhs(rhs, 4, None, args=(strength, damping), guess_period=turns * PERIOD)
 
 
 @pytest.mark.parametrize("turns", [1, 2, 3, 6, 8, 12])
@@ -64,6 +64,16 @@ def test_a_doubling_is_found_and_left(turns):
     assert doubling.coefficient == pytest.approx(-2.0 * PERIOD, rel=1e-6)
     (start,) = switch(family, doubling)
     assert start.period == pytest.approx(2.0 * PERIOD, rel=1e-12)
+
+    # It is followed over its own period, not the guessed one, and damping moves it.
+    def both(strength, damping):
+        return twisted(strength, 1.2 * turns, damping)
+
+    box = (0.05, 0.2), (0.1, 0.13)
+    first, *_, last = follow2(both, doubling, box, second=DAMPING, points=3, step=0.2, longest=0.2).points
+    assert first.period == pytest.approx(PERIOD, rel=1e-12)
+    assert last.values[1] > 0.11
+    assert last.values[0] == pytest.approx(last.values[1], abs=1e-8)
 
 
 def test_periods_that_were_asked_for():

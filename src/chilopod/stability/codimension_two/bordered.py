@@ -26,7 +26,7 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
 from chilopod.stability.problem.arguments import Budget, system_of
-from chilopod.stability.problem.capabilities import SystemLike, given_scale, sizes
+from chilopod.stability.problem.capabilities import SystemLike, given_scale, returns_per_period, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.symmetry.groups import symmetric_states
 from chilopod.stability.tracing.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
@@ -145,10 +145,11 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         """The system at values of both parameters."""
         return system_of(self._family2, *values.tolist())
 
-    def begin(self, place: Place) -> Spot:
-        """The point of the curve nearest to a place beside it."""
+    def begin(self, place: Place, period: float) -> Spot:
+        """The point of the curve nearest to a place beside it, with about the full period there, NaN if unknown."""
         system = self.system(place.values)
-        section = None if self.known else section_at(system, place.state)
+        duration = period / returns_per_period(system) if np.isfinite(period) else None
+        section = None if self.known else section_at(system, place.state, duration=duration)
         place, image = self._mapped(place, section, False)
         size = self._size(system, place, image, section)
         frame = self._framed(system, place, image, size, None)

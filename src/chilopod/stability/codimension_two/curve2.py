@@ -52,7 +52,7 @@ class Point2(ReadOnlyArrays):
         Values of both parameters, shape (2,).
     error_bound
         Bounds on the errors of both, shape (2,), at right angles to the curve (in units of the box).
-    orbit, mode, multiplier, frequency, coefficient, coefficient_error
+    orbit, mode, multiplier, frequency, period, coefficient, coefficient_error
         As of a :class:`BifurcationPoint`; the coefficient is the quadratic one at a fold or a transcritical point.
     multipliers
         All multipliers of the return map, by falling modulus.
@@ -65,6 +65,7 @@ class Point2(ReadOnlyArrays):
     multiplier: complex
     multipliers: ComplexArray
     frequency: float
+    period: float = np.nan
     coefficient: float | None = None
     coefficient_error: float | None = None
 
@@ -146,7 +147,16 @@ class Curve2(Result):
     def to_dataset(self) -> xr.Dataset:
         """Dataset over ``point``; ``special`` is empty at ordinary points. Multipliers are of the return map."""
         kinds = {"special": [getattr(point, "kind", None) for point in self.points]}
-        names = ("values", "error_bound", "coefficient", "coefficient_error", "frequency", "orbit", "multipliers")
+        names = (
+            "values",
+            "error_bound",
+            "coefficient",
+            "coefficient_error",
+            "frequency",
+            "period",
+            "orbit",
+            "multipliers",
+        )
         first, last = (end.label for end in self.endings)
         about = {"kind": self.kind.label, "first_end": first, "last_end": last}
         return dataset("point", columns(self.points, *names) | kinds, **about)

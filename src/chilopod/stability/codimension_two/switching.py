@@ -91,7 +91,7 @@ class _Unfolding:
         self._equations = curve = CriticalCurve(family2, target, offers(system, "orbit"), box, budget)
         # For a point on the edge of the box the other side is used.
         curve.box = box + 2.0 * _FARTHEST * curve.widths[:, None] * [-1.0, 1.0]
-        self.spot = spot = curve.begin(Place(point.orbit, point.values, 0.0))
+        self.spot = spot = curve.begin(Place(point.orbit, point.values, 0.0), point.period)
         detector = Detector(curve, kind, True)
         here = Critical(target, spot)
         beside = [Critical(target, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
@@ -142,7 +142,7 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
             place = there.fold(sign * amplitude)
             if place is None:
                 continue
-            found = folds.begin(place)
+            found = folds.begin(place, periods * there.spot.image.period)
         except (AnalysisError, ArithmeticError, ValueError) as error:
             cause = error
             continue

@@ -97,7 +97,7 @@ def follow2(
     curve = CriticalCurve(family2, target, known, box, Budget(budget, seconds))
     nu = complex(start.multiplier)
     with curve.budget:
-        first = curve.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)))
+        first = curve.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)), start.period)
         detector = Detector(curve, start.kind, coefficients)
         origin = detector.station(first)
 
