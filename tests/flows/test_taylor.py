@@ -175,6 +175,21 @@ def test_sliding_is_named():
             flow.advance(np.array([start]), 0.0, 3.0, params)
 
 
+@pytest.mark.parametrize(
+    ("rhs", "start", "said"),
+    [
+        (lambda t, x: [-1.0 - np.abs(x[0]) ** 1.5], 0.5, "is not smooth: a root of"),
+        (lambda t, x: [-1.0 - np.abs(x[0]) ** 1.3], 0.5, "is not smooth: a power of"),
+        (lambda t, x: [1.0 / (1.0 + np.exp(-2000.0 * x[0])) - 1.0], -0.2, "overflows: exp of"),
+    ],
+)
+def test_a_motion_that_ends_at_a_function_names_it(rhs, start, said):
+    """It does not diverge."""
+    flow, params = flow_of(rhs, 1)
+    with pytest.raises(AnalysisError, match=f"the right-hand side {said}"):
+        flow.advance(np.array([start]), 0.0, 3.0, params)
+
+
 def test_what_cannot_go_on_ends(monkeypatch):
     monkeypatch.setattr("chilopod.flows.taylor.flow._MOST_WORK", 1e5)
     flow, params = flow_of(lambda t, x: x**2, 1)

@@ -33,11 +33,11 @@ class TooManySteps(AnalysisError):
     """The budget of steps is spent, as for a stiff right-hand side."""
 
 
-def failure(status: int, t: float) -> ChilopodError:
-    """The error for an integration that stopped early at a time."""
+def failure(status: int, t: float, cause: str = "") -> ChilopodError:
+    """The error for an integration that stopped early at a time, with its cause in the right-hand side, if known."""
     if status not in _REASONS:
         return deadline.over()
-    reason, advice = _REASONS[status]
+    reason, advice = (f"{cause} at t = {{t:g}}", None) if cause else _REASONS[status]
     return (TooManySteps if status == BUDGET else AnalysisError)(reason.format(t=t), field="rhs", allowed=advice)
 
 

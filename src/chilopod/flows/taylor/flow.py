@@ -20,8 +20,8 @@ import numpy as np
 
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.carrying import RESOLUTION, failure, pieces
-from chilopod.flows.tracing.tape import Tape
+from chilopod.flows.carrying import NOT_FINITE, RESOLUTION, failure, pieces
+from chilopod.flows.tracing.tape import COSH, EXP, LOG, POWER, SINH, SQRT, Tape
 from chilopod.flows.tracing.trace import evaluate
 from chilopod.frozen import Array
 
@@ -36,6 +36,10 @@ _NOTHING_BESIDE = 1e-6  # negligible entry, relative to the geometric mean of th
 _SHAKE = 4.0 * 2.0**-53
 _UNDERFLOW = 1e-290  # limit below which numbers lose precision
 _NOTHING = np.empty((0, 0))
+_OVERFLOWING = {EXP: "exp", SINH: "sinh", COSH: "cosh"}
+_LARGE = 300.0  # argument beyond which the series of these may overflow
+_ROOTS = {SQRT: "a root", POWER: "a power", LOG: "a logarithm"}
+_ZERO = 1e-9  # argument, relative to states and rates, at which the series of these may overflow
 
 
 class Passage(NamedTuple):
@@ -145,9 +149,25 @@ class TaylorFlow:
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
             status = carry(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:
-                raise failure(status, report[1])
+                cause = self._cause(report[1], x.reshape(-1, n), params) if status == NOT_FINITE else ""
+                raise failure(status, report[1], cause)
             steps += int(report[0])
         return steps
+
+    def _cause(self, t: float, states: Array, params: Array) -> str:
+        """The function without a finite series in one of some states; empty if none stands out."""
+        nodes = np.arange(self.tape.layout[4])
+        for x in states[np.isfinite(states).all(axis=1)]:
+            values = evaluate(self.tape, nodes, t, x, params)
+            rates = np.nan_to_num(values[self.tape.slopes], posinf=0.0, neginf=0.0)
+            zero = _ZERO * float(np.abs([x, rates]).max())
+            for code, operand in self.tape.program[:2, : nodes.size].T.tolist():
+                if code in _OVERFLOWING and values[operand] > _LARGE:
+                    return f"the right-hand side overflows: {_OVERFLOWING[code]} of {values[operand]:.6g}"
+                if code in _ROOTS and values[operand] <= zero:
+                    what = "smooth" if values[operand] >= -zero else "finite"
+                    return f"the right-hand side is not {what}: {_ROOTS[code]} of {values[operand]:.6g}"
+        return ""
 
     def _clock_table(self, params: bytes) -> tuple[Array, float]:
         """Functions of time on a grid over the period, each with its largest modulus last, and the period."""
