@@ -170,6 +170,21 @@ def test_an_event_that_passes_time_0_is_named():
     assert branch.reason.startswith("an event passes time 0 of the orbit")
 
 
+def test_a_grazing_is_named():
+    """The linear motion has the amplitude force / |3 + 0.2 i|, and meets a wall at 1."""
+    wall = Event(lambda t, x: x[0] - 1.0, lambda t, x: [x[0], -0.8 * x[1]], 1)
+
+    def family(force):
+        return from_rhs(
+            lambda t, x: [x[1], -0.2 * x[1] - 4.0 * x[0] + force * np.cos(t + 1.0)], 2, 2.0 * np.pi, events=[wall]
+        )
+
+    branch = follow(family, [0.1, 0.1], (2.0, 5.0))
+    assert branch.ending is Ending.LOST
+    assert branch.reason.startswith("just ahead the orbit grazes an event")
+    assert branch.points[-1].value == pytest.approx(abs(3.0 + 0.2j), abs=1e-4)
+
+
 def test_time_0_of_an_autonomous_orbit_is_moved_away_from_an_event():
     """The wall of an oscillator reaches the state in which the branch began."""
     wall = Event(lambda t, x, w: x[0] - w, lambda t, x, w: [x[0], -0.9 * x[1]], 1)

@@ -34,6 +34,7 @@ from chilopod.stability.problem.returns import carried, jumps_at_ends, return_du
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum.eigenvalues import VERDICTS
 from chilopod.stability.tracing.equations import Step
+from chilopod.stability.tracing.tolerances import SHORTEST
 from chilopod.stability.tracing.tracer import Ending, outward, trace
 
 if TYPE_CHECKING:
@@ -51,6 +52,9 @@ BUDGET = 200_000
 
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 _EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
+_GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
+_AHEAD = 10.0 * SHORTEST * LONGEST  # distance ahead of a lost curve's end at which an orbit is past a grazing
+_JUMPS, _SMOOTH = 0.3, 0.1  # change of the derivative, relative to it, in a grazing; and largest part of it before
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
@@ -295,6 +299,8 @@ def followed(
         if ending is Ending.LOST and _at_event(curve, found[-1]):
             reason = _EVENT_AT_ZERO
             moved = _elsewhere(curve, found[-1]) if done > before else None
+        elif ending is Ending.LOST and _grazes(curve, found[-1]):
+            reason = _GRAZES
         if moved is not None:
             remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
     said = tuple(dict.fromkeys(remarks))
@@ -308,6 +314,23 @@ def _at_event(curve: Curve, last: BranchPoint) -> bool:
         return jumps_at_ends(system, last.orbit, _duration(system, last))
     except ChilopodError:
         return False
+
+
+def _grazes(curve: Curve, last: BranchPoint) -> bool:
+    """True if the derivative of the return jumps just ahead of a point, as where an orbit grazes an event."""
+    section = curve.section_at(last.orbit, last.value, last.period)
+
+    def scaled(distance: float) -> Array:
+        moved = distance * last.tangent * last.units
+        image = curve.image(last.orbit + moved[:-1], last.value + float(moved[-1]), section)
+        return np.asarray(image.jacobian * last.units[:-1] / last.units[:-1, None])
+
+    try:
+        behind, here, ahead = map(scaled, (-_AHEAD, 0.0, _AHEAD))
+    except ChilopodError:
+        return False
+    before, jump = float(np.linalg.norm(here - behind)), float(np.linalg.norm(ahead - here))
+    return jump > _JUMPS * max(1.0, float(np.linalg.norm(here))) > before / _SMOOTH
 
 
 def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
