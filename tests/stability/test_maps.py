@@ -7,6 +7,7 @@ import pytest
 
 from chilopod.errors import ParameterError
 from chilopod.stability import (
+    Kind,
     PeriodicSystem,
     begin,
     find_orbit,
@@ -155,3 +156,24 @@ def test_a_wrong_derivative_is_refused_once_and_in_one_line():
 )
 def test_a_right_derivative_passes_the_check(image):
     from_map(image, 1).flow(np.array([0.5]), 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("quadratic", "kind"), [(0.0, Kind.PITCHFORK), (1e-8, Kind.TRANSCRITICAL)])
+def test_a_quadratic_term_that_a_symmetry_allows_need_not_be_there(quadratic, kind):
+    """z -> (1 + p) z - z |z|^2 + 0.2 conj(z)^5 + quadratic conj(z)^2, with the symmetries of a triangle."""
+    turn = complex(-0.5, math.sqrt(0.75))
+
+    def family(p):
+        def image(x):
+            z, other = complex(*x), complex(x[0], -x[1])
+            along, across = 1.0 + p - 2.0 * z * other, -z * z + other**4 + 2.0 * quadratic * other
+            rows = along + across, 1j * (along - across)
+            moved = (1.0 + p - z * other) * z + 0.2 * other**5 + quadratic * other**2
+            return [moved.real, moved.imag], [[each.real for each in rows], [each.imag for each in rows]]
+
+        generators = [[[turn.real, -turn.imag], [turn.imag, turn.real]], [[1.0, 0.0], [0.0, -1.0]]]
+        return from_map(image, 2, orbit=[0.0, 0.0], spatial_symmetry=generators)
+
+    (point,) = locate(family, (-0.3, 0.2))
+    assert (point.kind, point.multiplicity) == (kind, 2)
+    assert len(switch(family, point)) == 2

@@ -20,7 +20,8 @@ from chilopod.stability.points import WITHOUT_CRITICALITY, BifurcationPoint, Cri
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, sizes
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
-from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
+from chilopod.stability.symmetry.equivariants import SymmetricCrossing, SymmetricKind, symmetric_crossing
+from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event
@@ -87,14 +88,18 @@ def described(
             count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
             said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
             raise ContinuumError(said)
-    kind = _kind(crossing, k, form, symmetry if breaking else None) if kind is None else kind
+    modes = None if simple else _modes(spec, crossing, orbit, block, symmetry)
+    if kind is None:
+        kind = _kind(crossing, k, form, symmetry if breaking else None)
+        if kind is Kind.TRANSCRITICAL and modes is not None and symmetry is not None:
+            kind, symmetry = _by_quadratic_term(system, orbit, modes, symmetry)
     verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
     about: dict[str, Any] = {"criticality": verdict, "multiplicity": critical.size, "symmetry": symmetry}
     error_bound += 4.0 * _EPSILON * abs(value)
     period = orbit.period
     point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, period=period, **about)
     if not simple:
-        return replace(point, modes=_modes(spec, crossing, orbit, block, symmetry))
+        return replace(point, modes=modes)
     return with_coefficients(point, form) if form is not None and with_normal_form else point
 
 
@@ -162,6 +167,38 @@ def _formed(
         return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)
     except (AnalysisError, SpentError, ValueError):
         return None
+
+
+def _by_quadratic_term(
+    system: SystemLike, orbit: Orbit, modes: ComplexArray, symmetry: SymmetricCrossing
+) -> tuple[Kind, SymmetricCrossing]:
+    """Kind of a crossing at +1 whose symmetry allows quadratic terms, by their coefficient along an axial branch: among
+    the states with its symmetries the multiplier is simple."""
+    axes = [i for i, branch in enumerate(symmetry.branches) if not branch.reversed]
+    if not axes:
+        return Kind.TRANSCRITICAL, symmetry
+    x, image, size = orbit.state, orbit.image, sizes(system, orbit.state, orbit.image.duration)
+    ahead = modes[:, axes[0]].real
+    basis = symmetric_basis(system, x + ahead / np.linalg.norm(ahead / size), size)
+    if basis is None:
+        return Kind.TRANSCRITICAL, symmetry
+    units, start = size / size[:, None], basis.T @ (x / size)
+    jacobian = basis.T @ (image.jacobian * units) @ basis
+    error = np.abs(basis.T) @ (np.nan_to_num(image.error, posinf=0.0) * units) @ np.abs(basis)
+    within = replace(image, state=start, jacobian=jacobian, error=error, velocity=None, normal=None)
+    spec = spectrum(within)
+    mode, left = (each[:, spec.nearest(1.0)].real.astype(np.complex128) for each in (spec.right, spec.left))
+
+    def mapped(states: Array) -> Array:
+        moved = returned_states(system, x + size * ((states - start) @ basis.T), orbit.section)
+        return np.asarray(start + ((moved - x) / size) @ basis)
+
+    try:
+        kind = kind_at_plus_one(normal_form(mapped, CriticalOrbit(start, within, 1.0 + 0.0j, mode, left)))
+    except (AnalysisError, SpentError, ValueError):
+        return Kind.BRANCH_POINT, symmetry
+    pitchfork = SymmetricKind.EQUIVARIANT_PITCHFORK
+    return kind, replace(symmetry, kind=pitchfork) if kind is Kind.PITCHFORK else symmetry
 
 
 def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: SymmetricCrossing | None) -> Kind:
