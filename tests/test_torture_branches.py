@@ -11,6 +11,7 @@ import branch_kinds as kinds
 import branches
 import own_flow as own
 from chilopod.stability import Kind
+from own_orbits import Crossing
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +43,14 @@ def test_a_branch_is_right(followed):
     found = checks.checked(asked, branch)
     assert found.faults == found.own == []
     assert found.counts["confirmed"] == len(branch.special_points) == 2
+
+
+def test_a_branch_may_turn_in_the_pitchfork_where_it_leaves():
+    fold, crossing = Crossing(0, 0.75, 1e-9, 0.5, True), Crossing(0, 0.75 + 2e-9, 1e-9, 0.5)
+    pair, apart = Crossing(2, 0.75, 1e-9, 0.5), Crossing(0, 0.76, 1e-9, 0.6)
+    for mine, other in ((fold, crossing), (crossing, fold)):
+        assert checks.at_once(mine, [pair, other, apart], 1e-12) == (crossing, [pair, apart])
+    assert checks.at_once(fold, [apart], 1e-12) == (fold, [apart])
 
 
 def left_out(branch, at):

@@ -237,6 +237,8 @@ def _compared(
             continue
         mine = near[0]
         rest.remove(mine)
+        if test == 0 and point.special.label != "fold":
+            mine, rest = at_once(mine, rest, bound)
         multiple = point.bifurcation.multiplicity > (2 if test == 2 else 1)
         if multiple:  # which cross at one place
             rest = [each for each in rest if abs(each.place - mine.place) > 1e-3]
@@ -262,6 +264,19 @@ def _compared(
             found.gap(f"{name} at {each.value!r}: {remark}")
         else:
             found.fault("missed", f"{name} at {each.value!r} ± {each.error:.1e}, fold {each.fold}")
+
+
+def at_once(mine: Crossing, rest: list[Crossing], bound: float) -> tuple[Crossing, list[Crossing]]:
+    """The crossing that a point at +1 is, and the others: a branch that turns in the pitchfork where it leaves another
+    one has a fold and a crossing within their errors there."""
+    twins = [
+        each
+        for each in rest
+        if each.test == 0
+        and each.fold != mine.fold
+        and abs(each.value - mine.value) <= bound + 3.0 * (each.error + mine.error)
+    ]
+    return (twins[0] if twins and mine.fold else mine), [each for each in rest if each not in twins]
 
 
 def _touches(found: Verdict, segment: Segment, point: Any, place: float, test: int) -> bool:
