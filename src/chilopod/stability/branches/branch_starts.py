@@ -315,7 +315,10 @@ def _along(matrix: Array, rising: bool) -> Array:
     _, values, rows = np.linalg.svd(matrix)
     if values[-1] <= _SINGULAR * max(1.0, float(values[0])):
         said = "branches meet here: the orbit alone does not determine one"
-        raise AnalysisError(said, field="start", allowed="another value, or switch from the located point")
+        allowed = (
+            "another value; switch from a located point; for families by energy a term l * grad H, l the parameter"
+        )
+        raise AnalysisError(said, field="start", allowed=allowed)
     tangent: Array = rows[-1]
     # At a fold the parameter does not rise: the largest part of the state gives the direction.
     along = tangent[-1] if abs(tangent[-1]) > IN_FOLD else tangent[np.abs(tangent).argmax()]
