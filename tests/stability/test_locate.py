@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Kind, PeriodicSystem, SearchStatus, find_orbit, from_map, from_rhs, locate
+from chilopod.stability import (
+    Kind,
+    PeriodicSystem,
+    SearchStatus,
+    SpentError,
+    find_orbit,
+    from_map,
+    from_rhs,
+    locate,
+)
 from helpers.systems import linear, lorenz
 
 PERIOD = 1.3
@@ -231,7 +240,7 @@ def test_a_search_that_is_out_of_time_after_the_first_orbit_is_a_result():
     guess = np.concatenate([2.0 * np.ones(cells), np.zeros(cells)])
     find_orbit(ring(0.5), guess)  # compiles
     for seconds in (0.2, 0.4, 0.8):
-        with contextlib.suppress(AnalysisError):  # there is no first orbit yet
+        with contextlib.suppress(SpentError):  # there is no first orbit yet
             assert not locate(ring, (0.5, 2.0), orbit=guess, seconds=seconds).complete
 
 

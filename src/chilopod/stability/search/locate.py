@@ -146,7 +146,8 @@ def locate(
         but not compilation; the description of found points may take 0.7 s more.
 
     An AnalysisError says that there is no orbit at the lower end of the interval, or ``family`` raises an exception
-    there. At any other value an exception counts as a missing orbit and gives a remark.
+    there. A SpentError says that ``seconds`` ended before the first orbit was found. At any other value an exception
+    counts as a missing orbit and gives a remark.
     """
     low, high = checked_interval(between)
     check_arguments(family=family, normal_form=normal_form, budget=budget)
