@@ -1,6 +1,7 @@
 """The command line, run in this process."""
 
 import json
+import re
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 
@@ -12,6 +13,11 @@ def run(*arguments) -> tuple[int, str, str]:
     with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
         code = main([str(each) for each in arguments])
     return code, out.getvalue(), err.getvalue()
+
+
+def remarks(err: str) -> list[str]:
+    """Lines on stderr without the progress that a slow machine, or the first of all runs, prints."""
+    return [each for each in err.splitlines() if not re.fullmatch(r"[\w ]+: (\d+ s.*|compiling, once.*)", each)]
 
 
 def printed(*arguments):
