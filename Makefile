@@ -7,7 +7,7 @@
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check --no-input
-UV := $(VENV)-lock/bin/uv
+UV := $(BIN)/uv
 LOCK := requirements.lock
 LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
@@ -46,7 +46,7 @@ setup: $(DEV)  ## make .venv with everything that the tests need
 # uv installs in a third of pip's time; where it cannot be had or fails, pip does the same.
 define install
 	@$(PIP) install -c $(LOCK) setuptools
-	@{ $(PIP) install uv && UV_HTTP_TIMEOUT=20 $(BIN)/uv pip install --quiet --python $(BIN)/python -c $(LOCK) \
+	@{ $(PIP) install uv && UV_HTTP_TIMEOUT=20 $(UV) pip install --quiet --python $(BIN)/python -c $(LOCK) \
 	    --no-build-isolation -e '$(1)'; } >/dev/null 2>&1 || $(PIP) install -c $(LOCK) --no-build-isolation -e '$(1)'
 endef
 
@@ -141,6 +141,7 @@ package: $(DEV)  ## build what is handed out into dist, and try it in an empty e
 
 bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchmarks/README.md
 	$(BIN)/python benchmarks/straight_walk.py
+	$(BIN)/python benchmarks/maps.py
 	$(BIN)/python benchmarks/periodic_systems.py
 	$(BIN)/python benchmarks/simulation.py
 	$(BIN)/python benchmarks/stepping.py
@@ -152,7 +153,7 @@ bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchm
 
 $(UV):
 	$(make_venv)
-	@$(BIN)/python -m venv $(VENV)-lock && $(VENV)-lock/bin/python -m pip --quiet --disable-pip-version-check install uv
+	@$(PIP) install uv
 
 # One lock for all supported Pythons and systems: no addresses and no hashes, so it also serves as a constraints file.
 COMPILE := $(UV) pip compile --quiet --no-config --universal --python-version 3.11 --fork-strategy fewest \
@@ -168,6 +169,6 @@ lock: $(UV)  ## renew both lock files from pyproject.toml
 	@rm -f $(LOCK).new $(LOCK_BENCH).new
 
 clean:  ## remove the environment, caches and generated output
-	rm -rf $(VENV) $(VENV)-lock $(VENV)-lowest $(VENV)-newest build dist report .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
+	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest build dist report .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
 	  .import_linter_cache src/*.egg-info docs/gallery docs/reference
 	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

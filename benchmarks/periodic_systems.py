@@ -13,6 +13,8 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import functools
+import time
 from collections.abc import Callable
 from math import pi
 from typing import Any
@@ -25,9 +27,12 @@ from scipy.optimize import brentq
 
 from chilopod.stability import PeriodicSystem, find_orbit, follow, from_rhs, locate, multipliers, switch
 
-from _timing import duration, machine, median_seconds, table, write_section
+import _timing
+from _timing import duration, machine, table, write_section
 
 Array = NDArray[np.float64]
+
+median_seconds = functools.partial(_timing.median_seconds, clock=time.process_time)  # others may compute beside
 
 PITCHFORK = 2.40337711605714358988
 STATE = np.array([1.87793925257730701435, 0.63506904472679528861])
@@ -155,8 +160,9 @@ def rows() -> list[list[str]]:
 
 
 def main() -> None:
+    load = f" CPU time of one core; load average before: {os.getloadavg()[0]:.1f}."
     text = table(["what", "who", "time", "relative error"], rows())
-    write_section("periodic-systems", machine() + "\n\n" + text)
+    write_section("periodic-systems", machine() + load + "\n\n" + text)
 
 
 if __name__ == "__main__":

@@ -7,35 +7,31 @@ under their modules, too; on the way it changes its nature.
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
-from chilopod import load_robot, units
-from chilopod.analysis import transition_curve
-from chilopod.stability import Kind
+from chilopod import load_robot
+from chilopod.analysis import map
 
 robot = load_robot("aoi2022-planar")
-springs = tuple(units.parse(text, "N*m/rad") for text in ("7 N*mm/deg", "16 N*mm/deg"))
-offsets = (0.01, 0.07)  # m
 
 # %%
-# The curve is found at one place and followed from there both ways, with the bend that grows and with the coefficient
-# that says how: below zero the curved walk grows gently out of the straight one, above it the robot jumps.
+# The map computes growth rates on a grid, and continues the curve between them exactly, with the coefficient that says
+# how the walk bends: below zero the curved walk grows gently out of the straight one, above it the robot jumps.
 
-paths = ("springs.stiffness[0]", "legs.forward_offset")
-found = transition_curve(robot, paths, (springs, offsets), Kind.PITCHFORK, second=robot.get(paths[1]))
-(turning,) = found.curve.special
-spring, offset = found.shown(turning.values)
+springs = ("springs.stiffness[0]", "7 N*mm/deg", "16 N*mm/deg")
+offsets = ("legs.forward_offset", "1 cm", "7 cm")
+found = map(robot, springs, offsets, points=25)
+(curve,), (turning,) = found.curves, found.special
+spring, offset = found.x.shown(turning.values)[0], turning.values[1]
 print(f"{turning.kind.label} at {spring:.5f} N·mm/deg and {1e3 * offset:.4f} mm")
 found
 
 # %%
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), sharey=True, layout="constrained")
-values = found.values * [1.0, 1e3]  # N·mm/deg and mm
-coefficient = np.array([point.coefficient for point in found.curve.points], dtype=float)  # NaN where it changes
-left.plot(*values.T, color="grey", linewidth=1)
-for gentle, color, name in ((coefficient < 0.0, "C0", "bends gently"), (coefficient >= 0.0, "C3", "jumps")):
-    left.plot(*values[gentle].T, "o", markersize=4, color=color, label=name)
-    right.plot(coefficient[gentle], values[gentle, 1], "o", markersize=4, color=color)
+stiffness, ahead = found.x.shown(curve.values[:, 0]), 1e3 * curve.values[:, 1]  # N·mm/deg and mm
+left.plot(stiffness, ahead, color="grey", linewidth=1)
+for gentle, color, name in ((curve.coefficient < 0.0, "C0", "bends gently"), (curve.coefficient >= 0.0, "C3", "jumps")):
+    left.plot(stiffness[gentle], ahead[gentle], "o", markersize=4, color=color, label=name)
+    right.plot(curve.coefficient[gentle], ahead[gentle], "o", markersize=4, color=color)
 for axes, place in ((left, spring), (right, 0.0)):
     axes.plot(place, 1e3 * offset, "D", color="black", label="where it changes")
 left.set(xlabel="first spring $k_1$ (N·mm/deg)", ylabel="feet ahead of the module's centre (mm)", title="the pitchfork")

@@ -2,6 +2,7 @@
 
 import os
 import platform
+import sys
 from collections import defaultdict
 from pathlib import Path
 from types import SimpleNamespace
@@ -65,6 +66,14 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
             lambda found, section: report.add(found, [section]),
         )
     return SimpleNamespace(folder=folder, found=found, told=told, failures=report.failures, painted=painted)
+
+
+@pytest.fixture(autouse=True)
+def no_figure_stays_open():
+    """Figures of pyplot are of the whole process: none is left to the tests that follow in it."""
+    yield
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        pyplot.close("all")
 
 
 @pytest.fixture(scope="module")

@@ -72,10 +72,7 @@ def test_the_help_has_all_choices(capsys):
             ["--targets", "some.txt"],
             "some.txt: --targets = 'some.txt': must be a number of targets; allowed: 1 to 1000",
         ),
-        (
-            ["--strategy", "pitchfrok"],
-            "--strategy = 'pitchfrok': must be a strategy; did you mean 'pitchfork'?",
-        ),
+        (["--strategy", "pitchfrok"], "--strategy = 'pitchfrok': must be a strategy; did you mean 'pitchfork'?"),
         (["--k1", "15 N*mm/deg"], "--k1 = '15 N*mm/deg': must not be given: strategy variable sets its own springs"),
         (["--strategy", "pitchfork"], "--k1: strategy pitchfork needs one stiffness"),
         (["--strategy", "hopf", "--k1", "-3"], "--k1 = '-3': must be positive"),

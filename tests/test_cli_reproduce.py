@@ -23,14 +23,7 @@ def test_another_robot_is_refused_in_one_line(capsys):
     assert "takes no robot and no --set" in " ".join(capsys.readouterr().out.split())
 
 
-def test_the_json_names_the_robots_and_has_the_rows_of_that_size(tmp_path):
-    found = printed("reproduce", "--tiny", "--only", "modules", "--out", tmp_path, "--json")
-    assert (found["robot"], found["whole_robot"]) == ("aoi2022-planar", "aoi2022")
-    (row,) = found["rows"]
-    assert "7 to 7 modules" in row["quantity"]
-
-
-def test_a_page_that_is_no_report_is_not_replaced(capsys, tmp_path):
+def test_a_page_that_is_no_report_is_not_replaced_and_the_json_has_robots_and_rows_of_that_size(capsys, tmp_path):
     page = tmp_path / "index.html"
     page.write_text("<title>mine</title>", encoding="utf-8")
     asked = ["reproduce", "--tiny", "--only", "modules", "--out", str(tmp_path)]
@@ -38,4 +31,7 @@ def test_a_page_that_is_no_report_is_not_replaced(capsys, tmp_path):
     assert "index.html" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [page]
     assert main([*asked, "--force"]) == 0
-    assert main(asked) == 0  # its own goes on
+    found = printed(*asked, "--json")  # its own goes on
+    assert (found["robot"], found["whole_robot"]) == ("aoi2022-planar", "aoi2022")
+    (row,) = found["rows"]
+    assert "7 to 7 modules" in row["quantity"]

@@ -61,7 +61,7 @@ def test_version():
 def test_new_writes_a_robot_that_reads_back(folder):
     assert run("robot", "new", "mine.toml", "--modules", "8", "--set", "gait.stride=2 cm") == (
         0,
-        "wrote mine.toml\n",
+        "wrote mine.toml: 8 modules of 0.1688 m, 1.35 m in all\n",
         "",
     )
     robot = load_robot("mine.toml")
@@ -77,7 +77,8 @@ def test_new_overwrites_only_when_told(folder):
     assert (folder / "mine.toml").read_text() == "precious"
     code, out, _ = run("robot", "new", "mine.toml", "--force", "--json")
     assert code == 0
-    assert json.loads(out) == {"robot": "mine", "file": "mine.toml"}
+    size = "6 modules of 0.225 m, 1.35 m in all"
+    assert json.loads(out) == {"robot": "mine", "file": "mine.toml", "size": size}
     assert load_robot("mine.toml").name == "mine"
 
 
@@ -93,26 +94,35 @@ def test_new_with_a_twin_walks_in_three_dimensions(folder):
     assert run("robot", "new", "mine.toml", "--twin", "--preset", "flat.toml")[0] == 0
     mine = load_robot("mine.toml")
     assert (mine.body.mass, mine.twin) == (9.0, preset.twin)
-    assert mine.provenance_of("twin.clearance") == preset.provenance_of("twin.clearance")
-    assert mine.provenance_of("legs.half_width") == load_robot(PRESET).provenance_of("legs.half_width")
+    assert mine.provenance_of("twin.clearance") == f"copied from aoi2022: {preset.provenance_of('twin.clearance')}"
+    said = load_robot(PRESET).provenance_of("legs.half_width")
+    assert mine.provenance_of("legs.half_width") == f"copied from {PRESET}: {said}"
+    assert mine.provenance_of("body.mass") == "set by override"
     assert run("robot", "new", "again.toml", "--twin", "--preset", "whole.toml")[0] == 0
     assert load_robot("again.toml").twin == whole.twin
     assert run("robot", "export", "mine.toml", "--out", "new/folder/mine.xml")[0] == 0
     assert run("robot", "new", "another/new/folder/mine.toml")[0] == 0
 
 
+def test_new_with_lengths_of_modules_or_body(folder):
+    assert run("robot", "new", "a.toml", "--modules", "10", "--module-length", "20 cm")[0] == 0
+    assert load_robot("a.toml").body.length == pytest.approx(2.0)
+    assert run("robot", "new", "b.toml", "--modules", "10", "--body-length", "2 m")[0] == 0
+    assert load_robot("b.toml").module_length == pytest.approx(0.2)
+    # An edited number with the provenance of the preset is remarked upon.
+    file = folder / "b.toml"
+    file.write_text(file.read_text().replace('mass = "8.5 kg"', 'mass = "9 kg"'))
+    assert "not those of the preset, with its provenance: body.mass." in run("robot", "check", "b.toml")[1]
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["."],
-        ["x.toml", "--modules", "1"],
-        ["x.toml", "--modules", "many"],
-        ["x.toml", "--preset", "aoi2023"],
-        ["x.toml", "--set", "gait.stride=3 kg"],
-        ["\udcff.toml"],
-        ["\x1b.toml"],
+        ["x.toml", "--module-length", "1 m", "--body-length", "2 m"], ["x.toml", "--module-length", "1 kg"],
+        ["."], ["x.toml", "--modules", "1"], ["x.toml", "--modules", "many"], ["x.toml", "--preset", "aoi2023"],
+        ["x.toml", "--set", "gait.stride=3 kg"], ["\udcff.toml"], ["\x1b.toml"],
     ],
-)
+)  # fmt: skip
 def test_new_leaves_nothing_behind_when_refused(folder, arguments):
     refused("robot", "new", *arguments)
     assert os.listdir(folder) == []
@@ -144,6 +154,19 @@ def test_check():
     assert code == 0
     assert json.loads(out)["valid"] is True
     assert "whole period" in json.loads(out)["remarks"][0]
+
+
+@pytest.mark.parametrize(
+    ("robot", "change", "said"),
+    [
+        (PRESET, "gait.stride=30 cm", "Legs of neighbouring modules collide"),
+        (PRESET, "springs.stiffness[0]=3 N*mm/deg", "A joint bends beyond a right angle"),
+        ("aoi2022", "twin.hip_height=13 cm", "cannot walk in three dimensions"),
+    ],
+)
+def test_check_warns_of_walks_that_cannot_be(robot, change, said):
+    assert said not in run("robot", "check", robot)[1]
+    assert said in run("robot", "check", robot, "--set", change)[1]
 
 
 @pytest.mark.parametrize(

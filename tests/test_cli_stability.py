@@ -26,16 +26,9 @@ def test_stability_json_has_all_reduced_exponents_by_falling_real_part():
     result = json.loads(out)
     assert (code, remarks(err)) == (0, [])
     assert set(result) == {
-        "robot",
-        "period_s",
-        "stable",
-        "verdict",
-        "exponents_per_s",
-        "multipliers",
-        "half_period_multipliers",
-        "error_estimate",
-        "modes",
-    }
+        "robot", "period_s", "stable", "verdict", "exponents_per_s", "multipliers", "half_period_multipliers",
+        "error_estimate", "modes",
+    }  # fmt: skip
     real = [exponent[0] for exponent in result["exponents_per_s"]]
     assert (
         len(real) == len(result["multipliers"]) == len(result["half_period_multipliers"]) == len(result["modes"]) == 13

@@ -32,18 +32,6 @@ def test_a_walk_in_three_dimensions(capsys, tmp_path):
     assert "feet creep like viscous ones" in capsys.readouterr().out
 
 
-@pytest.mark.slow
-def test_a_turn_in_three_dimensions_comes_with_a_replay(tmp_path):
-    out = tmp_path / "turn"
-    arguments = ["turn", ROBOT, "--engine", "twin", "--target", "45 deg, 1.3 m", "--k1", "21 N*mm/deg"]
-    found = printed(*arguments, "--seed", "1", "--out", str(out), "--json")
-    assert found["engine"] == "twin"
-    assert found["walks"][0]["outcome"] == "arrived"
-    page = (out / "turn.html").read_text(encoding="utf-8")
-    assert "webgl" in page.lower()
-    assert (out / "turn.png").stat().st_size > 10_000
-
-
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [

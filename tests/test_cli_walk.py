@@ -130,22 +130,13 @@ def test_turn_with_a_given_spring_and_the_other_strategies():
     outcomes = {
         (strategy, spring): printed("turn", ROBOT, *target, "--strategy", strategy, "--k1", spring)["walks"][0]
         for strategy, spring in (
-            ("pitchfork", "7 N*mm/deg"),
-            ("pitchfork", "9.8 N*mm/deg"),
-            ("pitchfork", "21 N*mm/deg"),
-            ("hopf", "5 N*mm/deg"),
-            ("leg-yaw", "auto"),
-            ("open-loop", "10 N*mm/deg"),
+            ("pitchfork", "7 N*mm/deg"), ("pitchfork", "9.8 N*mm/deg"), ("pitchfork", "21 N*mm/deg"),
+            ("hopf", "5 N*mm/deg"), ("leg-yaw", "auto"), ("open-loop", "10 N*mm/deg"),
         )
-    }
+    }  # fmt: skip
     assert [walk["outcome"] for walk in outcomes.values()] == [
-        "turned inside",
-        "arrived",
-        "bulged outside",
-        "bulged outside",
-        "bulged outside",
-        "bulged outside",
-    ]
+        "turned inside", "arrived", "bulged outside", "bulged outside", "bulged outside", "bulged outside",
+    ]  # fmt: skip
     assert outcomes["open-loop", "10 N*mm/deg"]["epsilon3_rad2_s"] == 0.0
 
 
@@ -153,22 +144,18 @@ def test_turn_with_a_given_spring_and_the_other_strategies():
     ("arguments", "words"),
     [
         (["walk", ROBOT, "--duration", "0 s"], ["duration", "more than 0"]),
-        (["walk", ROBOT, "--duration", "-3 s"], ["duration"]),
         (["walk", ROBOT, "--duration", "3 kg"], ["kg"]),
         (["walk", ROBOT, "--rate", "0"], ["rate"]),
         (["walk", ROBOT, "--repeats", "0"], ["--repeats"]),
         (["walk", ROBOT, "--repeats", "3"], ["repeats", "seed"]),
         (["walk", ROBOT, "--trials", "/dev/null/trials"], ["/dev/null/trials", "cannot be written"]),
         (["walk", ROBOT, "--initial-joints", "1,2 deg"], ["not 2", "5"]),
-        (["walk", ROBOT, "--initial-joints", "1,x,0,0,0 deg"], ["x"]),
         (["walk", ROBOT, "--set", "springs.stiffness=0 N*mm/deg"], ["springs.stiffness", "positive"]),
         (["walk", ROBOT, "--controller", "nosuch.module:Class"], ["cannot be imported", "nosuch"]),
         (["walk", ROBOT, "--controller", "Class"], ["must name an object", "package.module:Class"]),
         (["walk", ROBOT, "--controller", ""], ["must name an object"]),
-        (["walk", ROBOT, "--controller", "os; rm:Class"], ["must name an object"]),
         (["turn", ROBOT, "--target", "0 deg, 0 m"], ["distance"]),
         (["turn", ROBOT, "--target", "20 deg, 0.1 m"], ["distance", "0.15"]),
-        (["turn", ROBOT, "--target", "20 deg, -1 m"], ["distance"]),
         (["turn", ROBOT, "--target", "45"], ["45 deg, 1.3 m"]),
         (["turn", ROBOT, "--target", "45 m, 1.3 m"], ["target"]),
         (["turn", ROBOT, "--target", "80 deg, 0.4 m"], ["must be at least the tightest radius"]),
@@ -177,9 +164,7 @@ def test_turn_with_a_given_spring_and_the_other_strategies():
         ([*THERE, "--k1", "atuo"], ["atuo"]),
         ([*THERE, "--strategy", "hopf", "--k1", "law"], ["radius law"]),
         ([*THERE, "--strategy", "leg-yaw", "--k1", "9 N*mm/deg"], ["--k1", "leg-yaw", "auto"]),
-        ([*THERE, "--strategy", "leg-yaw", "--k1", "law"], ["--k1", "leg-yaw", "auto"]),
         ([*THERE, "--repeats", "2"], ["seed"]),
-        ([*THERE, "--duration", "0 s"], ["duration"]),
         ([*THERE, "--set", "legs.half_width=0.3 m"], ["no pitchfork"]),
     ],
 )
@@ -295,10 +280,11 @@ def test_a_controller_of_ones_own_turns_in_place_of_the_strategys(own, tmp_path)
         ("toy", ["must name a class"]),
     ],
 )
-@pytest.mark.parametrize("command", [["walk"], [*TURN, "--k1", "10 N*mm/deg"], ["course", "--targets", "0 deg, 1 m"]])
-def test_controllers_that_are_none_are_refused_in_one_line(own, command, name, words):
-    message = refused(command[0], ROBOT, *command[1:], "--controller", f"{own}:{name}")
-    assert all(word in message for word in words), message
+def test_controllers_that_are_none_are_refused_in_one_line(own, name, words):
+    others = [[*TURN, "--k1", "10 N*mm/deg"], ["course", "--targets", "0 deg, 1 m"]]
+    for command in [["walk"], *(others if name == "Raises" else ())]:
+        message = refused(command[0], ROBOT, *command[1:], "--controller", f"{own}:{name}")
+        assert all(word in message for word in words), message
 
 
 def test_a_controller_that_takes_most_of_the_time_is_named(capsys, own):

@@ -147,7 +147,7 @@ def test_every_command_is_in_the_table():
 
 # What users write, and what commands write.
 MADE = re.compile(
-    r"^(my|mine|steer|mymodule|identified|identification)\.|NAME|^(report|build|turn|course)/|^(course|walk|play|play-page)\.html$|(paper|figures)/stride"
+    r"^(my|mine|steer|mymodule|identified|identification|sized)\.|NAME|^(report|build|turn|course)/|^(course|walk|play|play-page)\.html$|(paper|figures)/stride"
 )
 
 

@@ -70,7 +70,6 @@ def test_example_runs_as_a_notebook(example, tmp_path, tmp_path_factory, monkeyp
     for number in plt.get_fignums():
         for axes in plt.figure(number).axes:
             assert axes.get_xlabel()
-    plt.close("all")
     for known in KNOWN.get(example.stem, []):
         assert re.search(known, said.getvalue()), (known, said.getvalue())
     assert not list(tmp_path.iterdir())

@@ -31,7 +31,6 @@ def test_exercises_wait_for_their_answers(lesson, capsys, monkeypatch):
             exec(answer[1] + open_line.sub("", waiting, count=1), names)
             assert capsys.readouterr().out.endswith("Right.\n"), cell.source
             answered += 1
-    plt.close("all")
     assert 4 <= answered <= 6
 
 

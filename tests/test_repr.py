@@ -53,13 +53,9 @@ def test_what_is_small_is_shown_and_what_is_large_is_named():
 
     found = Found(0.1, np.array([1.0, 0.5]), np.zeros((9, 9)), 1000 * "word ", (Found,) * 3)
     assert repr(found).splitlines()[1:-1] == [
-        "    value=0.1",
-        "    few=[1. , 0.5]",
-        "    many=<float64 array of shape (9, 9)>",
-        "    words=<str of 5000>",
-        "    parts=<3 times type>",
-        "    nothing=None",
-    ]
+        "    value=0.1", "    few=[1. , 0.5]", "    many=<float64 array of shape (9, 9)>", "    words=<str of 5000>",
+        "    parts=<3 times type>", "    nothing=None",
+    ]  # fmt: skip
     assert "\n" not in str(ParameterError("is none", field="found", value=found))
 
 

@@ -152,6 +152,16 @@ def test_override_and_get(robot):
 
 
 def test_override_of_all_springs(robot):
+    group = robot.with_value("springs.stiffness[1:3]", 0.7)
+    assert group.springs.stiffness == tuple(
+        0.7 if joint in (1, 2) else value for joint, value in enumerate(robot.springs.stiffness)
+    )
+    assert group.get("springs.stiffness[1:3]") == group.with_value("springs.stiffness[:]", 0.7).get("springs.stiffness")
+    assert [group.provenance_of(f"springs.stiffness[{i}]") == "set by override" for i in (0, 1, 2, 3)] == [
+        False, True, True, False
+    ]  # fmt: skip
+    with pytest.raises(ParameterError, match=r"must be one spring, such as springs\.stiffness\[2\], because"):
+        group.get("springs.stiffness[2:]")
     uniform = robot.with_value("springs.stiffness[0]", 0.7).with_value("springs.stiffness", 0.5)
     assert uniform.springs.stiffness == (0.5,) * 5
     assert uniform.get("springs.stiffness") == 0.5
@@ -212,6 +222,8 @@ def test_overrides_agree_with_a_file_that_says_the_same(data):
         ("stiffness[2]=1", ParameterError, "did you mean 'springs.stiffness[2]'?"),
         ("legs.mass=1", ParameterError, "did you mean 'body.mass'?"),
         ("springs.stiffness[5]=1", ParameterError, "must be the index of a spring; allowed: 0 to 4"),
+        ("springs.stiffness[5:]=1", ParameterError, "must be a group of springs; allowed: FIRST:END of indices from 0"),
+        ("springs.stiffness[2:6]=1", ParameterError, "must be a group of springs"),
         ("springs.stiffness[-1]=1", ParameterError, "must be the path of a parameter"),
         ("body.mass[0]=1", ParameterError, "must be written without an index"),
         ("name=x", ParameterError, "not of a text"),
@@ -404,12 +416,9 @@ def test_descriptions_accept_arrays_and_copy(robot):
 
 
 ACTUATED = [
-    "springs.adjustable[0]=true",
-    "springs.softest=5 N*mm/deg",
-    "springs.stiffest=80 N*mm/deg",
-    "springs.rate=100 N*mm/deg/s",
-    "springs.lag=0.1 s",
-]
+    "springs.adjustable[0]=true", "springs.softest=5 N*mm/deg", "springs.stiffest=80 N*mm/deg",
+    "springs.rate=100 N*mm/deg/s", "springs.lag=0.1 s",
+]  # fmt: skip
 
 
 def test_what_is_adjustable_is_part_of_the_file_and_absent_means_fixed():

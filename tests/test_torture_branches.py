@@ -18,12 +18,9 @@ from own_orbits import Crossing
 def followed():
     """A bent resonance, with two folds."""
     terms = (
-        own.Term(0, 1.0, (0, 1)),
-        own.Term(1, -0.1, (0, 1)),
-        own.Term(1, -1.0, (1, 0)),
-        own.Term(1, -1.0, (3, 0)),
+        own.Term(0, 1.0, (0, 1)), own.Term(1, -0.1, (0, 1)), own.Term(1, -1.0, (1, 0)), own.Term(1, -1.0, (3, 0)),
         own.Term(1, 0.0, (0, 0), 1.0, 1.8),
-    )
+    )  # fmt: skip
     asked = kinds.Drawn(own.Terms(2, terms, 2 * np.pi / 1.8), (0.2, 1.5), 0.2, True, np.array([0.0, 0.0]))
     return asked, branches.branch_of(asked)[0]
 

@@ -16,31 +16,15 @@ STIFFNESS = "N*m/rad"
 @pytest.mark.parametrize(
     ("text", "si_unit", "value"),
     [
-        ("1.35 m", "m", 1.35),
-        ("135cm", "m", 1.35),
-        ("3 cm", "m", 0.03),
-        ("8500 g", "kg", 8.5),
-        ("310 ms", "s", 0.31),
-        ("2 min", "s", 120.0),
-        ("180 deg", "rad", math.pi),
-        ("0.5 rev", "rad", math.pi),
-        ("41 N*mm/deg", STIFFNESS, 41e-3 * 180 / math.pi),
-        ("41 N·mm/°", STIFFNESS, 41e-3 * 180 / math.pi),
-        ("41 N mm / deg", STIFFNESS, 41e-3 * 180 / math.pi),
-        ("41 N*mm*deg^-1", STIFFNESS, 41e-3 * 180 / math.pi),
-        ("2 N*m*s/rad", "N*m*s/rad", 2.0),
-        ("2 N*m/(rad/s)", "N*m*s/rad", 2.0),
-        ("3 kg*cm^2", "kg*m^2", 3e-4),
-        ("3 kg*cm²", "kg*m^2", 3e-4),
-        ("256.5 N*s/m", "N*s/m", 256.5),
-        ("1 kgf", "N", 9.80665),
-        ("2 Hz", "1/s", 2.0),
-        ("-1.5e-3", "m", -1.5e-3),
-        ("120", STIFFNESS, 120.0),
-        (120, STIFFNESS, 120.0),
-        (Fraction(1, 4), "m", 0.25),
+        ("1.35 m", "m", 1.35), ("135cm", "m", 1.35), ("3 cm", "m", 0.03), ("8500 g", "kg", 8.5),
+        ("310 ms", "s", 0.31), ("2 min", "s", 120.0), ("180 deg", "rad", math.pi), ("0.5 rev", "rad", math.pi),
+        ("41 N*mm/deg", STIFFNESS, 41e-3 * 180 / math.pi), ("41 N·mm/°", STIFFNESS, 41e-3 * 180 / math.pi),
+        ("41 N mm / deg", STIFFNESS, 41e-3 * 180 / math.pi), ("41 N*mm*deg^-1", STIFFNESS, 41e-3 * 180 / math.pi),
+        ("2 N*m*s/rad", "N*m*s/rad", 2.0), ("2 N*m/(rad/s)", "N*m*s/rad", 2.0), ("3 kg*cm^2", "kg*m^2", 3e-4),
+        ("3 kg*cm²", "kg*m^2", 3e-4), ("256.5 N*s/m", "N*s/m", 256.5), ("1 kgf", "N", 9.80665), ("2 Hz", "1/s", 2.0),
+        ("-1.5e-3", "m", -1.5e-3), ("120", STIFFNESS, 120.0), (120, STIFFNESS, 120.0), (Fraction(1, 4), "m", 0.25),
     ],
-)
+)  # fmt: skip
 def test_reads(text, si_unit, value):
     assert units.parse(text, si_unit) == pytest.approx(value, rel=2e-16)
 
@@ -110,6 +94,8 @@ def test_writes_the_shortest_text(value, unit, text):
 def test_writes_given_digits():
     assert units.format(1.0 / 3.0, "cm", digits=3) == "33.3 cm"
     assert units.from_si(0.5, "mm") == 500.0
+    assert math.isnan(units.from_si(math.nan, "N*mm/deg"))
+    assert units.from_si(-math.inf, "N*mm/deg") == -math.inf
 
 
 @given(

@@ -237,8 +237,10 @@ def _compared(
             continue
         mine = near[0]
         rest.remove(mine)
-        if test == 0 and point.special.label != "fold":
-            mine, rest = at_once(mine, rest, bound)
+        if test == 0:
+            turns, (mine, rest) = mine.fold and point.special.label != "fold", at_once(mine, rest, bound)
+            if turns and mine.fold and _touches(found, segment, point, place, test):
+                continue
         multiple = point.bifurcation.multiplicity > (2 if test == 2 else 1)
         if multiple:  # which cross at one place
             rest = [each for each in rest if abs(each.place - mine.place) > 1e-3]
@@ -267,16 +269,18 @@ def _compared(
 
 
 def at_once(mine: Crossing, rest: list[Crossing], bound: float) -> tuple[Crossing, list[Crossing]]:
-    """The crossing that a point at +1 is, and the others: a branch that turns in the pitchfork where it leaves another
-    one has a fold and a crossing within their errors there."""
+    """The crossing that a point at +1 is, and the others without those at its value within their errors: a branch that
+    turns in the pitchfork where it leaves another one has a fold and a crossing there, or a multiplier that touches 1
+    and is seen as two; an orbit exactly at a fold is one in two segments."""
     twins = [
         each
         for each in rest
         if each.test == 0
-        and each.fold != mine.fold
+        and (mine.fold or each.fold)
         and abs(each.value - mine.value) <= bound + 3.0 * (each.error + mine.error)
     ]
-    return (twins[0] if twins and mine.fold else mine), [each for each in rest if each not in twins]
+    other = [each for each in twins if each.fold != mine.fold]
+    return (other[0] if other and mine.fold else mine), [each for each in rest if each not in twins]
 
 
 def _touches(found: Verdict, segment: Segment, point: Any, place: float, test: int) -> bool:

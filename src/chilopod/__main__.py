@@ -21,6 +21,8 @@ def _run() -> int:
     process.answer_interrupts()
     # Figures go into files, so a window backend is neither needed nor used.
     os.environ["MPLBACKEND"] = "agg"
+    # Matrices are small: threads of linear algebra would mostly wait for each other, and take other work's time.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Numba would go on without a variable that it cannot read, after many lines about it.
     warnings.filterwarnings("error", "Environment variable 'NUMBA_", RuntimeWarning)
     warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)

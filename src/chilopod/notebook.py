@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
@@ -110,6 +111,24 @@ def axes_for(axes: Axes | None) -> Axes:
     if not isinstance(axes, Axes):
         raise ParameterError("must be axes to draw on", field="axes", value=axes, allowed="axes of matplotlib, or None")
     return axes
+
+
+def tornado(axes: Axes | None, changes: Mapping[str, float], label: str, title: str) -> Axes:
+    """Draw changes by their names as horizontal bars, largest on top, on axes of matplotlib or on new ones."""
+    axes = axes_for(axes)
+    order = sorted(changes, key=lambda name: abs(changes[name]) if math.isfinite(changes[name]) else 0.0)
+    if not order:
+        axes.text(0.5, 0.5, "no change", ha="center", transform=axes.transAxes)
+    colors = ["C0" if changes[name] > 0.0 else "C1" for name in order]
+    axes.barh(order, [changes[name] for name in order], color=colors)
+    axes.axvline(0.0, color="C7", linewidth=0.8)
+    axes.set(xlabel=label, title=title)
+    return axes
+
+
+def finite(value: float | None) -> float | None:
+    """Number for JSON; None if it is not finite."""
+    return float(value) if value is not None and math.isfinite(value) else None
 
 
 def block(heading: str, *parts: str) -> str:

@@ -180,7 +180,7 @@ def test_sliding_is_named():
     [
         (lambda t, x: [-1.0 - np.abs(x[0]) ** 1.5], 0.5, "is not smooth: a root of"),
         (lambda t, x: [-1.0 - np.abs(x[0]) ** 1.3], 0.5, "is not smooth: a power of"),
-        (lambda t, x: [1.0 / (1.0 + np.exp(-2000.0 * x[0])) - 1.0], -0.2, "overflows: exp of"),
+        (lambda t, x: [-1.0 - np.log1p(np.exp(-2000.0 * x[0]))], -0.2, "overflows: exp of"),
     ],
 )
 def test_a_motion_that_ends_at_a_function_names_it(rhs, start, said):

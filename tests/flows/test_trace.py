@@ -215,12 +215,9 @@ def test_random_expressions(data):
             leaf = data.draw(st.sampled_from(["x0", "x1", "t", "p", "number"]))
             number = data.draw(st.floats(-3, 3).filter(lambda v: abs(v) > 0.01))
             return {
-                "x0": lambda t, x, p: x[0],
-                "x1": lambda t, x, p: x[1],
-                "t": lambda t, x, p: t,
-                "p": lambda t, x, p: p,
-                "number": lambda t, x, p: number,
-            }[leaf]
+                "x0": lambda t, x, p: x[0], "x1": lambda t, x, p: x[1], "t": lambda t, x, p: t,
+                "p": lambda t, x, p: p, "number": lambda t, x, p: number,
+            }[leaf]  # fmt: skip
         a, b = tree(depth - 1), tree(depth - 1)
         kind = data.draw(st.sampled_from(["+", "-", "*", "/", "max", "f"]))
         f = data.draw(st.sampled_from(functions))

@@ -1,6 +1,7 @@
 """What the whole robot's studies find, without any simulation: bends that follow a square root, criteria that follow a
 parabola, so that the answers are known."""
 
+import dataclasses
 from functools import cache
 
 import numpy as np
@@ -8,7 +9,7 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.walks import SHORTER, SPRINGS, UNIFORM_SPRINGS, VARIANT_SPRINGS, RobotWalks, over_durations
+from chilopod.paper.robot.walks import BEND, SHORTER, SPRINGS, UNDULATION, VARIANT_SPRINGS, RobotWalks, over_durations
 from chilopod.paper.turning.trials import CRITERIA, TurningTask
 from chilopod.steering import Outcome, Target
 
@@ -60,8 +61,8 @@ def durations(onsets, springs=SPRINGS, repeats=10, scatter=0.01):
     return over_durations(each, [*SHORTER, 90.0])
 
 
-def walks(**changes):
-    """What the paper prints of its robot, met in everything."""
+@cache
+def _walks():
     variants = {
         "k2-5 = 28 N*mm/deg": series(VARIANT_SPRINGS, 23.0),
         "stride 1.8 cm": series(VARIANT_SPRINGS, 25.0),
@@ -72,20 +73,22 @@ def walks(**changes):
         coords={"time": [0.0, 1.0, 2.0], "spring": [41.0, 15.0], "joint": np.arange(1, 6)},
     )
     uniform = xr.Dataset(
-        {"amplitude": (("spring", "repeat"), np.full((len(UNIFORM_SPRINGS), 3), 0.2))},
-        coords={"spring": np.array(UNIFORM_SPRINGS)},
-        attrs={"critical_k": 18.0, "critical_k_error": 0.2, "critical_k_freedom": 12.0},
+        {"end": ("mode", [18.0, 18.0]), "end_error": ("mode", [0.2, 0.2])},
+        coords={"mode": [UNDULATION, BEND]},
+        attrs={"amplitude": np.deg2rad(5.0)},
     )
-    given = {
-        "robot": ROBOT,
-        "base": series(SPRINGS, 34.0),
-        "durations": durations((34.0,) * 5),
-        "variants": variants,
-        "lower_steps": {"stride 1.8 cm": series(VARIANT_SPRINGS, 25.0)},
-        "examples": examples,
-        "uniform": uniform,
-    }
-    return RobotWalks(**{**given, **changes})
+    lower = {"stride 1.8 cm": series(VARIANT_SPRINGS, 25.0)}
+    return RobotWalks(ROBOT, series(SPRINGS, 34.0), durations((34.0,) * 5), variants, lower, examples, uniform)
+
+
+def walks(**changes):
+    """What the paper prints of its robot, met in everything."""
+    return dataclasses.replace(_walks(), **changes)
+
+
+def base_walks(**changes):
+    """The same of the robot as built alone."""
+    return walks(**{"variants": {}, "lower_steps": {}, "uniform": None, **changes})
 
 
 def task(springs, best, lowest, outcomes, *, wiggle=0.01, time=23.0, repeats=5, target="45 deg, 1.3 m", seed=0):
@@ -105,12 +108,12 @@ def task(springs, best, lowest, outcomes, *, wiggle=0.01, time=23.0, repeats=5, 
     noise = wiggle * rng.standard_normal((len(springs), repeats))
     parabola = 1.0 + (40.0 * (1.0 / springs - 1.0 / best))[:, None] ** 2
     data = xr.Dataset(coords={"spring": springs, "repeat": np.arange(repeats)})
-    data["seconds"] = ("instant", [time, 23.0])
+    data["seconds"] = ("instant", [time, 23.0, np.nan])
     for name in CRITERIA:
         values = lowest.get(name, 1.0) * (parabola + noise)
         until = name == "effort_until_arrival"
         data[name] = (
-            (("spring", "repeat"), values) if until else (("instant", "spring", "repeat"), np.stack([values] * 2))
+            (("spring", "repeat"), values) if until else (("instant", "spring", "repeat"), np.stack([values] * 3))
         )
         data[f"{name}_mean"] = data[name].mean("repeat")
         data[f"{name}_error"] = data[name].std("repeat", ddof=1) / np.sqrt(repeats)
@@ -119,8 +122,8 @@ def task(springs, best, lowest, outcomes, *, wiggle=0.01, time=23.0, repeats=5, 
     return TurningTask(Target.parse(target), data, xr.Dataset())
 
 
-def turning(**changes):
-    """The paper's tasks, met in everything."""
+@cache
+def _turning():
     springs = (15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0)
     inside, arrived, outside = Outcome.INSIDE.label, Outcome.ARRIVED.label, Outcome.OUTSIDE.label
     outcomes = {k: inside if k < 17.0 else outside if k > 34.0 else arrived for k in springs}
@@ -139,10 +142,16 @@ def turning(**changes):
         },
         coords={"case": ["paper's spring, without", "paper's spring, with"]},
     )
-    given = {
-        "robot": ROBOT,
-        "tasks": tasks,
-        "hopf": task((8.7, 11.0, 15.0), 11.0, higher, dict.fromkeys((8.7, 11.0, 15.0), arrived), wiggle=1e-3, seed=1),
-        "without": alone,
-    }
-    return RobotTurning(**{**given, **changes})
+    hopf = task((8.7, 11.0, 15.0), 11.0, higher, dict.fromkeys((8.7, 11.0, 15.0), arrived), wiggle=1e-3, seed=1)
+    return RobotTurning(ROBOT, tasks, hopf, alone)
+
+
+def turning(**changes):
+    """The paper's tasks, met in everything."""
+    return dataclasses.replace(_turning(), **changes)
+
+
+def with_criteria(criteria, letter="A"):
+    """The paper's tasks, one with other criteria, and no uniform springs."""
+    tasks = turning().tasks
+    return turning(tasks={**tasks, letter: dataclasses.replace(tasks[letter], criteria=criteria)}, hopf=None)

@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
 ]
 
-PATIENCE = 60_000  # ms, on a busy machine
+PATIENCE = 120_000  # ms, on a busy machine
 SOFTWARE_WEBGL = "--enable-unsafe-swiftshader"
 SELDOM = """window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 200);
 window.cancelAnimationFrame = clearTimeout;"""
@@ -94,10 +94,8 @@ def type_into(page, label, text):
 
 
 def read(page, words):
-    """Wait until the page says so, and give the whole paragraph."""
-    found = page.get_by_text(re.compile(words)).first
-    found.wait_for()
-    return found.inner_text()
+    """Wait until the page says so, and give the whole paragraph, which may go again at once."""
+    return page.wait_for_selector(f"text=/{words}/").inner_text()
 
 
 def walked(page):
@@ -199,7 +197,9 @@ def test_keys_do_what_controls_do(opened, live):
 
 def test_the_address_sets_the_walk_and_says_what_of_it_is_wrong(chromium, live):
     with visit(chromium, live, query="?k1=9&seed=3&friction=77") as page:
-        read(page, r"In the address: friction = 77: is out of range \(0\.3 to 3\)|In the address: friction = 77")
+        read(page, r"In the address: friction = 77")
+        page.wait_for_timeout(9000.0)  # longer than other notifications stay
+        read(page, r"In the address: friction = 77")
         read(page, r"first spring, 9 N")
         read(page, r"s, seed 3")
         link = page.locator("[data-copy]").get_attribute("data-copy")

@@ -1,15 +1,24 @@
 """The registry of sections, and how they are computed."""
 
+import os
 import re
+import signal
+import time
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.paper import duration
+from chilopod.paper import ahead, duration
+from chilopod.paper.ahead import Studio, walked_ahead
 from chilopod.paper.registry import REGISTRY, chosen, load_sections
+from chilopod.paper.robot.sections import FILMS
 from chilopod.paper.section import Context, Found, Section, Size, reproduce
 from chilopod.paper.straight.sections import MODE, UNIFORM
 from chilopod.paper.table import Result, Row, Verdict
+from chilopod.trials import batch
 
 SECTIONS = load_sections()
 
@@ -41,7 +50,7 @@ def test_what_is_left_out_unless_it_is_named():
     assert set(names(SECTIONS)) - everything == {"robot-structures"}
     assert names(chosen(size=Size.FULL)) == names(chosen())
     headlines, others = {"identification", "robot-why", "courses"}, {"robot-spread", "robot-numerics", "courses-robust"}
-    others |= {"robot-courses", "courses-movie"}
+    others |= {"robot-courses", "courses-movie", "robot-strategies"}
     assert everything - set(names(chosen(size=Size.MAIN))) == others
     named = chosen(["robot-structures", "robot-spread"], Size.QUICK)
     assert names(named) == ["robot-spread", "robot-structures"]
@@ -90,6 +99,17 @@ def test_the_plan_says_what_a_report_has_and_how_long_it_takes(monkeypatch):
     assert set(duration.SECONDS) <= set(REGISTRY)
 
 
+def test_sections_that_are_walked_beside_others_take_no_longer_than_the_longer_part(monkeypatch):
+    sections = chosen(size=Size.MAIN)
+    monkeypatch.setattr(duration, "cores", lambda: 1)
+    beside, others = ([each for each in sections if each.ahead is apart] for apart in (True, False))
+    parts = [duration.seconds(part, Size.MAIN) for part in (beside, others)]
+    assert duration.seconds(sections, Size.MAIN) == sum(parts)
+    monkeypatch.setattr(duration, "cores", lambda: 2)
+    assert max(parts) < duration.seconds(sections, Size.MAIN) < sum(parts)
+    assert duration.seconds(beside, Size.MAIN) == parts[0]
+
+
 def one(value):
     return Row("one", "1", Result(str(value)), "here", Verdict.AGREES)
 
@@ -122,3 +142,49 @@ def test_one_that_fails_leaves_the_others_alone():
 def test_lines_stand_by_chapter():
     rows = {MODE: [one(1)], ONE: [one(2)], UNIFORM: [one(3)]}
     assert Found(rows=rows).planar_rows() == {MODE.chapter: [one(1), one(3)], "chapter": [one(2)]}
+
+
+def test_trials_that_another_process_walks_ahead_are_those_that_this_one_walks(tmp_path, monkeypatch):
+    one, two = (Context(size=Size.TINY, folder=tmp_path / name) for name in ("one", "two"))
+    with walked_ahead([FILMS], one) as ready:
+        assert not ready(FILMS)  # there is nothing to do meanwhile
+        reproduce([FILMS], one, ready=ready)
+    walked, told, last = [], [], time.monotonic() + 120.0
+    monkeypatch.setattr(batch, "walked", lambda trials: walked.append(trials))
+    other = Section("other", "chapter", "other", lambda context, report: 1)
+    with walked_ahead(sections := [ONE, other, FILMS], two) as ready:
+        while not ready(FILMS) and time.monotonic() < last:
+            time.sleep(0.05)
+        found = reproduce(sections, two, callback=lambda _, section: told.append(section), ready=ready)
+    assert told == [ONE, FILMS, other]
+    assert walked == []
+    assert not found.failures
+    records = [{path.name: path.read_bytes() for path in each.folder.iterdir()} for each in (one, two)]
+    assert len(records[0]) == 6
+    assert records[0] == records[1]
+
+
+def test_work_is_done_in_a_studio_and_here_where_that_is_none_or_was_killed(monkeypatch):
+    monkeypatch.setattr(ahead, "cores", lambda: 2)
+    studio = Studio()
+    assert studio.do(os.getpid) == os.getpid()
+    studio.begin()
+    other = studio.do(os.getpid)
+    assert other != os.getpid()
+    assert studio.do(partial(signal.getsignal, signal.SIGINT)) == signal.SIG_IGN  # Ctrl-C is this process's affair
+    with pytest.raises(ZeroDivisionError):
+        studio.do(partial(divmod, 1, 0))
+    os.kill(other, signal.SIGKILL)
+    assert studio.do(os.getpid) == os.getpid()
+    studio.end()
+
+
+def test_a_studio_that_ends_at_once_leaves_its_work(monkeypatch):
+    monkeypatch.setattr(ahead, "cores", lambda: 2)
+    studio = Studio()
+    studio.begin()
+    studio.do(os.getpid)
+    with ThreadPoolExecutor(1) as thread:
+        work = thread.submit(studio.do, partial(time.sleep, 3600.0))
+        studio.end(at_once=True)
+        assert isinstance(work.exception(), (BrokenProcessPool, CancelledError, RuntimeError))

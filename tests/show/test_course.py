@@ -52,7 +52,8 @@ def test_a_target_that_stays_or_none_at_all_is_drawn_too(done, targets, lines):
         assert not any(np.isnan(line.get_ydata()).any() for line in angle.lines)
 
 
-def test_its_files(done, tmp_path):
+def test_its_files(done, tmp_path, monkeypatch):
+    monkeypatch.setattr("chilopod.show.scene.film.Film.mp4", lambda film: b"a film")  # that of courses is in test_film
     assert write_walks("course", done, tmp_path, replace=False) == files_of_walks("course", tmp_path)
     page = Page((tmp_path / "course.html").read_text())
     first, second = json.loads(page.data)["robots"]

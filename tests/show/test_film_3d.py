@@ -42,13 +42,9 @@ def near(pixels, color, far=60.0):
 def look(pose, **more):
     stands = np.ones((N, 2), bool)
     rest = {
-        "springs": np.ones(N - 1),
-        "walks": True,
-        "path": np.zeros((0, 2)),
-        "target": None,
-        "radius": 0.15,
+        "springs": np.ones(N - 1), "walks": True, "path": np.zeros((0, 2)), "target": None, "radius": 0.15,
         "arrived": False,
-    }
+    }  # fmt: skip
     return Look(pose=pose, stands=stands, **{**rest, **more})
 
 

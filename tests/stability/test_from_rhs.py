@@ -372,3 +372,30 @@ def test_a_search_warns_once():
     with pytest.warns(NotAnalytic) as said:
         locate(family, (0.5, 0.6), orbit=[0.0])
     assert len(said) == 1
+
+
+def test_symmetries_are_checked_at_every_value_of_a_family():
+    """Options of a family are kept, but a symmetry may hold at one value alone, and options may change."""
+
+    def pushed(t, x, push, rate=0.0):
+        return [x[1], cos(t) - 0.1 * x[1] - x[0] ** 3 + push + rate * x[0] * np.cos(0.5 * t)]
+
+    mirror = -np.eye(2)
+
+    def of(*args, **options):
+        return from_rhs(pushed, 2, 2 * pi, args=args, **options)
+
+    kept = of(0.0, symmetry=mirror)
+    with pytest.raises(ParameterError, match=r"symmetry.*fails at t"):
+        of(0.1, symmetry=mirror)
+    with pytest.raises(ParameterError, match=r"period.*fails at t"):
+        of(0.0, 0.1)
+    assert of(0.1).symmetry is None
+    mirror[:] = np.eye(2)  # in place: the system keeps its own
+    assert np.array_equal(kept.symmetry, -np.eye(2))
+    with pytest.raises(ParameterError, match=r"symmetry.*fails at t"):
+        of(0.0, symmetry=mirror)
+    start, end = np.array([0.3, -0.2]), of(0.25).flow(np.array([0.3, -0.2]), 0.0, 1.0)[0]
+    own = solve_ivp(lambda t, x: pushed(t, x, 0.25), (0.0, 1.0), start, rtol=1e-12, atol=1e-12).y[:, -1]
+    assert np.abs(end - own).max() < 1e-10  # another system of the family has its own flow
+    assert [of(0.0, orbit=each).orbit[0] for each in ([1.0, 0.0], (2.0, 0.0), np.array([3, 0]))] == [1.0, 2.0, 3.0]

@@ -1,5 +1,6 @@
 """Maps as periodic systems, against what is known of them."""
 
+import functools
 import math
 
 import numpy as np
@@ -134,6 +135,9 @@ def test_a_wrong_derivative_is_refused_once_and_in_one_line():
 
     with pytest.raises(ParameterError, match=r"entry \(1, 0\) is 0.4, but a difference gives 0.3"):
         multipliers(from_map(lambda x: henon(x, 0.4), 2), [0.6, 0.2])
+    multipliers(from_map(functools.partial(lambda entry, x: henon(x, entry), 0.3), 2), [0.6, 0.2])
+    with pytest.raises(ParameterError, match=r"entry \(1, 0\) is 0.5, but a difference gives 0.3"):
+        multipliers(from_map(functools.partial(lambda x, entry: henon(x, entry), entry=0.5), 2), [0.6, 0.2])
     for times in (1, 2):  # refused again at the second call
         with pytest.raises(ParameterError, match=r"flow = .*: derivative entry \(0, 0\) is 0.4, but .* gives 0.367879"):
             multipliers(PeriodicSystem(1, 1.0, lambda x, t0, t1: (x * np.exp(t0 - t1), np.diag([0.4]))), [times])

@@ -146,11 +146,8 @@ def test_a_result_is_drawn(result):
     axes = Figure().add_subplot()
     assert result().plot(axes) is axes
     own = result().plot()
-    try:
-        assert isinstance(own, matplotlib.axes.Axes)
-        assert own.figure.number in plt.get_fignums()
-    finally:
-        plt.close("all")
+    assert isinstance(own, matplotlib.axes.Axes)
+    assert own.figure.number in plt.get_fignums()
     with pytest.raises(ParameterError, match="axes = 3"):
         result().plot(3)
 
@@ -296,13 +293,13 @@ def test_what_breaks_a_symmetry_in_time_doubles_no_period(mirrored):
 def test_a_branch_covers_its_interval():
     """By default; of a long way that takes more than a hundred steps."""
     between = (-1.0, 1.0)
-    whole = follow(folding, begin(folding, -1.0, [-1.3]), between, longest=0.02)
-    assert len(whole.points) > 200
+    whole = follow(folding, begin(folding, -1.0, [-1.3]), between, longest=0.035)
+    assert len(whole.points) > 100
     assert (whole.points[0].value, whole.points[-1].value) == between
     assert whole.ending is Ending.LEFT_INTERVAL
-    part = follow(folding, begin(folding, -1.0, [-1.3]), between, longest=0.02, points=20)
+    part = follow(folding, begin(folding, -1.0, [-1.3]), between, longest=0.035, points=20)
     assert (part.ending, len(part.points)) == (Ending.ENOUGH_POINTS, 21)
-    assert follow(folding, part, between, longest=0.02).points[-1].value == 1.0
+    assert follow(folding, part, between, longest=0.035).points[-1].value == 1.0
 
 
 def test_remarks_of_a_search_name_values_as_they_are_shown():

@@ -177,6 +177,15 @@ def test_no_orbit_to_be_found():
         multipliers(system)
 
 
+def test_a_search_that_fails_where_a_function_overflows_names_it():
+    def rhs(t, x):
+        return [x[1], 2.0 * np.cos(t) - 0.2 * x[1] - x[0] - np.log1p(np.exp(300.0 * x[0])) / 300.0]
+
+    system = from_rhs(rhs, 2, 2.0 * np.pi)
+    with pytest.raises(AnalysisError, match="of its size\\): the right-hand side overflows: exp of"):
+        find_orbit(system, [0.5, 0.5])
+
+
 def test_a_defective_matrix_has_a_useless_but_honest_bound():
     """A Jordan block: a perturbation e moves its eigenvalues by sqrt(e)."""
 
@@ -211,16 +220,11 @@ def test_a_sweep_in_threads_is_that_of_one_after_the_other():
 @pytest.mark.parametrize(
     ("values", "bounds", "stable"),
     [
-        ([0.5, 0.9], [0.01, 0.01], True),
-        ([1.2, 0.5], [0.01, 0.01], False),
-        ([1.0 - 1e-9, 0.5], [1e-7, 1e-9], None),
-        ([1.0 + 1e-9, 0.5], [1e-7, 1e-9], None),
-        ([1.2, 0.5], [0.01, 2.0], False),
-        ([0.5], [np.inf], None),
-        ([1.0], [0.0], None),
-        ([np.nan], [0.0], None),
+        ([0.5, 0.9], [0.01, 0.01], True), ([1.2, 0.5], [0.01, 0.01], False), ([1.0 - 1e-9, 0.5], [1e-7, 1e-9], None),
+        ([1.0 + 1e-9, 0.5], [1e-7, 1e-9], None), ([1.2, 0.5], [0.01, 2.0], False), ([0.5], [np.inf], None),
+        ([1.0], [0.0], None), ([np.nan], [0.0], None),
     ],
-)
+)  # fmt: skip
 def test_a_verdict_within_the_errors_is_undecided(values, bounds, stable):
     found = Multipliers(np.array(values, complex), None, max(bounds), np.array(bounds), np.zeros(1), 1.0)
     assert found.stable is stable

@@ -130,10 +130,7 @@ def test_progress_is_told():
         ({"step": 0.0}, "step"),
         ({"budget": -1}, "budget"),
         ({"start": "here"}, "start"),
-        (
-            {"start": BifurcationPoint(Kind.FOLD, 0.9, 0.0, np.zeros(2), np.ones(2, complex), 1 + 0j, 0.0)},
-            "start",
-        ),
+        ({"start": BifurcationPoint(Kind.FOLD, 0.9, 0.0, np.zeros(2), np.ones(2, complex), 1 + 0j, 0.0)}, "start"),
     ],
 )
 def test_what_is_refused(given, field):

@@ -73,11 +73,7 @@ _DYADIC = st.sampled_from([0.0, 0.125, 0.25, 0.5, 0.75, 1.0])
 _NODE = st.integers(0, 8).map(lambda k: 0.5 - 0.5 * np.cos(np.pi * k / 8))
 _PLACE = st.one_of(_DYADIC, _NODE, st.floats(0.0, 1.0))
 _CLUSTER = st.tuples(_PLACE, st.none() | st.tuples(st.sampled_from([-1.0, 1.0]), st.floats(-9.0, -1.0)))
-_SHAPES = {
-    "polynomial": lambda x: x,
-    "trigonometric": np.sin,
-    "exponential": np.expm1,
-}
+_SHAPES = {"polynomial": lambda x: x, "trigonometric": np.sin, "exponential": np.expm1}
 
 
 @given(

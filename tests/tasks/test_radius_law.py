@@ -107,10 +107,10 @@ def test_no_spring_of_the_law_folds_the_robot():
 
     def folded(value):
         walker = robot.with_value("springs.stiffness[0]", float(value))
-        ends = run([Trial(walker, 90.0, seed, rate=1.0) for seed in range(100, 120)])
+        ends = run([Trial(walker, 90.0, seed, rate=1.0) for seed in range(100, 110)])
         return [str(end.status.values[0]) for end in ends].count("out of range")
 
-    assert folded(exact.values[0]) == 20
+    assert folded(exact.values[0]) == 10
     assert folded(law.values[0]) == 0
 
 

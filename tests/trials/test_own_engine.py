@@ -145,17 +145,12 @@ def test_what_goes_wrong_in_an_engine_is_its_own_fault(folder, name, words):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("--engine", "leaves:x"),
-        ("--engine", "own_engines:Sketch"),
-        ("--engine", "own_engines:raising"),
-        ("--engine", "own_engines:shared"),
-        ("--controller", "leaves:X"),
-        ("--controller", "own_engines:sketch.x"),
-        ("--controller", "own_engines:Steers"),
-        ("--controller", "own_engines:Ours"),
+        ("--engine", "leaves:x"), ("--engine", "own_engines:Sketch"), ("--engine", "own_engines:raising"),
+        ("--engine", "own_engines:shared"), ("--controller", "leaves:X"), ("--controller", "own_engines:sketch.x"),
+        ("--controller", "own_engines:Steers"), ("--controller", "own_engines:Ours"),
         ("--controller", "own_engines:Worse"),
     ],
-)
+)  # fmt: skip
 def test_on_the_command_line_each_is_one_line(folder, capsys, arguments):
     assert main(["walk", "aoi2022-planar", "--duration", "0.5 s", *arguments]) == 2
     told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]

@@ -39,17 +39,10 @@ FAMILIES = {"forced": (forced, forced_orbit, 0.0), "cycles": (cycles, cycle, -0.
 # From where and to where, relative to the fold: it is a node of the search's grid, between two, at the end, before and
 # beyond it by a little.
 REACHES = [
-    (0.75, -0.05),
-    (0.75, -0.25),
-    (0.5, -0.5),
-    (0.1, -0.7),
-    (1.0, 0.0),
-    (1.0, -1e-9),
-    (0.01, -0.01),
-    (1e-6, -1e-6),
-]
+    (0.75, -0.05), (0.75, -0.25), (0.5, -0.5), (0.1, -0.7), (1.0, 0.0), (1.0, -1e-9), (0.01, -0.01), (1e-6, -1e-6),
+]  # fmt: skip
 # A cycle takes several times as long as a forced orbit.
-CASES = [*(("forced", *reach) for reach in REACHES), *(("cycles", *reach) for reach in REACHES[1::2])]
+CASES = [*(("forced", *reach) for reach in REACHES), *(("cycles", *reach) for reach in REACHES[3::4])]
 
 
 def is_fold(point, known, closest=1e-11):

@@ -56,6 +56,36 @@ def test_a_double_pendulum_that_hangs():
     assert np.prod(found.values).real == pytest.approx(math.exp(-damping * 4.0 * period), rel=1e-12)
 
 
+# Steep functions, at the ends of which exp and cosh overflow
+
+
+@pytest.mark.parametrize(
+    ("force", "guess"),
+    [
+        (lambda x: -0.5 / (1.0 + np.exp(100.0 * x)), [0.5, 0.5]),
+        (lambda x: -0.5 / (1.0 + np.exp(100.0 * x)), [0.3, 9.8]),
+        (lambda x: -0.5 / (1.0 + np.exp(300.0 * x)), [2.0, -3.0]),
+        (lambda x: -0.5 * np.tanh(50.0 * x), [0.5, 0.5]),
+        (lambda x: -0.5 / np.cosh(100.0 * (x - 1.0)) ** 2, [0.5, 0.5]),
+        (lambda x: -0.5 * (1.0 + np.exp(100.0 * x)) ** -1.3, [0.5, 0.5]),
+        (lambda x: -0.5 * np.exp(-np.exp(100.0 * x)), [0.5, 0.5]),
+    ],
+)
+def test_steep_but_smooth_forces(force, guess):
+    """A motion of amplitude 10, corrected once by the residual of scipy's, whose steps meet every change."""
+
+    def slope(t, x):
+        return [x[1], -0.2 * x[1] - x[0] + 2.0 * np.cos(t) + force(x[0])]
+
+    found = find_orbit(from_rhs(slope, 2, 2.0 * np.pi), guess)
+    with np.errstate(over="ignore"):
+        run = solve_ivp(slope, (0.0, 2.0 * np.pi), found.state, "DOP853", rtol=1e-12, atol=1e-12, max_step=0.004)
+    end = run.y[:, -1]
+    off = np.linalg.solve(found.image.jacobian - np.eye(2), end - found.state)
+    assert np.abs(off).max() < 1e-10
+    assert found.error.max() < 1e-10
+
+
 # Duffing in other units
 
 

@@ -78,11 +78,7 @@ def test_constant_coefficients_seen_from_a_turning_frame(case):
     assert found.stable is not None or np.abs(modulus - 1.0).min() <= 2.0 * found.error_bound + slack
 
 
-@given(
-    st.lists(st.tuples(rates, st.floats(-2.0, 2.0)), min_size=1, max_size=4),
-    seeds,
-    st.floats(0.3, 8.0),
-)
+@given(st.lists(st.tuples(rates, st.floats(-2.0, 2.0)), min_size=1, max_size=4), seeds, st.floats(0.3, 8.0))
 @example(  # the step control is deceived near a quarter of the period, at every tolerance alike
     [(-0.60546875, 0.0), (-0.60546875, 0.0), (-0.36926642652344077, -0.931640625)], 1, 4.91796875
 )

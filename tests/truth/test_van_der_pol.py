@@ -54,30 +54,6 @@ def test_multiplier_and_period_in_any_units(mu, period, peak, log, units):
     assert (u, v) == pytest.approx((peak, 0.0)) or mu >= 5.0  # of relaxation oscillations it may be another state
 
 
-def test_a_multiplier_of_minus_seven_thousand_powers_of_e():
-    """mu = 50, by the mean divergence along scipy's solution with an implicit method."""
-    mu = 50.0
-
-    def with_liouville(t, x):
-        return [x[1], mu * (1.0 - x[0] * x[0]) * x[1] - x[0], mu * (1.0 - x[0] * x[0])]
-
-    def derivative(t, x):
-        return [
-            [0.0, 1.0, 0.0],
-            [-2.0 * mu * x[0] * x[1] - 1.0, mu * (1.0 - x[0] * x[0]), 0.0],
-            [-2.0 * mu * x[0], 0.0, 0.0],
-        ]
-
-    found = exponents(oscillator(mu, 85.0), [2.0, 0.0])
-    period, start = found.multipliers.period, found.multipliers.orbit
-    known = solve_ivp(with_liouville, (0.0, period), [*start, 0.0], "Radau", rtol=1e-10, atol=1e-12, jac=derivative).y[
-        :, -1
-    ]
-    assert known[:2] == pytest.approx(start, abs=1e-9)
-    assert abs(found.values[0] - known[2] / period) <= found.error_bound[0] + 1e-8
-    assert found.error_bound[0] < 1e-6
-
-
 @pytest.mark.parametrize("guess", [(2.0, 0.0), (0.1, 0.1), (5.0, 5.0), (0.0, -3.0), (-1.0, 0.3)])
 @pytest.mark.parametrize(("mu", "period", "factor"), [(0.5, KNOWN[1][1], 0.8), (5.0, KNOWN[5][1], 1.0)])
 def test_bad_guesses(mu, period, factor, guess):

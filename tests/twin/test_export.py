@@ -16,33 +16,22 @@ PRESET = load_robot("aoi2022")
 # Numbers of many digits everywhere.
 ODD = PRESET.set_from_text(
     [
-        "body.mass=8.123456789012 kg",
-        "body.length=1.23456789012 m",
-        "springs.stiffness[0]=15.123456789 N*mm/deg",
-        "springs.damping=0.0123456789012",
-        "legs.forward_offset=0.0345678901234 m",
-        "legs.half_width=0.0654321098765 m",
-        "twin.upper_link=61.2345678901 mm",
-        "twin.lower_link=57.6543210987 mm",
-        "twin.link_mass=0.0371234567891 kg",
-        "twin.foot_radius=6.12345678901 mm",
-        "twin.hip_height=97.1234567891 mm",
-        "twin.body_width=98.7654321098 mm",
-        "twin.servo_stiffness=7.65432109876",
-        "twin.servo_damping=0.123456789012",
-        "twin.joint_inertia=0.000987654321098",
-        "twin.sliding_friction=0.678901234567",
-        "twin.contact_time=0.0212345678901 s",
-        "twin.impedance_ratio=5.12345678901",
-        "twin.scanner_offset=0.0812345678901 m",
-        "twin.pole_radius=0.0312345678901 m",
+        "body.mass=8.123456789012 kg", "body.length=1.23456789012 m", "springs.stiffness[0]=15.123456789 N*mm/deg",
+        "springs.damping=0.0123456789012", "legs.forward_offset=0.0345678901234 m",
+        "legs.half_width=0.0654321098765 m", "twin.upper_link=61.2345678901 mm", "twin.lower_link=57.6543210987 mm",
+        "twin.link_mass=0.0371234567891 kg", "twin.foot_radius=6.12345678901 mm", "twin.hip_height=97.1234567891 mm",
+        "twin.body_width=98.7654321098 mm", "twin.servo_stiffness=7.65432109876", "twin.servo_damping=0.123456789012",
+        "twin.joint_inertia=0.000987654321098", "twin.sliding_friction=0.678901234567",
+        "twin.contact_time=0.0212345678901 s", "twin.impedance_ratio=5.12345678901",
+        "twin.scanner_offset=0.0812345678901 m", "twin.pole_radius=0.0312345678901 m",
+        "twin.yaw_friction=0.0312345678901", "twin.leg_friction=0.0512345678901",
     ]
-)
+)  # fmt: skip
 ODD = ODD.with_(twin=ODD.twin.model_copy(update={"control_interval": 0.00201234567891, "timestep": 0.00201234567891}))
 FEWER = ODD.with_value("body.modules", 3).with_(name='nasty <name> & "quotes" -- µ')
 
 # What the viewer is given in addition, and what counts or locates it.
-DECORATION = ("cam_", "light_", "mat_", "tex_", "key_", "names", "name_", "geom_matid", "paths")
+DECORATION = ("cam_", "sensor", "light_", "mat_", "tex_", "key_", "names", "name_", "geom_matid", "paths")
 
 
 @pytest.fixture(params=[PRESET, ODD, FEWER], ids=["preset", "odd numbers", "three modules"])
@@ -90,9 +79,29 @@ def test_mjcf_walks_the_same_walk(robot, tmp_path):
     np.testing.assert_array_equal(record.pose.values[-1, 0], data.qpos)
 
 
+def test_a_loop_over_the_keyframes_walks(tmp_path):
+    model = loaded(tmp_path, "robot.xml", mjcf(PRESET))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    gait = [i for i in range(model.nkey) if model.key(i).name.startswith("gait")]
+    period = gait_period = len(gait) * model.key_time[gait[1]]
+    assert gait_period == pytest.approx(PRESET.gait.period)
+    start = data.qpos[:2].copy()
+    while data.time < 5.0:
+        data.ctrl[:] = [
+            np.interp(data.time, model.key_time[gait], row, period=period) for row in model.key_ctrl[gait].T
+        ]
+        mujoco.mj_step(model, data)
+    ours = simulate(PRESET, 5.0, rate=1.0, poses=True).pose.values[-1, 0]
+    assert np.linalg.norm(data.qpos[:2] - start) > 0.2
+    assert data.qpos[:2] == pytest.approx(ours[:2], abs=0.02)
+    assert data.sensor("yaw1").data == pytest.approx(data.joint("yaw1").qpos, abs=1e-4)  # of one step before
+    assert data.sensor("position").data == pytest.approx(data.body("module1").xipos, abs=0.05)
+
+
 def test_mjcf_is_fit_to_be_looked_at(tmp_path):
     model = loaded(tmp_path, "robot.xml", mjcf(PRESET))
-    assert model.nlight == model.ncam == model.nkey == 1
+    assert model.nlight == model.ncam == 1
     assert model.geom("floor").matid[0] == model.material("floor").id
     assert model.stat.extent == pytest.approx(PRESET.body.length)
     data = mujoco.MjData(model)
@@ -124,6 +133,7 @@ def test_urdf_has_the_parts_of_the_robot(robot, tmp_path):
         assert theirs.joint(name).range[1] >= 0.5 * np.pi - 1e-12
         yaw = name.startswith("yaw")
         assert theirs.joint(name).damping[0] == (robot.springs.damping[0] if yaw else 0.0)
+        assert theirs.joint(name).frictionloss[0] == (robot.twin.yaw_friction if yaw else robot.twin.leg_friction)
     # Feet collide and nothing else; what cannot be said in URDF is told.
     root = ET.fromstring(text)
     assert root.get("name") == robot.name

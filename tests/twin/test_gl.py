@@ -115,32 +115,6 @@ def test_leaves_the_environment_alone():
     assert dict(os.environ) == before
 
 
-def test_context_draws_whenever_mujoco_was_imported():
-    if gl.find().backend is None:
-        pytest.skip(gl.find().missing)
-    import mujoco
-    import numpy as np
-
-    for _ in range(2):
-        with gl.context(32, 16):
-            model = mujoco.MjSpec.from_string(
-                '<mujoco><worldbody><light pos="0 0 3"/><geom type="sphere" size="1"/></worldbody></mujoco>'
-            ).compile()
-            data, scene = mujoco.MjData(model), mujoco.MjvScene(model, 10)
-            drawing, pixels = mujoco.MjrContext(model, 100), np.zeros((16, 32, 3), np.uint8)
-            mujoco.mj_forward(model, data)
-            camera = mujoco.MjvCamera()
-            mujoco.mjv_defaultFreeCamera(model, camera)
-            everything = mujoco.mjtCatBit.mjCAT_ALL
-            mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, everything, scene)
-            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
-            mujoco.mjr_render(mujoco.MjrRect(0, 0, 32, 16), scene, drawing)
-            mujoco.mjr_readPixels(pixels, None, mujoco.MjrRect(0, 0, 32, 16), drawing)
-            drawing.free()
-        assert pixels[8, 16].max() > 20
-        assert pixels[0, 0].max() < pixels[8, 16].max()
-
-
 @pytest.mark.parametrize("wish", ["nonsense", "osmesa"])
 def test_mujoco_is_imported_whatever_the_environment_says(wish):
     # On its own, since the package imports MuJoCo before it can be asked.

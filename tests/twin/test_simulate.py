@@ -194,26 +194,6 @@ def test_with_left_and_right_in_phase_the_mirror_image_walks_the_mirror_image():
     np.testing.assert_allclose(right.leg_yaw.values, -left.leg_yaw.values[..., ::-1], rtol=0, atol=1e-9)
 
 
-def test_in_antiphase_the_mirror_image_is_the_walk_half_a_period_later():
-    """The mirrored robot has its left legs where the right ones were: in antiphase that is half a period."""
-    compiled, half = TwinModel(SOFT), SOFT.gait.period / 2.0
-    times = np.arange(1500) * 0.002
-    np.testing.assert_allclose(
-        servo_targets(SOFT, times)[:, :, ::-1], servo_targets(SOFT, times + half), rtol=0, atol=1e-11
-    )
-    start = initial_states(SOFT, -BENT)[0]
-    start[compiled.leg_positions] = servo_targets(SOFT, [half])[0]
-    control = np.zeros((1500, compiled.model.nu))
-    control[:, compiled.leg_controls] = servo_targets(SOFT, times + half)
-    mirrored = looped(SOFT, start, control)[4::5]
-    record = simulate(SOFT, 3.0, initial=initial_states(SOFT, BENT), poses=True, rate=100.0).isel(time=slice(1, None))
-    pose = record.pose.values[:, 0]
-    np.testing.assert_allclose(mirrored[:, :3], pose[:, :3] * [1.0, -1.0, 1.0], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(mirrored[:, 3:7], pose[:, 3:7] * [1.0, -1.0, 1.0, -1.0], rtol=0, atol=1e-9)
-    yaw = compiled.yaw_positions
-    np.testing.assert_allclose(mirrored[:, yaw], -pose[:, yaw], rtol=0, atol=1e-9)
-
-
 def test_friction_factors_scale_the_feet():
     doubled = SOFT.with_value("twin.sliding_friction", 2.0 * SOFT.twin.sliding_friction)
     start = initial_states(SOFT, BENT)

@@ -7,9 +7,14 @@ from chilopod.lazy import exports
 if TYPE_CHECKING:
     from chilopod.analysis.bend_onset import bend_onset
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
+    from chilopod.analysis.compare import RobotComparison, compare
     from chilopod.analysis.cycle_modes import CycleMultipliers
     from chilopod.analysis.cycle_multipliers import cycle_multipliers, walk_multipliers
+    from chilopod.analysis.map import map
+    from chilopod.analysis.map_result import StabilityMap
+    from chilopod.analysis.quantities import Onset
     from chilopod.analysis.radius_law import RadiusLaws, radius_laws
+    from chilopod.analysis.sensitivity import Sensitivity, sensitivity
     from chilopod.analysis.square_root import SquareRootFit, square_root_fit
     from chilopod.analysis.straight_walk import (
         StraightWalk,
@@ -19,7 +24,7 @@ if TYPE_CHECKING:
         pitchfork,
         straight_walk,
     )
-    from chilopod.analysis.transition_curves import TransitionCurve, transition_curve
+    from chilopod.analysis.uncertainty import Uncertainty, uncertainty
     from chilopod.analysis.undulation import undulating_walks
 else:
     __getattr__, __dir__ = exports(
@@ -27,9 +32,14 @@ else:
         {
             "bend_onset": ("bend_onset",),
             "branch": ("curved_walks", "read_walks", "resumed"),
+            "compare": ("RobotComparison", "compare"),
             "cycle_modes": ("CycleMultipliers",),
             "cycle_multipliers": ("cycle_multipliers", "walk_multipliers"),
+            "quantities": ("Onset",),
+            "map": ("map",),
+            "map_result": ("StabilityMap",),
             "radius_law": ("RadiusLaws", "radius_laws"),
+            "sensitivity": ("Sensitivity", "sensitivity"),
             "square_root": ("SquareRootFit", "square_root_fit"),
             "straight_walk": (
                 "StraightWalk",
@@ -39,30 +49,37 @@ else:
                 "pitchfork",
                 "straight_walk",
             ),
-            "transition_curves": ("TransitionCurve", "transition_curve"),
+            "uncertainty": ("Uncertainty", "uncertainty"),
             "undulation": ("undulating_walks",),
         },
     )
 
 __all__ = [
     "CycleMultipliers",
+    "Onset",
     "RadiusLaws",
+    "RobotComparison",
+    "Sensitivity",
     "SquareRootFit",
+    "StabilityMap",
     "StraightWalk",
-    "TransitionCurve",
+    "Uncertainty",
     "WalkBifurcation",
     "bend_onset",
     "bifurcations",
+    "compare",
     "curved_walks",
     "cycle_multipliers",
     "first_loss",
+    "map",
     "pitchfork",
     "radius_laws",
     "read_walks",
     "resumed",
+    "sensitivity",
     "square_root_fit",
     "straight_walk",
-    "transition_curve",
+    "uncertainty",
     "undulating_walks",
     "walk_multipliers",
 ]

@@ -28,11 +28,23 @@ def bend_onset(
     if at_a * at_b > 0.0:
         said = f"must hold an onset; the multiplier is {1.0 + at_a:.4f} and {1.0 + at_b:.4f} at its ends"
         raise ParameterError(said, field="onset", value=f"{a:.6g} to {b:.6g}", allowed="values on both sides of 1")
+    return crossing(excess, (a, at_a), (b, at_b))
+
+
+def crossing(
+    excess: Callable[[float], tuple[float, float]],
+    one: tuple[float, float],
+    other: tuple[float, float],
+    tolerance: float = 0.0,
+) -> Interval:
+    """Value at which an excess passes 0, between two values with excesses of different signs, by regula falsi until the
+    excess is below its error or the tolerance; its error over the slope is the interval. ``excess`` returns both."""
+    (a, at_a), (b, at_b) = one, other
     for _ in range(_MOST):
         slope = (at_b - at_a) / (b - a)
         value = a - at_a / slope
         at, error = excess(value)
-        if abs(at) <= error:
+        if abs(at) <= max(error, tolerance):
             break
         a, at_a, b, at_b = (value, at, b, at_b) if at * at_a > 0.0 else (a, at_a, value, at)
     value -= at / slope

@@ -20,6 +20,7 @@ from chilopod.engine import Status
 from chilopod.errors import AnalysisError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, unsealed
+from chilopod.notebook import finite
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.stretch import MOST_BENT
 from chilopod.progress import Progress, silent
@@ -220,9 +221,6 @@ def read_walks(path: str | Path) -> xr.Dataset:
 def as_json(data: xr.Dataset) -> dict[str, Any]:
     """A branch as plain numbers; an infinite radius (straight on) is null."""
 
-    def plain(value: float) -> float | None:
-        return float(value) if np.isfinite(value) else None
-
     columns = ("axis_radius", "path_radius", "heading_rate", "speed", "cost_of_transport", "multiplier")
     return {
         "robot": data.attrs["robot"],
@@ -230,7 +228,7 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
         "unit": data.parameter.attrs["units"],
         "ending": data.attrs["ending"],
         "criticality": data.attrs["criticality"],
-        "coefficient_per_rad2": plain(data.attrs["coefficient"]),
+        "coefficient_per_rad2": finite(data.attrs["coefficient"]),
         "direction": data.attrs["direction"],
         "direction_confirms": data.attrs["direction_confirms"] == "yes",
         "points": [
@@ -240,7 +238,7 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
                 "verdict": str(at.verdict.values),
                 "special": str(at.special.values) or None,
                 "mean_joint_angles_rad": [float(angle) for angle in at.mean_angle],
-                **{f"{name}_{_SUFFIX[name]}".rstrip("_"): plain(float(at[name])) for name in columns},
+                **{f"{name}_{_SUFFIX[name]}".rstrip("_"): finite(float(at[name])) for name in columns},
                 "multipliers": np.column_stack([at.multiplier_real, at.multiplier_imag]).tolist(),
             }
             for at in (data.isel(point=i) for i in range(data.sizes["point"]))

@@ -24,13 +24,25 @@ def stiffness(value: float) -> float:
     return units.parse(f"{float(value)!r} {PAPER_UNIT}", "N*m/rad")
 
 
+def numbers_read(robot: Robot) -> tuple[str, ...]:
+    """Paths of all continuous numbers of a robot's file that the planar model reads, springs one by one."""
+    derived = robot.body.yaw_inertia is None
+    read = {*_READ, *_inertia_read(robot)} - ({"body.yaw_inertia"} if derived else set())
+    return tuple(path for path in robot.parameters() if path.partition("[")[0] in read)
+
+
+def _inertia_read(robot: Robot) -> tuple[str, ...]:
+    """Numbers of the twin that set the yaw inertia of a module."""
+    sets = robot.twin is not None and robot.body.yaw_inertia is None
+    return tuple(f"twin.{name}" for name in _OF_INERTIA) if sets else ()
+
+
 def check_parameter(robot: Robot, parameter: str) -> None:
     """Refuse, with a ParameterError, anything but the path of a continuous number that the planar model reads.
 
     Numbers of the twin are read where they set the yaw inertia of a module.
     """
-    inertia = _OF_INERTIA if robot.twin is not None and robot.body.yaw_inertia is None else ()
-    read = (*_READ, *(f"twin.{name}" for name in inertia))
+    read = (*_READ, *_inertia_read(robot))
     try:
         robot.unit_of(parameter)
     except ParameterError as error:

@@ -271,28 +271,30 @@ def bifurcations(
 
 
 def first_loss(
-    robot: Robot, parameter: str, between: tuple[float, float], kind: Kind, normal_form: bool = True
+    robot: Robot, parameter: str, between: tuple[float, float], kind: Kind | None, normal_form: bool = True
 ) -> WalkBifurcation:
     """Bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down.
 
     Raises
     ------
     AnalysisError
-        If there is no bifurcation, or it is of another kind.
+        If there is no bifurcation, or it is of another kind; None is any kind.
     """
-    for low in np.geomspace(between[1], between[0], 5)[1:]:
+    what = "loss of stability" if kind is None else kind.label
+    spaced = np.geomspace if between[0] > 0.0 else np.linspace
+    for low in spaced(between[1], between[0], 5)[1:]:
         # From the stiff end down, so that points far below, where the walk is unstable anyway, cost nothing.
         points = bifurcations(robot, parameter, (float(low), between[1]), normal_form=False)
         if points:
-            if points[-1].point.kind is kind:
+            if kind in (None, points[-1].point.kind):
                 if not normal_form:
                     return points[-1]
                 near = points[-1].point.value * np.array([1.0 - 1e-3, 1.0 + 1e-3])
                 return bifurcations(robot, parameter, (float(near[0]), float(near[1])))[-1]
-            problem = f"stability is lost by a {points[-1].point.kind.label}, not a {kind.label}"
+            problem = f"stability is lost by a {points[-1].point.kind.label}, not a {what}"
             raise AnalysisError(problem, field=parameter)
     searched = interval_text(robot, parameter, between)
-    raise AnalysisError(f"no {kind.label} in the interval", field=parameter, value=searched)
+    raise AnalysisError(f"no {what} in the interval", field=parameter, value=searched)
 
 
 def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) -> str:

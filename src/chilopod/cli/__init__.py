@@ -16,7 +16,24 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, course, doctor, identify, live, play, reproduce, robot, stability, trials, turn, walk
+from chilopod.cli import (
+    branch,
+    compare,
+    course,
+    doctor,
+    identify,
+    live,
+    map,
+    play,
+    reproduce,
+    robot,
+    sensitivity,
+    size,
+    stability,
+    trials,
+    turn,
+    walk,
+)
 from chilopod.cli.commands import new_app
 from chilopod.errors import ChilopodError, ParameterError, briefly, one_line
 from chilopod.process import INTERRUPTED
@@ -31,6 +48,10 @@ app.add_typer(robot.app, name="robot")
 app.command("stability", short_help="Stability of the straight walk: its Floquet exponents.")(stability.stability)
 app.command("bifurcation", short_help="Points at which the straight walk gives way, and how.")(stability.bifurcation)
 app.command("branch", short_help="Curved walks beyond that point: how tightly they turn.")(branch.branch)
+app.command("sensitivity", short_help="What each number of a robot does to where it bends.")(sensitivity.sensitivity)
+app.command("compare", short_help="Differing numbers of two robots, and the part of each.")(compare.compare)
+app.command("size", short_help="Numbers of a robot at which it does what is wished.")(size.size)
+app.command("map", short_help="Map over two numbers: where it holds, bends or undulates.")(map.stability_map)
 app.command("walk", short_help="Let a robot walk, and report where it gets to.")(walk.walk)
 app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(turn.turn)
 app.command("course", short_help="Walk from target to target, and report on each.")(course.course)

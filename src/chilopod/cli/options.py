@@ -328,6 +328,24 @@ def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> No
             raise failure
 
 
+def free_result(name: str, out: Path | None, force: bool) -> None:
+    """Make sure that the files of :func:`deliver_result` can be written."""
+    if out:
+        free([out / f"{name}.{kind}" for kind in ("json", "svg", "png")], force)
+
+
+def deliver_result(found: Any, name: str, options: RobotOptions, out: Path | None) -> None:
+    """Write a result into a folder, if there is one, as JSON and as its plot, and print it."""
+    result = found.as_json()
+
+    def write() -> list[Path]:
+        from chilopod.show import write_result
+
+        return write_result(found, json_text(result) + "\n", name, out, replace=options.force) if out else []
+
+    deliver(write, lambda: print_json(result) if options.as_json else typer.echo("\n".join(found.lines())))
+
+
 def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:
     """Read the interval of a parameter, in SI units, and refuse one that is reversed or that the robot cannot have."""
     from chilopod import units

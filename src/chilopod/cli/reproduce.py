@@ -101,6 +101,7 @@ def _computed(
     """Results, their report, and the error that stopped the work, if one did."""
     from chilopod.errors import OutputError
     from chilopod.paper import section as computed
+    from chilopod.paper.ahead import Studio, walked_ahead
     from chilopod.paper.duration import plan
     from chilopod.paper.page import Report, check_report
     from chilopod.paper.section import Context, Found
@@ -119,11 +120,13 @@ def _computed(
         with (
             walking_on(options.cluster),
             progress_bar("reproduce") as progress,
-            Report(sections, context, options.out, progress, said) as report,
+            Report(sections, context, options.out, progress, said, Studio()) as report,
         ):
             typer.echo(said.words(), err=options.as_json)
             typer.echo(f"The page is {report.page.resolve()}", err=options.as_json)
-            computed.reproduce(sections, context, progress, add)
+            # A cluster walks everything.
+            with walked_ahead([] if options.cluster else sections, context) as ready:
+                computed.reproduce(sections, context, progress, add, ready)
     except OutputError as error:
         if not found.values:
             raise

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from chilopod.cli.commands import new_app
-from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, print_json, read_robot, save
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, print_json, read_robot, reading, save
+from chilopod.errors import ChilopodError, ParameterError
+
+if TYPE_CHECKING:
+    from chilopod.robot import Robot
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
+_FOLLOWED = 12  # modules of robots whose curved walks a check follows, which takes seconds
 
 app = new_app("Make, show, check and export robot files.")
 
@@ -22,8 +29,15 @@ def new(
         str | None,
         typer.Option(
             metavar="N",
-            help="Number of modules; the whole robot keeps its length and mass, the last spring is repeated.",
+            help="Number of modules; the whole robot keeps its mass, and its length unless --module-length is given; "
+            "the last spring is repeated.",
         ),
+    ] = None,
+    module_length: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Length of a module; that of the whole robot follows.")
+    ] = None,
+    body_length: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Length of the whole robot; that of a module follows.")
     ] = None,
     preset: Annotated[
         str | None,
@@ -48,13 +62,30 @@ def new(
 
     Example: chilopod robot new my.toml --modules 8
     """
-    robot = read_robot((_WHOLE if twin else _PLANAR) if preset is None else preset, None)
+    robot = read_robot((_WHOLE if twin else _PLANAR) if preset is None else preset, None).copied()
     if twin and robot.twin is None:
-        robot = robot.with_twin_of(read_robot(_WHOLE, None))
+        robot = robot.with_twin_of(read_robot(_WHOLE, None).copied())
     if modules is not None:
         robot = robot.override("body.modules", modules)
+    robot = _lengthened(robot, module_length, body_length)
     robot = read_robot(robot, overrides).with_(name=file.stem)
-    save(file, robot.to_toml(), robot, force=force, as_json=as_json, ending=".toml")
+    lengths = f"{robot.body.modules} modules of {robot.module_length:.4g} m, {robot.body.length:.4g} m in all"
+    save(file, robot.to_toml(), robot, force=force, as_json=as_json, ending=".toml", size=lengths)
+
+
+def _lengthened(robot: Robot, module_length: str | None, body_length: str | None) -> Robot:
+    """The robot with another length of its modules or of its body."""
+    from chilopod import units
+
+    if module_length and body_length:
+        raise ParameterError("must not be given with --body-length", field="module_length", value=module_length)
+    if body_length:
+        with reading("body_length"):
+            return robot.override("body.length", body_length)
+    if module_length:
+        with reading("module_length"):
+            return robot.with_value("body.length", units.parse(module_length, "m") * robot.body.modules)
+    return robot
 
 
 @app.command()
@@ -108,13 +139,32 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
     from chilopod.robot import remarks
 
     described = read_robot(robot, overrides)
-    found = remarks(described)
+    found = [*remarks(described), *_out_of_reach(described)]
     if as_json:
         print_json({"robot": described.name, "valid": True, "remarks": found})
         return
     typer.echo(f"{described.name}: valid, {described.body.modules} modules")
     for remark in found:
         typer.echo(f"  {remark}")
+
+
+def _out_of_reach(robot: Robot) -> Iterator[str]:
+    """Sentences about legs that cannot follow their paths, and joints that bend too far on the curved walk."""
+    from chilopod.analysis.quantities import Measured, Onset, leading_mode
+    from chilopod.planar.stretch import MOST_BENT
+
+    if robot.twin is not None:
+        from chilopod.twin import TwinModel
+
+        try:
+            TwinModel(robot)
+        except ChilopodError as error:
+            yield f"The robot cannot walk in three dimensions: {error}."
+    if robot.body.modules > _FOLLOWED:
+        return
+    with suppress(ChilopodError):  # no curved walk is known
+        if leading_mode(robot).growth > 0.0 and Measured(Onset()).most_bent(robot) > MOST_BENT:
+            yield "A joint bends beyond a right angle on the curved walk, where walks end: the springs are too soft."
 
 
 @app.command(short_help="Write the robot in 3-D for other programs (MJCF, URDF).")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import operator
 import re
 from collections.abc import Callable
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words
-from chilopod.frozen import Array, read_only
+from chilopod.frozen import Array
 
 LARGEST = 1_000_000
 """Largest number of states."""
@@ -46,7 +45,7 @@ class UserCode:
 
 def positive(field: str, value: object) -> float:
     """A positive finite number."""
-    number = float(finite_array(value, (), field))
+    number = value if type(value) is float and value < np.inf else float(finite_array(value, (), field))
     if not number > 0:
         raise ParameterError("must be positive and finite", field=field, value=value)
     return number
@@ -122,61 +121,49 @@ Slopes = Callable[[Array, Array], Array]
 """``slopes(times, states) -> dx/dt``, shapes (samples,), (n, samples) and (n, samples); NaN where undefined."""
 
 
-_SYMMETRIES = {
+_CLAIMS = {
+    "timeless": ("must be given", "T: the right-hand side depends on t"),
     "period": ("period", "T with f(t + T, x) = f(t, x); a function of one period takes t % T"),
     "symmetry": ("symmetry", "S with S f(t, x) = f(t + T/2, S x)"),
     "spatial_symmetry": ("symmetry", "P with P f(t, x) = f(t, P x)"),
 }
 
 
-@functools.lru_cache(maxsize=16)
-def _compared(matrix: bytes, shift: float, times: bytes, base: bytes, period: float) -> tuple[Array, Array]:
-    """Times and states of all sizes at which a symmetry is tested, then their images: the same for a family."""
-    origin, some = np.frombuffer(base), np.frombuffer(times)
-    n = origin.size
-    waves = np.cos(3.0 * np.arange(n)[:, None] + np.arange(1.0, 3.0))[:, None] * np.array(SIZES)[:, None]
-    x = np.tile(origin[:, None] + waves.reshape(n, -1), some.size)
-    t = np.repeat(some, x.shape[1] // some.size)
-    images = np.frombuffer(matrix).reshape(n, n) @ x
-    return read_only(np.concatenate([t, (t + shift) % period])), read_only(np.concatenate([x, images], axis=1))
+class Claim:
+    """A symmetry in time or space of a right-hand side, its period, or none: S f(t, x) = f(t + shift, S x) at some
+    times, modulo the period, and states of all sizes round a ``base``. A period is S = 1 with itself as the shift."""
 
+    def __init__(self, field: str, matrix: Array, shift: float, times: Array, base: Array, period: float) -> None:
+        self.field, self.matrix, self.shift = field, matrix, shift
+        waves = np.cos(3.0 * np.arange(base.size)[:, None] + np.arange(1.0, 3.0))[:, None] * np.array(SIZES)[:, None]
+        x = np.tile(base[:, None] + waves.reshape(base.size, -1), times.size)
+        t = np.repeat(times, x.shape[1] // times.size)
+        self.times = np.concatenate([t, (t + shift) % period])
+        self.states = np.concatenate([x, matrix @ x], axis=1)
+        self._alike = base.size, times.size, len(SIZES), -1  # the largest among samples of the same size
 
-def check_symmetry(
-    field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
-) -> None:
-    """Check a symmetry in time or space, or a period, of a right-hand side: a wrong one gives wrong multipliers."""
-    failed = _failure(matrix, shift, slopes, times, base, period)
-    if failed is not None:
-        what, allowed = _SYMMETRIES[field]
+    def check(self, slopes: Array) -> None:
+        """Check the claim by the slopes at its times and states: a wrong one gives wrong multipliers."""
+        half = self.times.size // 2
+        here, there = slopes[:, :half], slopes[:, half:]
+        off = np.abs(self.matrix @ here - there)
+        if off.max() < np.inf and (off <= _SAME * np.abs(there)).all():
+            return
+        terms = np.abs(self.matrix) @ np.abs(here) + np.abs(there)
+        largest = np.where(np.isfinite(terms), terms, 0.0).reshape(self._alike).max(axis=(1, 3), keepdims=True)
+        wrong = (off.reshape(self._alike) > _SAME * largest).reshape(off.shape)
+        if self.shift > 0.0:  # a right-hand side may be round-off of terms that cancel
+            wrong &= off > _NEGLIGIBLE / self.shift * np.abs(self.states[:, :half]).max(axis=0)
+        if not wrong.any():
+            return
+        what, allowed = _CLAIMS[self.field]
+        if self.field == "timeless":
+            raise ParameterError(what, field="period", value=None, allowed=allowed)
+        failed = float(self.times[:half][wrong.any(axis=0)][0])
         said = f"must be a {what} of the right-hand side, but fails at t = {failed:g}"
-        raise ParameterError(said, field=field, value=shift if field == "period" else None, allowed=allowed)
-
-
-def check_timeless(slopes: Slopes, base: Array, duration: float) -> None:
-    """Check that a right-hand side without a period does not depend on time."""
-    times = np.array([0.1234 * duration])
-    if _failure(np.eye(base.size), 0.4444 * duration, slopes, times, base, np.inf) is not None:
-        raise ParameterError("must be given", field="period", value=None, allowed="T: the right-hand side depends on t")
-
-
-def _failure(matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float) -> float | None:
-    """Time at which S f(t, x) is not f(t + shift, S x), of some times, modulo the period, and states of all sizes;
-    None if there is none. A period is the symmetry S = 1 with itself as the shift."""
-    t, x = _compared(matrix.tobytes(), shift, times.tobytes(), base.tobytes(), period)
-    both, half = slopes(t, x), t.size // 2
-    here, there = both[:, :half], both[:, half:]
-    off = np.abs(matrix @ here - there)
-    if np.isfinite(off).all() and (off <= _SAME * np.abs(there)).all():
-        return None
-    terms = np.abs(matrix) @ np.abs(here) + np.abs(there)
-    # The largest among samples of the same size; every time has some.
-    alike = (base.size, times.size, len(SIZES), -1)
-    largest = np.where(np.isfinite(terms), terms, 0.0).reshape(alike).max(axis=(1, 3), keepdims=True)
-    wrong = (off.reshape(alike) > _SAME * largest).reshape(off.shape)
-    if shift > 0.0:  # a right-hand side may be round-off of terms that cancel
-        wrong &= off > _NEGLIGIBLE / shift * np.abs(x[:, :half]).max(axis=0)
-    wrong = wrong.any(axis=0)
-    return float(t[:half][wrong][0]) if wrong.any() else None
+        raise ParameterError(
+            said, field=self.field, value=self.shift if self.field == "period" else None, allowed=allowed
+        )
 
 
 def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slopes:

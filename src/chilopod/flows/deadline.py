@@ -41,7 +41,7 @@ class Deadline:
     @property
     def late(self) -> bool:
         """True once the limit is reached."""
-        return _now() > self._ends
+        return self._ends < math.inf and _now() > self._ends
 
     @property
     def remaining(self) -> float:

@@ -51,7 +51,7 @@ def checked_events(events: object) -> tuple[Event, ...]:
     return tuple(events)
 
 
-def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array, orbit: Array | None, n: int) -> None:
+def check_events(events: Sequence[Event], args: tuple[Any, ...], times: Array, orbit: Array | None, n: int) -> None:
     """Check that guards give numbers that may pass zero, and resets states, around the orbit at some times."""
     if not events:
         return

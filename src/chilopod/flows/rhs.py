@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
-from chilopod.flows.arguments import LARGEST, Slopes, check_shape, check_timeless, checked_count, finite_array, sampled
+from chilopod.flows.arguments import LARGEST, Slopes, check_shape, checked_count, finite_array, sampled
 from chilopod.flows.called import CalledFlow
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.events import Event, check_events, checked_events
@@ -20,7 +20,7 @@ from chilopod.flows.jumps import fast_parts, warn_of_jumps
 from chilopod.flows.taylor.flow import TaylorFlow
 from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_series, trace
 from chilopod.flows.tracing.traced import Untraceable
-from chilopod.frozen import Array, read_only
+from chilopod.frozen import Array
 
 TOLERANCE, _COARSEST = 1e-14, 1e-3
 _FLOOR = 0.01  # truncation of a Taylor step relative to the tolerance: a small one costs almost nothing
@@ -39,17 +39,15 @@ _FLOWS = "flow", "flow_with_error", "flow_states"
 
 @dataclass
 class RightHandSide:
-    """A right-hand side f(t, x, *args), checked, with the arguments of :func:`chilopod.stability.from_rhs`.
+    """Properties of right-hand sides f(t, x, *args), checked: arguments of :func:`chilopod.stability.from_rhs`.
 
     The ``duration`` is the period of the explicit dependence on time, or about that of a motion; ``base`` is a state to
     test f at, ``edges`` are the times from 0 to the period at which f switches, ``times`` one inside each interval.
     """
 
-    rhs: Callable[..., ArrayLike]
     dimension: int
     duration: float
     autonomous: bool
-    args: tuple[Any, ...] = ()
     events: Sequence[Event] = ()
     switch_times: Sequence[float] = ()
     orbit: ArrayLike | None = None
@@ -60,50 +58,41 @@ class RightHandSide:
         method: object = self.method
         if not (isinstance(method, str) and method in get_args(Method)):
             raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
-        if not callable(self.rhs):
-            raise ParameterError("must be a function", field="rhs", value=self.rhs, allowed="rhs(t, x, *args)")
         self.dimension = checked_count("dimension", self.dimension, LARGEST)
-        if not isinstance(self.args, tuple):
-            raise ParameterError("must be a tuple", field="args", value=self.args, allowed="such as (0.5,)")
         if not 0.0 < finite_array(self.tolerance, (), "tolerance") <= _COARSEST:
             allowed = f"0 to {_COARSEST:g}"
             raise ParameterError("is out of range", field="tolerance", value=self.tolerance, allowed=allowed)
         self.tolerance = float(self.tolerance)
         self.events = checked_events(self.events)
-        if isinstance(self.switch_times, tuple) and not self.switch_times:
-            self.edges, self.times = _unswitched(self.duration)
-        else:
-            self.edges = _edges(self.switch_times, self.duration)
-            self.times = self.edges[:-1] + 0.4142 * np.diff(self.edges)
+        self.edges = _edges(self.switch_times, self.duration)
+        self.times = self.edges[:-1] + 0.4142 * np.diff(self.edges)
         if self.autonomous and self.edges.size > 2:
             raise ParameterError("need a period", field="switch_times", value=self.switch_times, allowed="none")
         self.start = None if self.orbit is None else finite_array(self.orbit, (self.dimension,), "orbit")
         self.base = np.zeros(self.dimension) if self.start is None else self.start
-        check_events(self.events, self.args, self.times, self.start, self.dimension)
 
-    def flows(self) -> tuple[Slopes, Members]:
-        """The right-hand side at many times and states, and its flows: traced if possible, else from calls."""
+    def flows(self, rhs: Callable[..., ArrayLike], args: tuple[Any, ...]) -> tuple[Slopes, Members]:
+        """A right-hand side at many times and states, and its flows: traced if possible, else from calls."""
+        if not callable(rhs):
+            raise ParameterError("must be a function", field="rhs", value=rhs, allowed="rhs(t, x, *args)")
+        if not isinstance(args, tuple):
+            raise ParameterError("must be a tuple", field="args", value=args, allowed="such as (0.5,)")
+        check_events(self.events, args, self.times, self.start, self.dimension)
         pairs = [(event.guard, event.reset) for event in self.events]
         try:
-            traced = trace(
-                self.rhs, self.dimension, self.args, times=(0.0, self.duration), base=self.base, events=pairs
-            )
+            traced = trace(rhs, self.dimension, args, times=(0.0, self.duration), base=self.base, events=pairs)
         except Untraceable as reason:
-            self._refuse_calls(reason)
-            slopes = sampled(self.rhs, self.args, self.dimension)
+            self._refuse_calls(rhs, args, reason)
+            slopes = sampled(rhs, args, self.dimension)
             warn_of_jumps(slopes, self.dimension, self.edges, self.start)
             fast = fast_parts(slopes, self.base, self.edges)
-            called = CalledFlow(self.rhs, self.args, self.edges, fast, self.times, str(reason), self.tolerance)
-            members: Members = {name: getattr(called, name) for name in _FLOWS}
-        else:
-            slopes, members = self._traced(traced)
-        if self.autonomous:
-            check_timeless(slopes, self.base, self.duration)
-        return slopes, members
+            called = CalledFlow(rhs, args, self.edges, fast, self.times, str(reason), self.tolerance)
+            return slopes, {name: getattr(called, name) for name in _FLOWS}
+        return self._traced(traced)
 
-    def _refuse_calls(self, reason: Untraceable) -> None:
+    def _refuse_calls(self, rhs: Callable[..., ArrayLike], args: tuple[Any, ...], reason: Untraceable) -> None:
         """Refuse a function of the wrong shape, and options that need a traced function."""
-        check_shape(self.rhs, self.args, float(self.times[0]), self.base)
+        check_shape(rhs, args, float(self.times[0]), self.base)
         if self.events:
             allowed = "arithmetic, elementary functions and numpy arrays, without branches on the state"
             raise ParameterError(
@@ -186,11 +175,6 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
 
     own: Members = {name: either(name) for name in _FLOWS}
     return own | {"flow_volume": lambda *args: implicit().flow_volume(*args), "is_stiff": is_stiff}
-
-
-@functools.lru_cache
-def _unswitched(period: float) -> tuple[Array, Array]:
-    return read_only(np.array([0.0, period])), read_only(np.array([0.4142 * period]))
 
 
 def _edges(switch_times: Sequence[float], period: float) -> Array:

@@ -21,11 +21,11 @@ def at_server(server: viser.ViserServer, do: Callable[[], None]) -> None:
     asyncio.run_coroutine_threadsafe(done(), server.get_event_loop()).result()
 
 
-def notify(server: viser.ViserServer, sentence: str) -> None:
-    """Show a sentence to all browsers."""
+def notify(server: viser.ViserServer, sentence: str, seconds: float | None = 8.0) -> None:
+    """Show a sentence to all browsers, for some seconds or until it is closed by hand (None)."""
 
     def show() -> None:
         for client in server.get_clients().values():
-            client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
+            client.add_notification("chilopod", sentence, auto_close_seconds=seconds)
 
     at_server(server, show)

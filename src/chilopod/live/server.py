@@ -334,7 +334,7 @@ class Live:
         """Grant what an address asks for; not if another web site led there."""
         if not by_hand:
             if read(asked, self.session.sliders)[0]:
-                notify(self.server, "Another page led here: press Enter in the address to apply it.")
+                notify(self.server, "Another page led here: press Enter in the address to apply it.", None)
             return
         preset = preset_of(asked)
         if preset is not None and preset != self.preset:
@@ -343,7 +343,7 @@ class Live:
         for wish in told:
             self.wish(wish)
         if wrong:
-            notify(self.server, wrong)
+            notify(self.server, wrong, None)
 
     def _take_address(self) -> None:
         """Open the address of a page that has just been loaded."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 
@@ -21,6 +20,7 @@ from chilopod.analysis.parameters import K1
 from chilopod.engine import Status, engine_named
 from chilopod.errors import ChilopodError
 from chilopod.frozen import Array
+from chilopod.process import deaf
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
 
@@ -132,7 +132,7 @@ class Beside:
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
         self._process = context.Process(target=_answer, args=(there, engine), daemon=True, name="chilopod theory")
-        with _deaf():
+        with deaf():
             self._process.start()
         there.close()
 
@@ -154,19 +154,6 @@ class Beside:
         self._here.close()
         self._process.terminate()
         self._process.join(timeout=5.0)
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Block in which new processes ignore Ctrl-C, which only the page obeys."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 class _Stale(Exception):

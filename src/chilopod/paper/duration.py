@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from chilopod.cores import cores
 from chilopod.paper.registry import chosen
 from chilopod.paper.section import Section, Size
 from chilopod.robot import load_robot
@@ -25,13 +26,14 @@ SECONDS: Final = {
     "undulation": (12, 12),
     "turning": (5, 3),
     "robot-movies": (50, 25),
-    "robot-walks": (200, 27),
-    "robot-turning": (36, 16),
+    "robot-walks": (200, 17),
+    "robot-turning": (36, 11),
     "identification": (40, 14),
+    "robot-strategies": (100, 10),
     "robot-spread": (180, 60),
     "robot-numerics": (25, 10),
     "robot-structures": (900, 300),
-    "robot-why": (270, 45),
+    "robot-why": (900, 90),
     "courses": (200, 28),
     "courses-robust": (90, 20),
     "robot-courses": (1200, 250),
@@ -39,7 +41,8 @@ SECONDS: Final = {
 }
 """Seconds of a full section and of a quick one, by its name; others take a moment."""
 
-_WALKS: Final = 0.45  # s, of the walks of :func:`pace` on that machine
+_WALKS: Final = 0.17  # s, of the walks of :func:`pace` on that machine
+_ENDS: Final = 20.0  # s at the beginning and the end, in which one process has nothing to do
 _TINY: Final = 0.2  # of what a quick one takes
 _SHORT: Final = 30.0  # s, too short to measure anything for
 _IN_FULL: Final = {
@@ -77,9 +80,13 @@ def plan(sections: Sequence[Section[Any]], size: Size, named: bool = False) -> P
 
 
 def seconds(sections: Sequence[Section[Any]], size: Size) -> float:
-    """Duration of sections on the machine of :data:`SECONDS`, s."""
-    pairs = [(SECONDS.get(each.name, (0, 0)), size.within(each)) for each in sections]
-    return (_TINY if size is Size.TINY else 1.0) * sum(pair[part is not Size.FULL] for pair, part in pairs)
+    """Duration of sections on the machine of :data:`SECONDS`, s; with two cores some are walked beside the others."""
+    beside = alone = 0.0
+    for each in sections:
+        taken = SECONDS.get(each.name, (0, 0))[size.within(each) is not Size.FULL]
+        beside, alone = (beside + taken, alone) if each.ahead else (beside, alone + taken)
+    together = beside and alone and cores() > 1
+    return (_TINY if size is Size.TINY else 1.0) * (max(beside, alone) + _ENDS if together else beside + alone)
 
 
 def pace() -> float:
@@ -87,7 +94,7 @@ def pace() -> float:
     walk = Trial(load_robot("aoi2022"), 0.1, engine="twin", rate=10.0)
     run([walk])  # loads what is needed
     started = time.perf_counter()
-    run([replace(walk, duration=30.0, seed=seed) for seed in range(2)])
+    run([replace(walk, duration=10.0, seed=seed) for seed in range(2)])
     return (time.perf_counter() - started) / _WALKS
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod import trials
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
+from chilopod.engine import engine_named
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
+from chilopod.output import write_atomic
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
+from chilopod.sources import digest
 from chilopod.statistics import Estimate, mean, propagated
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
 from chilopod.trials import Trial
@@ -27,6 +33,7 @@ SEEDS = 10_000
 """Distance of the seeds of neighbouring springs; more repeats then do not change the other trials."""
 
 _RATE = 50.0  # Hz
+_WITHOUT = ("cli", "gym", "live", "show")  # subpackages that do not affect results that are kept
 
 
 def spring_walks(
@@ -54,6 +61,21 @@ def spring_walks(
         for repeat in range(repeats)
     ]
     return trials.run(asked, folder, progress)
+
+
+def kept(folder: Folder, robot: Robot, how: object, compute: Callable[[], list[Any]]) -> list[Any]:
+    """Result of a computation on a robot that is no trial, plain numbers, from a file beside the folder of the trials
+    if it is there; ``how`` is all else that determines it, but for the sources and the twin's engine."""
+    if folder is None:
+        return compute()
+    code = digest(_WITHOUT), engine_named("twin").traits.version
+    said = repr((code, how, robot.with_(name="robot", provenance={}).to_toml()))
+    path = Path(folder).parent / "multipliers" / f"{hashlib.sha256(said.encode()).hexdigest()[:20]}.json"
+    with suppress(OSError, ValueError):
+        return list(json.loads(path.read_text()))
+    found = compute()
+    write_atomic(path, json.dumps(found))
+    return found
 
 
 def spring_seeds(springs: Sequence[float]) -> list[int]:

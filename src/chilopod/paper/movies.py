@@ -22,6 +22,7 @@ _ROBOT_TRIED = (41.0, 21.0, 15.0)  # N*mm/deg, the paper's of task A
 _WALK, _ROBOT_WALK = 45.0, 90.0  # s
 _TASK, _ROBOT_TASK = 24.0, 32.0  # s
 _ROBOT_STILLS = ((2.0, 30.0, 60.0, 88.0), (0.5, 8.0, 16.0, 24.0))  # s
+_QUICK_FPS = 12  # frames take long to render
 _BEND = tuple(float(angle) for angle in np.deg2rad([20.0, 10.0, 14.0, 12.0, 4.0]))
 
 
@@ -46,7 +47,6 @@ def robot_movies(context: Context, progress: Progress) -> list[Movie]:
     found = _movies(context, progress, "robot-", walk, shorter * _ROBOT_TASK, springs)
     moments = [tuple(shorter * moment for moment in stills) for stills in _ROBOT_STILLS]
     first, second = (replace(movie, stills=stills) for movie, stills in zip(found, moments, strict=True))
-    # Frames take long to render: a quick report has a third of them.
     faster = 3.0 if context.size is Size.QUICK else 1.0
     return [replace(first, speed=3.0 * faster), replace(second, speed=faster)]
 
@@ -62,6 +62,7 @@ def _movies(
     records = run(asked, context.folder, progress)
     kinds = ("straight", "curved a little", "curved a lot", "too stiff", "best", "too soft")
     names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
+    fps = _QUICK_FPS if context.size is Size.QUICK else Movie.fps
     titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))
     return [
         Movie(
@@ -70,8 +71,9 @@ def _movies(
             titles[:3],
             together(records[:3]),
             2.0,
+            fps,
             size=(1280, 400),
             follow=True,
         ),
-        Movie(f"{prefix}movie-2", f"Turning to a target, {TASK_A}", titles[3:], together(records[3:]), 1.0),
+        Movie(f"{prefix}movie-2", f"Turning to a target, {TASK_A}", titles[3:], together(records[3:]), 1.0, fps),
     ]

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from chilopod.paper.section import Section, Size
 
 REGISTRY: dict[str, str] = {
+    "exponents": "straight.sections.EXPONENTS",  # needs the least compiled code: the first figure comes soonest
     "mode": "straight.sections.MODE",
-    "exponents": "straight.sections.EXPONENTS",
     "variants": "straight.sections.VARIANTS",
     "modules": "straight.sections.MODULES",
     "uniform": "straight.sections.UNIFORM",
@@ -22,10 +22,11 @@ REGISTRY: dict[str, str] = {
     "undulation": "curved.sections.UNDULATION",
     "turning": "turning.sections.TURNING",
     "movies": "turning.sections.MOVIES",
-    "robot-movies": "robot.sections.FILMS",
     "robot-walks": "robot.sections.WALKS",
+    "robot-movies": "robot.sections.FILMS",
     "robot-turning": "robot.sections.TASKS",
     "identification": "straight.sections.IDENTIFICATION",
+    "robot-strategies": "robot.sections.STRATEGIES",
     "robot-spread": "robot.sections.SPREAD",
     "robot-numerics": "robot.sections.NUMERICS",
     "robot-structures": "robot.sections.STRUCTURES",

@@ -25,6 +25,9 @@ Line = Row | OfTwin | OfPlanar
 NEEDS_MORE = "needs more trials"
 """Words of a quick report for the studies that it leaves out."""
 
+QUICK_REPEATS = 3
+"""Walks of the whole robot with each spring in a quick report: the fewest whose scatter gives an interval."""
+
 SectionProgress = Callable[[str, float, str], None]
 """Function of a section, the fraction of it that is done (0 to 1), and a few words."""
 
@@ -76,6 +79,7 @@ class Movie:
     titles: tuple[str, ...]  # of the panels
     record: xr.Dataset
     speed: float  # seconds of the walks per second of the film
+    fps: int = 25  # frames per second
     stills: tuple[float, ...] = ()  # moments of it that are pictured in three dimensions, s; none of a film from above
     size: tuple[int, int] = (1280, 320)  # of a film from above, pixels; that of three panels in a row
     follow: bool = False  # True if every panel follows its robot, from near
@@ -102,6 +106,7 @@ class Section(Generic[T]):
     beyond: bool = False  # beyond the paper's own experiments
     headline: bool = False  # the one of its chapter beyond them that a main report has
     on_request: bool = False  # computed only if it is asked for by name
+    ahead: bool = False  # its trials need no compiled code: another process walks them from the start
 
     def figures(self, found: Found) -> list[Panel]:
         """Figures of the results."""
@@ -160,15 +165,20 @@ def reproduce(
     context: Context | None = None,
     progress: SectionProgress = lambda what, done, words: None,
     callback: Callable[[Found, Section[Any]], None] = lambda found, section: None,
+    ready: Callable[[Section[Any]], bool] = lambda section: False,
 ) -> Found:
     """Compute sections of the report; one that fails does not keep the others from being computed.
 
     ``sections`` are those of :func:`chilopod.paper.registry.chosen`, the context by default that of the paper's robots.
     ``progress`` is called during the work. ``callback`` is called after every section, with all results so far and the
-    section. An OutputError is raised if trials cannot be kept.
+    section. Sections that are ``ready``, as their trials are kept, come before others, except the first. An OutputError
+    is raised if trials cannot be kept.
     """
     found = Found(context or Context())
-    for section in sections:
+    left = list(sections)
+    while left:
+        section = next(filter(ready, left), left[0]) if found.seconds else left[0]
+        left.remove(section)
         started = time.perf_counter()
         progress(section.sentence, 0.0, section.sentence)
 

@@ -104,7 +104,7 @@ VARIANTS = {
     )
     for name, variant in printed.VARIANTS.items()
 }
-UNIFORM = _number("where a body with springs all alike undulates", printed.UNIFORM, _PREDICTED)
+UNIFORM = _number("where the straight walk ends, all springs alike", printed.UNIFORM, _PREDICTED)
 # The springs next to the onset are those that need the longest.
 SLOWEST = {"curved": max(printed.CURVED), "straight": min(printed.STRAIGHT)}
 ONSET_BY_DURATION = _duration("onset")

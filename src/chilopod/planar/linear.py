@@ -21,7 +21,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
 
 from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.errors import ParameterError
@@ -37,7 +36,7 @@ _CANCELLED = 2.0  # of which so much may be lost to cancellation: a factor e^2 i
 _ROUND_OFF = 2.0**-20  # size of the round-off that is carried along, far above the true one and far below the states
 _CARRIED, _OWN = 16.0, 128.0  # safety: of that column, and of the largest entry
 _MOST_ORDERS = 400
-_MOST_EXTENDED = 60  # modules; beyond them extended precision takes too long
+MOST_EXTENDED = 60  # modules; beyond them extended precision takes too long
 _KEPT = 24  # terms held before the last three move back to the bottom
 _CHECKED = 4
 
@@ -58,6 +57,14 @@ def mass_matrix(modules: int, length: float, mass: float, inertia: float, dtype:
     matrix[0, 0] = modules * mass
     matrix[2:, 2:] += inertia * np.eye(modules)
     return matrix, lateral
+
+
+def rate_differences(modules: int) -> Array:
+    """Joint rates as functions of the velocities, shape (N-1, N+2)."""
+    rates, joints = np.zeros((modules - 1, modules + 2)), range(modules - 1)
+    rates[joints, range(2, modules + 1)] = -1.0
+    rates[joints, range(3, modules + 2)] = 1.0
+    return rates
 
 
 def system_matrices(
@@ -82,7 +89,7 @@ def system_matrices(
     intervals, n, _ = moments.shape
     # The mass matrix of a long chain is nearly singular and turns round-off in what follows into accelerations a
     # thousand times larger; extended precision, where the machine has it, keeps them good to double.
-    extended: Any = np.longdouble if n <= _MOST_EXTENDED else np.float64
+    extended: Any = np.longdouble if n <= MOST_EXTENDED else np.float64
     m, lateral = mass_matrix(n, length, mass, inertia, extended)
     mass, speed = extended(mass), extended(speed)
     c, c_x, c_y, c_xx = np.moveaxis(moments[..., : C_PP + 1].astype(extended), -1, 0)
@@ -115,9 +122,7 @@ def system_matrices(
     force[..., n + 2 :] = speed * sideways
     force[0, :, :, 2] -= mass * speed * lateral.sum(0)  # module 1's frame turns: vy' = a_y - w0 vx
 
-    rates = np.zeros((n - 1, n + 2))
-    rates[range(n - 1), range(2, n + 1)] = -1.0
-    rates[range(n - 1), range(3, n + 2)] = 1.0
+    rates = rate_differences(n)
     # A power series has no direction of time, so its terms grow as fast as the motion of the interval before, run
     # backwards, would: the mean of the drag from -h to 0 counts too. Within the interval the largest stands at an end,
     # since a foot damps as the square of a linear function of time.
@@ -128,19 +133,22 @@ def system_matrices(
     inverse_root = np.linalg.inv(np.linalg.cholesky(m.astype(np.float64)))
     decay: Array = np.linalg.eigvalsh(inverse_root @ drags.astype(np.float64) @ inverse_root.T)[..., -1].max(axis=0)
     columns = np.moveaxis(force, 2, 0).reshape(n + 2, -1)
-    solved = _solve(m, np.concatenate([columns, rates.T], axis=1))
+    solved = solve(m, np.concatenate([columns, rates.T], axis=1))
     passive = solved[:, : columns.shape[1]].reshape(n + 2, 3, intervals, 2 * n + 1)
     passive = np.ascontiguousarray(passive.transpose(2, 0, 1, 3))
     joint = np.ascontiguousarray(solved[:, columns.shape[1] :])
     return passive, joint, rates, decay
 
 
-def _solve(matrix: Any, right: Any) -> Array:
-    """Solve with a matrix in extended precision: elimination in double, and two refinements."""
-    factors = lu_factor(matrix.astype(np.float64))
+def solve(matrix: Any, right: Any) -> Array:
+    """Solve with a matrix in extended precision: inverse in double, and two refinements.
+
+    LAPACK's solver would share a few columns between threads, which takes milliseconds where other work keeps a core.
+    """
+    inverse = np.linalg.inv(matrix.astype(np.float64))
     solution = np.zeros_like(right)
     for _ in range(3):
-        solution += lu_solve(factors, (right - matrix @ solution).astype(np.float64))
+        solution += inverse @ (right - matrix @ solution).astype(np.float64)
     rounded: Array = solution.astype(np.float64)
     return rounded
 
@@ -168,10 +176,11 @@ def joint_bound(compliance: Array, torque: Array) -> float:
     return float((np.abs(compliance) @ torque).max())
 
 
-def steps(widths: Array, decay: Array, frequency: float) -> float:
-    """Approximate number of Taylor steps of :func:`propagate`."""
+def steps(widths: Array, decay: Array, frequency: Array | float) -> Array:
+    """Approximate number of Taylor steps of :func:`propagate`; intervals come last, robots may be in front."""
     centred = np.hypot(0.5 * decay, frequency)
-    return float((widths * np.maximum(centred / _LONGEST, (centred - 0.5 * decay) / _CANCELLED)).sum())
+    found: Array = (widths * np.maximum(centred / _LONGEST, (centred - 0.5 * decay) / _CANCELLED)).sum(-1)
+    return found
 
 
 @njit(inline="always")
@@ -265,7 +274,7 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
 
 
 @njit
-def _propagate_all(
+def propagate_all(
     widths: Any, upper: Any, decay: Any, frequency: float, clock: float, matrix: Any
 ) -> tuple[float, int]:
     """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel."""
@@ -293,7 +302,7 @@ def propagate_batch(
     """:func:`propagate` for many robots with the same gait, on all cores: all but ``widths`` and ``clock`` have robots
     in front."""
     for r in numba.prange(matrices.shape[0]):
-        errors[r] = _propagate_all(widths, upper[r], decay[r], frequency[r], clock, matrices[r])[0]
+        errors[r] = propagate_all(widths, upper[r], decay[r], frequency[r], clock, matrices[r])[0]
 
 
 def propagate(
@@ -311,5 +320,5 @@ def propagate(
     n, intervals = len(matrix), widths.size
     if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):
         raise ParameterError("must have the shapes of propagate()", field="upper", value=upper.shape)
-    error, orders = _propagate_all(widths, upper, decay, frequency, clock, matrix)
+    error, orders = propagate_all(widths, upper, decay, frequency, clock, matrix)
     return float(error), int(orders)

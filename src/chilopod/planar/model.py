@@ -33,7 +33,7 @@ _SAME_INSTANT = 1e-12  # in periods
 _ROWS_DIFFER = 2.0  # joint rates are differences of two rows
 _FEW = 2  # robots whose linear flows take no longer than waking other threads
 _MOST_STEPS = 2e5  # of the linear flow: ten seconds or so
-_MOST_WORK = 2e9  # steps times the cube of the states: likewise of many modules
+MOST_WORK = 2e9  # steps times the cube of the states: likewise of many modules
 _MOST_NUMBERS = 1e8  # of the matrices of a period
 
 
@@ -135,7 +135,7 @@ class PlanarModel(ReadOnlyArrays):
         """:meth:`flow`, and a bound on the error of the largest entry of the derivative."""
         x = self._checked(x)
         if (x == self.orbit).all():
-            to_joint, from_joint = _joint_rates(self.modules)
+            to_joint, from_joint = joint_rates(self.modules)
             matrix = from_joint.copy()
             error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
             return x, to_joint @ matrix, _ROWS_DIFFER * error
@@ -206,7 +206,7 @@ class PlanarModel(ReadOnlyArrays):
         parts = [model._linear_pieces(t0, t1) for model in models]
         widths = parts[0][0]
         upper, decay, frequency = (np.stack([each[part] for each in parts]) for part in (1, 2, 3))
-        to_joint, from_joint = _joint_rates(models[0].modules)
+        to_joint, from_joint = joint_rates(models[0].modules)
         matrices = np.tile(from_joint, (len(models), 1, 1))
         errors = np.empty(len(models))
         clock = models[0]._clock(t0, t1)
@@ -284,7 +284,7 @@ class PlanarModel(ReadOnlyArrays):
             upper[:, :, 0, : n + 2] -= dampers
         decay = decay[interval]
         steps = linear.steps(widths, decay, frequency)
-        if not steps < _MOST_STEPS or not steps * self.dimension**3 < _MOST_WORK:
+        if not steps < _MOST_STEPS or not steps * self.dimension**3 < MOST_WORK:
             walked = f"from {t0:g} s to {t1:g} s: about {steps:.0e} steps of {self.dimension} states"
             allowed = "less stiffness, damping or friction, or more mass, or fewer modules"
             raise AnalysisError(f"motion is too fast to follow {walked}", field="springs, ground", allowed=allowed)
@@ -384,7 +384,7 @@ def _passive_matrices(
 
 
 @lru_cache(maxsize=64)
-def _joint_rates(modules: int) -> tuple[Array, Array]:
+def joint_rates(modules: int) -> tuple[Array, Array]:
     """Change of coordinates from (vx, vy, w_0 .. w_{N-1}, theta) to (vx, vy, w_0, theta, theta'), and back."""
     n = modules
     matrix = np.zeros((2 * n + 1, 2 * n + 1))

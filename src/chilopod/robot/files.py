@@ -74,14 +74,6 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     return parsed(read_text(path, "robot file", RobotFileError), source), source
 
 
-def read_file(cls: type[Described], path: str | Path, kind: str) -> Described:
-    """Read a TOML file of the keys of a description; `kind` is the expected content, such as ``robot file``.
-
-    RobotFileError names the file, the key and the fault of an invalid one.
-    """
-    return described(cls, parsed(read_text(path, kind, RobotFileError), str(path)), str(path))
-
-
 def described(cls: type[Described], table: Mapping[str, Any], source: str) -> Described:
     """Make a description of a table; RobotFileError names the source, the key and the fault of an invalid one."""
     try:

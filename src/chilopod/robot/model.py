@@ -22,6 +22,7 @@ from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
 from chilopod.units import Description, Flag, Quantity, quantities
 
 _OVERRIDDEN: Final = "set by override"
+_COPIED: Final = "copied from "
 _DERIVED: Final = "body.yaw_inertia"  # the one optional number that has a value where none is given
 
 
@@ -126,7 +127,8 @@ class Robot(Description):
                 )
         for path in self.provenance:
             try:
-                self._locate(path)
+                if isinstance(self._locate(path).index, slice):
+                    raise ParameterError("must be the path of one spring or of all")
             except ParameterError as error:
                 error.field = f"provenance.{path}"
                 raise
@@ -175,9 +177,9 @@ class Robot(Description):
     def get(self, path: str) -> float:
         """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``.
 
-        Without an index the springs count as one parameter, which has a value if all are alike. ``body.yaw_inertia`` is
-        `module_yaw_inertia` where none is given. Here and below, a path that is not that of a number raises
-        ParameterError.
+        Without an index the springs count as one parameter, as do those of a group such as ``springs.stiffness[1:]``,
+        which has a value if all are alike. ``body.yaw_inertia`` is `module_yaw_inertia` where none is given. Here and
+        below, a path that is not that of a number raises ParameterError.
         """
         place = self._locate(path)
         if path == _DERIVED:
@@ -187,9 +189,11 @@ class Robot(Description):
             raise ParameterError("must be a parameter that this robot has", field=path)
         if not place.quantity.each:
             return float(value)
-        if place.index is None and any(item != value[0] for item in value):
-            raise ParameterError(f"must be one spring, such as {path}[0], because they differ", field=path)
-        return float(value[place.index or 0])
+        chosen = place.joints(len(value))
+        if any(value[joint] != value[chosen[0]] for joint in chosen):
+            one = f"{path.partition('[')[0]}[{chosen[0]}]"
+            raise ParameterError(f"must be one spring, such as {one}, because they differ", field=path)
+        return float(value[chosen[0]])
 
     def unit_of(self, path: str) -> str:
         """Return the unit a parameter is written in, such as ``N*mm/deg``; empty for a count."""
@@ -234,6 +238,16 @@ class Robot(Description):
         """Return this robot with the [twin] of another, and the provenance of its numbers."""
         texts = {path: text for path, text in other.provenance.items() if path.startswith("twin.")}
         return self.with_(twin=other.twin, provenance={**self.provenance, **texts})
+
+    def copied(self) -> Self:
+        """Return this robot with provenance that names it as what numbers were copied from, but for those that were
+        overridden, or copied before."""
+        texts = {
+            path: text if text == _OVERRIDDEN or text.startswith(_COPIED) else f"{_COPIED}{self.name}: {text}"
+            for path, text in self.provenance.items()
+        }
+        rest = (path for path in self.parameters() if self.provenance_of(path) is None)
+        return self.with_(provenance={**texts, **dict.fromkeys(rest, f"{_COPIED}{self.name}")})
 
     def provenance_of(self, path: str) -> str | None:
         """Return the provenance of a parameter; a spring falls back on that of all springs."""
@@ -288,8 +302,12 @@ class Robot(Description):
         place = place_of(path)
         if place.section == "twin" and self.twin is None:
             raise ParameterError("needs a table [twin], which this robot lacks", field=path)
-        if place.index is not None and place.index >= self.body.modules - 1:
-            raise ParameterError("must be the index of a spring", field=path, allowed=f"0 to {self.body.modules - 2}")
+        last = self.body.modules - 2
+        if isinstance(place.index, int) and place.index > last:
+            raise ParameterError("must be the index of a spring", field=path, allowed=f"0 to {last}")
+        if isinstance(place.index, slice) and not (place.joints(last + 1) and (place.index.stop or 0) <= last + 1):
+            allowed = f"FIRST:END of indices from 0 to {last}, END not included"
+            raise ParameterError("must be a group of springs", field=path, allowed=allowed)
         return place
 
     def _changed(self, path: str, read: Callable[[Quantity], float]) -> Self:
@@ -312,7 +330,8 @@ class Robot(Description):
                         "must be a parameter that this robot has", allowed=f"{path.partition('[')[0]} for all of them"
                     )
                 old = (False,) * (self.body.modules - 1)
-            new = tuple(value if place.index in (None, index) else item for index, item in enumerate(old))
+            chosen = place.joints(len(old))
+            new = tuple(value if index in chosen else item for index, item in enumerate(old))
         if new == getattr(section, place.key):
             return self
         changed = section.model_copy(update={place.key: new})
@@ -329,7 +348,10 @@ class Robot(Description):
         texts = dict(self.provenance)
         if joints != self.body.modules - 1:
             texts = {name: text for name, text in texts.items() if spring_index(name, path) < joints}
-        changes["provenance"] = Table({**texts, path: _OVERRIDDEN})
+        own = [path]
+        if isinstance(place.index, slice):
+            own = [f"{path.partition('[')[0]}[{joint}]" for joint in place.joints(self.body.modules - 1)]
+        changes["provenance"] = Table({**texts, **dict.fromkeys(own, _OVERRIDDEN)})
         return self.model_copy(update=changes)
 
 

@@ -14,17 +14,25 @@ from chilopod.robot.parts import Body, Legs, Springs, Twin
 from chilopod.units import Description, Quantity, quantities
 
 _PATH: Final = re.compile(r"([a-z_]+\.[a-z_]+)(?:\[([0-9]{1,6})\])?")
+_GROUP: Final = re.compile(r"([a-z_]+\.[a-z_]+)\[([0-9]{0,6}):([0-9]{0,6})\]")
 _INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # tolerates spaces and a missing bracket
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Place of a parameter: section, key, index among the springs or None, and allowed values."""
+    """Place of a parameter: section, key, index among the springs, slice of a group of them, or None for all, and
+    allowed values."""
 
     section: str
     key: str
-    index: int | None
+    index: int | slice | None
     quantity: Quantity
+
+    def joints(self, count: int) -> range:
+        """Indices of the springs that it means, of a robot with so many joints; empty if it has none of them."""
+        if isinstance(self.index, int):
+            return range(self.index, min(self.index + 1, count))
+        return range(count)[self.index or slice(None)]
 
 
 SECTIONS: Final[dict[str, type[Description]]] = {
@@ -43,11 +51,11 @@ QUANTITIES: Final = {
 
 @lru_cache(maxsize=1024)
 def place_of(path: str) -> Place:
-    """Read a dotted path such as ``springs.stiffness[0]``; whether the robot has that many springs is not checked.
-    ParameterError, with the nearest path, if it is not the path of a number."""
+    """Read a dotted path such as ``springs.stiffness[0]``, or ``springs.stiffness[1:]`` for a group; whether the robot
+    has that many springs is not checked. ParameterError, with the nearest path, if it is not the path of a number."""
     known = QUANTITIES
-    match = _PATH.fullmatch(path)
-    stem, index = match.groups() if match else (path, None)
+    match, group = _PATH.fullmatch(path), _GROUP.fullmatch(path)
+    stem, index = match.groups() if match else (group[1] if group else path, None)
     if stem not in known:
         if stem.partition(".")[0] in ("name", "provenance"):
             raise ParameterError("must be the path of a parameter, not of a text", field=path, allowed=", ".join(known))
@@ -62,9 +70,11 @@ def place_of(path: str) -> Place:
             "must be the path of a parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest
         )
     quantity = known[stem]
-    if index is not None and not quantity.each:
+    if (index is not None or group) and not quantity.each:
         raise ParameterError("must be written without an index", field=path, allowed=stem)
     section, key = stem.split(".")
+    if group:
+        return Place(section, key, slice(*(int(end) if end else None for end in group.groups()[1:])), quantity)
     return Place(section, key, None if index is None else int(index), quantity)
 
 

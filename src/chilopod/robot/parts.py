@@ -122,6 +122,8 @@ class Twin(Description):
         Stiffness and damping of every leg joint's position servo, N*m/rad and N*m*s/rad.
     joint_inertia
         Reflected inertia of every servo's motor, kg*m^2.
+    yaw_friction, leg_friction
+        Dry friction of every yaw joint and of every leg joint, N*m, zero by default (MuJoCo: frictionloss).
     sliding_friction
         Coulomb coefficient between foot and floor.
     contact_time
@@ -171,6 +173,8 @@ class Twin(Description):
     scanner_noise: Annotated[float, Quantity("m", "mm", at_least=0.0)]
     scanner_offset: Annotated[float, Quantity("m", "m", at_least=-1e9)]
     pole_radius: Annotated[float, Quantity("m", "m")]
+    yaw_friction: Annotated[float, Quantity("N*m", "N*m", at_least=0.0, at_most=1e3)] = 0.0
+    leg_friction: Annotated[float, Quantity("N*m", "N*m", at_least=0.0, at_most=1e3)] = 0.0
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:

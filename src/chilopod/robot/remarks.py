@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from chilopod.robot.files import presets
 from chilopod.robot.model import Robot
 
@@ -23,6 +25,9 @@ def remarks(robot: Robot) -> list[str]:
         found.append("There are moments when a module has no foot on the floor.")
     if abs(robot.legs.forward_offset) + robot.gait.stride / 2.0 > robot.module_length:
         found.append("Feet reach more than a module's length ahead of or behind their module's centre.")
+    ahead = robot.gait.stroke(robot.gait.phases(np.linspace(0.0, robot.gait.period, 241), robot.body.modules))
+    if (ahead[:, :-1] - ahead[:, 1:] + robot.module_length <= 0.0).any():
+        found.append("Legs of neighbouring modules collide: feet on one side pass each other.")
     springs, joints = robot.springs, robot.body.modules - 1
     ranges = zip(springs.softest or (0.0,) * joints, springs.stiffest or (math.inf,) * joints, strict=True)
     kept = zip(springs.adjustable or (False,) * joints, springs.stiffness, ranges, strict=True)
@@ -33,8 +38,12 @@ def remarks(robot: Robot) -> list[str]:
         found.append(f"Springs {', '.join(map(str, outside))} begin outside the range of their actuators.")
     found += _out_of_proportion(robot)
     own = {path: (shown, origin) for path, shown, origin in robot.listed() if path != "body.yaw_inertia"}
-    theirs = [row for name in presets() for row in Robot.load(name).listed() if row[0] in own]
-    stale = {path for path, shown, origin in theirs if own[path][1] == origin and own[path][0] != shown}
+    theirs = [row for name in presets() for row in Robot.load(name).copied().listed() if row[0] in own]
+    stale = {
+        path
+        for path, shown, text in theirs
+        if own[path][1] in (text, text.partition(": ")[2]) and own[path][0] != shown
+    }
     if stale:
         found.append(f"Numbers that are not those of the preset, with its provenance: {', '.join(sorted(stale))}.")
     unexplained = [path for path in robot.parameters() if robot.provenance_of(path) is None]

@@ -9,14 +9,21 @@ from chilopod.lazy import exports
 logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 if TYPE_CHECKING:
-    from chilopod.show.files import files_of, write_branch, write_undulation
+    from chilopod.show.files import (
+        files_of,
+        files_of_map,
+        write_branch,
+        write_map,
+        write_result,
+        write_undulation,
+    )
     from chilopod.show.scene.replay import Replay, replay
     from chilopod.show.walk_files import files_of_walks, write_walks
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "files": ("files_of", "write_branch", "write_undulation"),
+            "files": ("files_of", "files_of_map", "write_branch", "write_map", "write_result", "write_undulation"),
             "scene.replay": ("Replay", "replay"),
             "walk_files": ("files_of_walks", "write_walks"),
         },
@@ -25,9 +32,12 @@ else:
 __all__ = [
     "Replay",
     "files_of",
+    "files_of_map",
     "files_of_walks",
     "replay",
     "write_branch",
+    "write_map",
+    "write_result",
     "write_undulation",
     "write_walks",
 ]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import xarray as xr
 
+from chilopod.analysis import StabilityMap
 from chilopod.netcdf import netcdf, sealed, storable
-from chilopod.output import write_all
+from chilopod.notebook import Summary
+from chilopod.output import Content, write_all
 from chilopod.show import style
-from chilopod.show.figures import branch, undulation
+from chilopod.show.figures import branch, stability_map, undulation
 from chilopod.show.panel import Panel
+
+_ALONE = style.Layout("A", 4.5), style.Layout("A", 4.5)
 
 
 def files_of(name: str, folder: str | Path) -> list[Path]:
@@ -28,6 +32,38 @@ def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) 
 def write_undulation(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write undulating walks as ``undulation``, with the same endings as :func:`write_branch`."""
     return _write_alone(undulation.panel(data), folder, replace)
+
+
+def write_result(result: Summary, text: str, name: str, folder: str | Path, *, replace: bool = True) -> list[Path]:
+    """Write the text of a result as ``.json``, and its plot as ``.svg`` and ``.png``; errors as of
+    :func:`chilopod.output.write_all`."""
+    files = [Path(folder) / f"{name}.{kind}" for kind in ("json", "svg", "png")]
+    with style.house_style():
+        drawn, axes = style.figure(*_ALONE, False)
+        result.plot(axes["A"])
+        contents: list[Content] = [text, style.svg(drawn, name), style.png(drawn)]
+    write_all(zip(files, contents, strict=True), replace=replace)
+    return files
+
+
+def files_of_map(folder: str | Path) -> list[Path]:
+    """Files that :func:`write_map` writes."""
+    return [Path(folder) / name for name in ("map.nc", "map.csv", "map-curves.csv", "map.svg", "map.png")]
+
+
+def write_map(found: StabilityMap, shown: Sequence[str], folder: str | Path, *, replace: bool = True) -> list[Path]:
+    """Write a map as ``map.nc``, its grid as ``map.csv``, its curves as ``map-curves.csv``, and some of its pictures as
+    ``map.svg`` and ``map.png``; files and errors as of :func:`chilopod.output.write_all`."""
+    data = found.to_dataset()
+    about = data.assign_attrs({"robot_toml": ""})
+    del about.attrs["robot_toml"]
+    table = about.drop_dims("point", errors="ignore")
+    curves = about.drop_dims(["x", "y"])
+    with style.house_style():
+        drawn = stability_map.draw(found, shown)
+        pictures = style.svg(drawn, "map"), style.png(drawn)
+    contents = netcdf(data), csv(table).encode(), csv(curves).encode(), *pictures
+    return write_all(zip(files_of_map(folder), contents, strict=True), replace=replace)
 
 
 def panel_files(

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from chilopod.tasks.identify import identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
     from chilopod.tasks.runs import RunOptions
+    from chilopod.tasks.size import Sizing, size
     from chilopod.tasks.turn import Turn, turn
     from chilopod.tasks.walk import Ends, Walks, ends, walk
 else:
@@ -19,6 +20,7 @@ else:
             "identify": ("identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
             "runs": ("RunOptions",),
+            "size": ("Sizing", "size"),
             "turn": ("Turn", "turn"),
             "walk": ("Ends", "Walks", "ends", "walk"),
         },
@@ -29,6 +31,7 @@ __all__ = [
     "Driver",
     "Ends",
     "RunOptions",
+    "Sizing",
     "Turn",
     "Walks",
     "drive",
@@ -37,6 +40,7 @@ __all__ = [
     "identify_planar",
     "identify_twin",
     "radius_law",
+    "size",
     "turn",
     "walk",
 ]

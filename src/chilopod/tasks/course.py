@@ -14,13 +14,14 @@ import xarray as xr
 from chilopod.engine import Controller, engine_named
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Short
+from chilopod.notebook import finite
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Course, RadiusLaw, Strategy, Verdict, random_course
 from chilopod.steering.strategies import check_strategy
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.runs import Pathed, RunOptions, runs
-from chilopod.trials import Trial, finite
+from chilopod.trials import Trial
 
 _RATE = 20.0  # Hz, of records: looks of the referee fall on samples
 _PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the straight walk without slip

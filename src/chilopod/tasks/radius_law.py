@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,8 +60,7 @@ def radius_law(
         return that_holds(radius_laws(robot, progress).axis, robot, engine)
     stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
     springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
-    bent = Trial(robot, DURATION, 0, (_LAW_BEND / (robot.body.modules - 1),), None, None, NONE, 10.0, engine=engine)
-    trials = [replace(bent, robot=robot.with_value(K1, stiffness(spring))) for spring in springs]
+    trials = [bent(robot.with_value(K1, stiffness(spring)), engine) for spring in springs]
     ends = xr.concat([end_of_walk(each, robot) for each in run(trials, folder, progress)], "spring")
     curved = is_curved(ends)
     if curved.sum() < 3:
@@ -73,6 +71,12 @@ def radius_law(
     values = [fit.critical, *(springs[i] for i in stiff_first)]
     radii = [np.inf, *(float(ends.axis_radius[i]) for i in stiff_first)]
     return RadiusLaw.of_branch([stiffness(each) for each in values], radii, [True] * len(values), PAPER_UNIT)
+
+
+def bent(robot: Robot, engine: str = "planar", duration: float = DURATION) -> Trial:
+    """An undisturbed walk of a robot that starts bent, recorded ten times a second."""
+    angles = (_LAW_BEND / (robot.body.modules - 1),)
+    return Trial(robot, duration, 0, angles, None, None, NONE, 10.0, engine=engine)
 
 
 def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:

@@ -14,13 +14,14 @@ from chilopod import units
 from chilopod.analysis.parameters import K1
 from chilopod.engine import Controller, engine_named
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.notebook import finite
 from chilopod.progress import part, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate
 from chilopod.steering.strategies import check_strategy
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.runs import Pathed, RunOptions, runs
-from chilopod.trials import NONE, Trial, check_fits, finite, run, straight, together
+from chilopod.trials import NONE, Trial, check_fits, run, straight, together
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: start of the search for a strategy without a radius law
 _ROUNDS = 2

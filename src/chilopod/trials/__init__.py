@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import as_now, check_fits, run, run_each, together
     from chilopod.trials.store import Store
-    from chilopod.trials.summary import AVERAGED, WalkSummary, finite, mean_joint_angles, straight, summaries
+    from chilopod.trials.summary import AVERAGED, WalkSummary, mean_joint_angles, straight, summaries
     from chilopod.trials.trial import Trial
 else:
     __getattr__, __dir__ = exports(
@@ -28,7 +28,7 @@ else:
             "executors": ("Executor", "Here", "using"),
             "run": ("as_now", "check_fits", "run", "run_each", "together"),
             "store": ("Store",),
-            "summary": ("AVERAGED", "WalkSummary", "finite", "mean_joint_angles", "straight", "summaries"),
+            "summary": ("AVERAGED", "WalkSummary", "mean_joint_angles", "straight", "summaries"),
             "trial": ("Trial",),
         },
     )
@@ -48,7 +48,6 @@ __all__ = [
     "batches",
     "check_fits",
     "draw",
-    "finite",
     "mean_joint_angles",
     "run",
     "run_each",

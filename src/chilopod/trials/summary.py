@@ -11,6 +11,7 @@ import xarray as xr
 
 from chilopod.engine import Status
 from chilopod.frozen import Array
+from chilopod.notebook import finite
 from chilopod.robot import Robot
 
 AVERAGED = 5.0
@@ -62,11 +63,6 @@ class WalkSummary:
             "axis_radius_m": finite(self.axis_radius),
             "mean_joint_angles_rad": [finite(angle) for angle in self.joint_angles],
         }
-
-
-def finite(value: float | None) -> float | None:
-    """Number for JSON; None if it is not finite."""
-    return float(value) if value is not None and np.isfinite(value) else None
 
 
 def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: float = 0.0) -> xr.DataArray:

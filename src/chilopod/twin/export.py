@@ -13,23 +13,25 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
-from chilopod.twin.legs import twin_of
+from chilopod.twin.legs import servo_targets, twin_of
 from chilopod.twin.model import SIDES, TwinModel, build
 
 # A link of URDF has one joint only, so that one more stands between the yaw and the hip of a leg; programs want it to
 # have a mass: this part of the upper link's, which loses it.
 _CARRIER = 1e-6
+_GAIT_KEYS = 100  # keyframes of the servo targets in a period
+_SENSOR, _JOINT = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_JOINT
 _FASTEST = 100.0  # rad/s: URDF wants a limit, the model has none
 
 # Attributes that MuJoCo writes of each named element, with their names in the compiled model where they differ.
 _NUMBERS = {
     "body": {"pos": "pos"},
     "inertial": {"pos": "ipos", "mass": "mass", "diaginertia": "inertia"},
-    "joint": {name: name for name in ("pos", "axis", "stiffness", "damping", "armature")},
+    "joint": {name: name for name in ("pos", "axis", "stiffness", "damping", "armature", "frictionloss")},
     "geom": {name: name for name in ("size", "pos", "friction", "solref", "solimp")},
     "site": {"size": "size", "pos": "pos"},
     "general": {"gainprm": "gainprm", "biasprm": "biasprm"},
-    "key": {"qpos": "qpos", "ctrl": "ctrl"},
+    "key": {"qpos": "qpos", "ctrl": "ctrl", "time": "time"},
 }
 _KINDS = {"inertial": "body", "general": "actuator"}
 
@@ -38,8 +40,9 @@ def mjcf(robot: Robot) -> str:
     """Return a robot with a twin as the text of an MJCF file.
 
     MuJoCo builds from it the model of :func:`chilopod.twin.simulate`, every number to the bit. For the viewer it has a
-    visible floor, a light, a camera that follows the robot, and the keyframe ``start``: the robot at time 0 with its
-    servo targets. ParameterError if the twin cannot be built.
+    visible floor, a light, a camera that follows the robot, sensors of the joint angles and of the place of module 1,
+    and keyframes: ``start`` is the robot at time 0 with its servo targets, ``gait0`` and so on are the servo targets at
+    their times within a period. ParameterError if the twin cannot be built.
     """
     twin = TwinModel(robot)
     spec = build(robot)
@@ -48,6 +51,13 @@ def mjcf(robot: Robot) -> str:
     targets = np.zeros(twin.model.nu)
     targets[twin.leg_controls] = start[twin.leg_positions]
     spec.add_key(name="start", qpos=start, ctrl=targets)
+    for i, time in enumerate(np.arange(_GAIT_KEYS) * robot.gait.period / _GAIT_KEYS):
+        targets[twin.leg_controls] = servo_targets(robot, [time])[0]
+        spec.add_key(name=f"gait{i}", time=time, qpos=start, ctrl=targets)
+    for i in range(1, robot.body.modules):
+        spec.add_sensor(name=f"yaw{i}", type=_SENSOR.mjSENS_JOINTPOS, objtype=_JOINT, objname=f"yaw{i}")
+    for name, kind in (("position", _SENSOR.mjSENS_FRAMEPOS), ("orientation", _SENSOR.mjSENS_FRAMEQUAT)):
+        spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_BODY, objname="module1")
     model = spec.compile()
     root = ET.fromstring(spec.to_xml())
     _write_all_digits(root, model)
@@ -85,7 +95,6 @@ def urdf(robot: Robot) -> str:
             ahead = -0.5 * length if i == 1 else -length
             joint = _add_joint(root, f"yaw{i}", f"module{i}", name, [ahead, 0.0, 0.0], model)
             _limit(joint, 0.5 * math.pi, effort=0.0)
-            ET.SubElement(joint, "dynamics", damping=repr(robot.springs.damping[i - 1]), friction="0")
         for side in SIDES:
             _add_leg(root, model, f"leg{i + 1}_{side}", name, back, steered=i == 0)
     ET.indent(root)
@@ -209,7 +218,10 @@ def _add_joint(
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
     ET.SubElement(joint, "origin", xyz=_numbers(place), rpy="0 0 0")
-    ET.SubElement(joint, "axis", xyz=_numbers(model.joint(name).axis))
+    compiled = model.joint(name)
+    ET.SubElement(joint, "axis", xyz=_numbers(compiled.axis))
+    damping, friction = _numbers(compiled.damping), _numbers(compiled.frictionloss)
+    ET.SubElement(joint, "dynamics", damping=damping, friction=friction)
     return joint
 
 

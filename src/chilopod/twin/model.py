@@ -160,6 +160,7 @@ def build(robot: Robot, forces: bool = False, edit: Edit | None = None) -> mujoc
                 pos=[0.5 * length, 0.0, 0.0],
                 stiffness=[robot.springs.stiffness[i - 1], 0.0, 0.0],
                 damping=[robot.springs.damping[i - 1], 0.0, 0.0],
+                frictionloss=twin.yaw_friction,
             )
             if _adjustable(robot):
                 _add_spring_actuator(spec, i)
@@ -300,7 +301,8 @@ def _add_leg(
 
 def _add_servo(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, axis: list[float], twin: Twin) -> None:
     """A hinge and the position servo that drives it: torque = stiffness * (target - angle) - damping * rate."""
-    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, armature=twin.joint_inertia)
+    hinge = mujoco.mjtJoint.mjJNT_HINGE
+    body.add_joint(name=name, type=hinge, axis=axis, armature=twin.joint_inertia, frictionloss=twin.leg_friction)
     spec.add_actuator(
         name=name,
         target=name,

@@ -202,7 +202,8 @@ def parse(value: object, si_unit: str) -> float:
 def from_si(value: float, unit_text: str) -> float:
     """Return `value`, in SI units, in the unit `unit_text` instead."""
     size = unit(unit_text).size
-    return value if size == 1 else float(Fraction(value) / size)
+    # An unknown or infinite number is so in every unit.
+    return value if size == 1 or not math.isfinite(value) else float(Fraction(value) / size)
 
 
 def format(value: float, unit_text: str, digits: int | None = None) -> str:

@@ -14,7 +14,7 @@ from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
 from chilopod.stability.problem.returns import whole_period
 from chilopod.tasks.radius_law import is_curved
-from chilopod.trials import NONE, Disturbance, Trial, run
+from chilopod.trials import Disturbance
 
 ROBOT = load_robot("aoi2022-planar")
 EVEN = Disturbance(friction=0.0)
@@ -52,24 +52,6 @@ def test_means_are_those_of_the_branch(branch, even):
 def test_stiff_springs_walk_straight(even):
     assert set(even.direction.values[2]) == {"straight"}
     assert even.settled.all()
-
-
-def test_mirrored_starts_end_in_mirrored_walks():
-    """Half a gait cycle later the mirrored robot's legs do what the robot's do."""
-    robot, start = ROBOT.with_value(K1, stiffness(8.0)), (0.02, 0.01, -0.01, 0.005, 0.0)
-    model = PlanarModel(robot)
-    begin = np.r_[robot.gait.speed, 0.0, 0.0, start, np.zeros(5)]
-    along = model.flow_states(begin[None], 0.0, 6.0)[0]
-    half = 0.5 * model.period
-    other = model.flow_states((model.reflection @ begin)[None], half, 6.0 + half)[0]
-    assert model.reflection @ other == pytest.approx(along, abs=1e-10)
-    right, left = run(
-        [Trial(robot, 180.0, 0, tuple(sign * a for a in start), disturbance=NONE, rate=10.0) for sign in (1.0, -1.0)]
-    )
-    last = slice(-48, None)
-    mean = right.joint_angle[last].mean("time").values
-    assert left.joint_angle[last].mean("time").values == pytest.approx(-mean, abs=1e-3)
-    assert np.abs(mean).max() > 1.0
 
 
 def test_walks_that_have_not_settled_are_told(monkeypatch):

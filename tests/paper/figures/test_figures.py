@@ -14,7 +14,6 @@ from helpers.texts import watched as WATCHED
 
 PRESET = load_robot("aoi2022-planar")
 ROBOTS = {
-    "preset": PRESET,
     "two modules": PRESET.with_value("body.modules", 2),
     "twenty": PRESET.with_value("body.modules", 20).with_value("body.length", 4.5),
     "feet behind": PRESET.override("legs.forward_offset", "-0.03 m"),

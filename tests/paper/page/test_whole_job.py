@@ -2,6 +2,7 @@
 
 import base64
 import json
+import pickle
 import re
 from pathlib import Path
 
@@ -53,15 +54,10 @@ def test_every_section_is_computed_and_on_the_page(tiny):
     assert drawn == {each for each in shown if not each.startswith("movies-")} | {"pitchfork"}
     without = {section.name for section, rows in tiny.found.rows.items() if not rows}
     assert without == {
-        "exponents",
-        "branch",
-        "undulation",
-        "movies",
-        "robot-movies",
-        "robot-spread",
+        "exponents", "branch", "undulation", "movies", "robot-movies", "robot-spread", "robot-strategies",
         "robot-structures",
         "courses-movie",
-    }
+    }  # fmt: skip
 
 
 def test_no_text_of_a_figure_is_cut_or_tiny(tiny):
@@ -80,14 +76,21 @@ def test_nothing_of_the_page_is_missing_or_empty(tiny):
             assert address[1:] in page.attributes("id")
         elif not address.startswith("data:"):
             assert (tiny.folder / address).stat().st_size > 100, address
+    assert not re.search(r"@import|url\(|Still to come|refresh", html)
+    assert html.count("<script>") == html.count("<script") == 1  # the page's own
     assert re.findall(r"<(?:td|th|p|h\d|figcaption|li|dd)\b[^>]*>\s*</", html) == []
     assert re.findall(r"\bnan\b|\binf\b|None|\b[A-Z]\w+\(\w+=", page.text) == []
+
+
+def test_every_film_can_be_drawn_by_another_process(tiny):
+    films = [movie for section, value in tiny.found.values.items() for movie in section.films(value)]
+    assert [pickle.loads(pickle.dumps(movie)).name for movie in films] == REPLAYS
 
 
 @pytest.mark.parametrize("name", REPLAYS)
 def test_replays_stand_on_their_own_and_have_frames_that_differ(tiny, name):
     html = (tiny.folder / "movies" / f"{name}.html").read_text(encoding="utf-8")
-    assert not re.search(r"(?:src|href)=\"(?!data:)|@import|url\(|https?://(?!www\.w3\.org/)", html)
+    assert not re.search(r"(?:src|href)=\"(?!data:)|@import|url\(|fetch\(|import\(|https?://(?!www\.w3\.org/)", html)
     data = json.loads(PAGE(html).data)
     assert data["time"]["count"] > 10
     for robot in data["robots"]:

@@ -1,6 +1,6 @@
 """The robot's table, on made-up findings: what the paper prints is within, and what is not lies outside."""
 
-import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ from chilopod.paper.fit_data import walking_speed
 from chilopod.paper.robot import numerics, why
 from chilopod.paper.robot.rows import duration_rows, turning_rows, walk_rows
 from chilopod.paper.robot.sections import WALKS
-from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
+from chilopod.paper.robot.walks import BEND, SPRINGS, VARIANT_SPRINGS
 from chilopod.paper.section import Context, Found, Size
 from chilopod.paper.table import Kind, OfPlanar, Result, robot_rows
 from chilopod.paper.turning.criteria import saturated
-from helpers.made_up_robot import AMPLITUDE, durations, series, task, turning, walks
+from helpers.made_up_robot import AMPLITUDE, base_walks, durations, series, task, turning, walks, with_criteria
 
 SOFT, SLOW, PHASE = "k2-5 = 28 N*mm/deg", "stride 1.8 cm", "module phase 180 deg"
 
@@ -42,8 +42,13 @@ def row_of(rows, start):
     return row
 
 
+@cache
+def whole():
+    return [*walk_rows(walks()), *turning_rows(turning(), walks())]
+
+
 def test_what_the_paper_prints_is_within_in_every_row():
-    rows = [*walk_rows(walks()), *turning_rows(turning(), walks())]
+    rows = whole()
     lines = robot_rows(rows, statements.ORDER)
     assert set(verdicts(lines).values()) == {"within"}
     assert not any("nan" in f"{row.data()}{row.robot}{row.asked}" for row in lines)
@@ -59,7 +64,7 @@ def test_what_the_paper_prints_is_within_in_every_row():
 
 
 def base_with(**changes):
-    return walks(base=series(SPRINGS, **{"onset": 34.0, **changes}))
+    return base_walks(base=series(SPRINGS, **{"onset": 34.0, **changes}))
 
 
 BASE = series(SPRINGS, 34.0)
@@ -70,11 +75,10 @@ FAILED = BASE.assign(direction=BASE.direction.where(BASE.spring < 70.0, ""))  # 
 
 
 def test_what_a_quick_report_has_is_judged_as_in_the_whole_one_and_the_rest_needs_more_trials():
-    whole = [*walk_rows(walks()), *turning_rows(turning(), walks())]
     few = walks(variants={}, lower_steps={}, uniform=None)
     tasks = turning(tasks={"A": turning().tasks["A"]}, hopf=None)
     quick = [*walk_rows(few), *turning_rows(tasks, few)]
-    assert [row for row in whole if row in quick] == quick
+    assert [row for row in whole() if row in quick] == quick
     found = Found(Context(size=Size.QUICK), rows={WALKS: [*quick, OfPlanar(statements.UNIFORM, Result("6.5"))]})
     (left_out,) = [row for row in found.robot_rows() if row.twin is None]
     assert left_out.data()["twin"] == "needs more trials"
@@ -98,21 +102,16 @@ def test_what_a_quick_report_has_is_judged_as_in_the_whole_one_and_the_rest_need
         (base_with(onset=45.0), "walks with k1 = 41 and 75", "outside"),
         (base_with(onset=27.0), "walks with k1 = 15", "outside"),
         (base_with(scatter=1.0), "angle of joint 1", "undecided"),
-        (walks(base=BASE.assign_coords(spring=list(SPRINGS[::-1]))), "angle of", "outside"),
+        (base_walks(base=BASE.assign_coords(spring=list(SPRINGS[::-1]))), "angle of", "outside"),
         (base_with(scatter=0.01), "fluctuation", "within"),
         (base_with(scatter=0.0), "fluctuation", "undecided"),
-        (walks(base=FALLING), "fluctuation", "outside"),
-        (walks(base=TO_THE_RIGHT), "walks with k1 = 15", "outside"),
-        (walks(base=FAILED), "walks with k1 = 41", "outside"),
+        (base_walks(base=FALLING), "fluctuation", "outside"),
+        (base_walks(base=TO_THE_RIGHT), "walks with k1 = 15", "outside"),
+        (base_walks(base=FAILED), "walks with k1 = 41", "outside"),
     ],
 )
 def test_the_base_series_on_both_sides_of_what_is_asked(found, start, verdict):
     assert row_of(walked(found), start).verdict == verdict
-
-
-def variants_with(**changes):
-    found = walks()
-    return walks(variants={**found.variants, **changes}, lower_steps=found.lower_steps)
 
 
 @pytest.mark.parametrize(
@@ -132,8 +131,7 @@ def variants_with(**changes):
     ],
 )
 def test_variants_on_both_sides_of_what_is_asked(name, onset, amplitude, where, radius):
-    found = variants_with(**{name: series(VARIANT_SPRINGS, onset, amplitude * AMPLITUDE, seed=5)})
-    rows = walked(found)
+    rows = walked(base_walks(variants={name: series(VARIANT_SPRINGS, onset, amplitude * AMPLITUDE, seed=5)}))
     assert row_of(rows, f"where curved walks set in, {name}").verdict == where
     assert row_of(rows, f"radius, {name}").verdict == radius
 
@@ -141,25 +139,25 @@ def test_variants_on_both_sides_of_what_is_asked(name, onset, amplitude, where, 
 def test_swapped_variants_are_noticed():
     """The radius with a module phase of 180 deg is smaller, that with softer springs is not."""
     variants = walks().variants
-    rows = verdicts(walked(variants_with(**{SOFT: variants[PHASE], PHASE: variants[SOFT]})))
+    rows = verdicts(walked(base_walks(variants={SOFT: variants[PHASE], PHASE: variants[SOFT]})))
     assert rows[f"where curved walks set in, {SOFT}"] == rows[f"where curved walks set in, {PHASE}"] == "outside"
     assert rows[f"radius, {SOFT}"] == "outside"
     assert rows[f"radius, {PHASE}"] != "within"
 
 
 def test_radii_are_judged_at_equal_distance_and_shown_at_equal_springs_too():
-    row = row_of(walked(walks()), f"radius, {SOFT}")
+    row = row_of(walked(base_walks(variants={SOFT: walks().variants[SOFT]})), f"radius, {SOFT}")
     assert row.twin.words.startswith("+0 ± ")
     assert "+58 ±" in row.twin.words
     assert "the robot's onsets alone would make it +58 %" in row.twin.words
     # At equal springs unchanged, that is: bent more at equal distance.
-    same = row_of(walked(variants_with(**{SOFT: series(VARIANT_SPRINGS, 23.0, 1.583 * AMPLITUDE)})), f"radius, {SOFT}")
-    assert same.verdict == "outside"
+    same = base_walks(variants={SOFT: series(VARIANT_SPRINGS, 23.0, 1.583 * AMPLITUDE)})
+    assert row_of(walked(same), f"radius, {SOFT}").verdict == "outside"
 
 
 def test_both_readings_of_the_shorter_stride_have_their_rows():
-    found = walks(lower_steps={SLOW: series(VARIANT_SPRINGS, 29.0)})
-    rows = verdicts(walked(found))
+    lower = {SLOW: series(VARIANT_SPRINGS, 29.0)}
+    rows = verdicts(walked(base_walks(variants={SLOW: walks().variants[SLOW]}, lower_steps=lower)))
     assert rows[f"where curved walks set in, {SLOW} (steps as high)"] == "within"
     assert rows[f"where curved walks set in, {SLOW} (steps lower in proportion)"] == "outside"
     assert rows[f"radius, {SLOW} (steps lower in proportion)"] == "within"
@@ -168,16 +166,16 @@ def test_both_readings_of_the_shorter_stride_have_their_rows():
 @pytest.mark.parametrize(
     ("critical", "error", "verdict"),
     [
-        (19.5, 0.1, "within"),
-        (20.5, 0.1, "outside"),
-        (15.5, 0.1, "outside"),
-        (19.7, 0.2, "undecided"),
+        (19.5, 0.1, "within"), (20.5, 0.1, "outside"), (15.5, 0.1, "outside"), (19.7, 0.2, "undecided"),
         (np.nan, 0.1, "not determined"),
     ],
-)
+)  # fmt: skip
 def test_uniform_springs_on_both_sides(critical, error, verdict):
-    uniform = walks().uniform.assign_attrs(critical_k=critical, critical_k_error=error)
-    assert row_of(walked(walks(uniform=uniform)), "where a body with springs all alike").verdict == verdict
+    uniform = walks().uniform.copy(deep=True)
+    uniform.end[0], uniform.end_error[0] = critical, error
+    rows = verdicts(walked(base_walks(uniform=uniform)))
+    said = "where the straight walk ends, all springs alike"
+    assert (rows[f"{said} (by undulations of 5 deg)"], rows[f"{said} (by bends of 5 deg)"]) == (verdict, "within")
 
 
 def test_what_hangs_on_the_duration_is_named():
@@ -199,7 +197,8 @@ def hopf_with(factors, wiggle=1e-3):
     low = {name: float(ours.criteria[f"{name}_mean"].min()) for name in factors}
     springs = (8.7, 11.0, 15.0)
     theirs = {name: factor * low[name] for name, factor in factors.items()}
-    return turning(hopf=task(springs, 11.0, theirs, dict.fromkeys(springs, "arrived"), wiggle=wiggle, seed=1))
+    hopf = task(springs, 11.0, theirs, dict.fromkeys(springs, "arrived"), wiggle=wiggle, seed=1)
+    return turning(tasks={"A": ours}, hopf=hopf)
 
 
 @pytest.mark.parametrize(
@@ -222,7 +221,7 @@ def test_pitchfork_against_hopf(factors, wiggle, verdict, says):
 
 def test_the_third_criterion_saturates_with_both_legs_at_their_limit():
     assert saturated(23.0) == pytest.approx(2.0 * np.deg2rad(5.0) ** 2 * 23.0)
-    row = row_of(turned(turning()), "task A, pitchfork against Hopf")
+    row = row_of(turned(turning(tasks={"A": turning().tasks["A"]})), "task A, pitchfork against Hopf")
     assert f"of the {saturated(23.0):.3g} rad²·s of legs at their limit" in row.twin.words
     assert "ε3 is 57 to " in row.twin.words  # 0.2 of 0.350
 
@@ -231,10 +230,8 @@ def test_the_third_criterion_saturates_with_both_legs_at_their_limit():
     ("time", "verdict"), [(20.0, "within"), (19.0, "outside"), (26.0, "within"), (27.0, "outside")]
 )
 def test_the_earliest_arrival_on_both_sides(time, verdict):
-    tasks = turning().tasks
-    criteria = tasks["A"].criteria.assign(seconds=("instant", [time, 23.0]))
-    found = turning(tasks={**tasks, "A": dataclasses.replace(tasks["A"], criteria=criteria)})
-    row = row_of(turned(found), "task A: earliest arrival")
+    criteria = turning().tasks["A"].criteria.assign(seconds=("instant", [time, 23.0, np.nan]))
+    row = row_of(turned(with_criteria(criteria)), "task A: earliest arrival")
     assert (row.verdict, row.kind) == (verdict, "fitted")
 
 
@@ -242,63 +239,50 @@ def test_the_earliest_arrival_on_both_sides(time, verdict):
     ("best", "wiggle", "verdict"), [(21.0, 1e-3, "within"), (36.0, 1e-3, "outside"), (29.0, 0.1, "undecided")]
 )
 def test_where_the_criteria_are_smallest(best, wiggle, verdict):
-    tasks = turning().tasks
-    outcomes = {
-        float(k): str(each[0])
-        for k, each in zip(tasks["A"].criteria.spring, tasks["A"].criteria.outcome.values, strict=True)
-    }
-    moved = task(tuple(outcomes), best, {}, outcomes, wiggle=wiggle)
-    rows = turned(turning(tasks={**tasks, "A": moved}))
+    ours = turning().tasks["A"].criteria
+    outcomes = {float(k): str(each[0]) for k, each in zip(ours.spring, ours.outcome.values, strict=True)}
+    rows = turned(turning(tasks={"A": task(tuple(outcomes), best, {}, outcomes, wiggle=wiggle)}, hopf=None))
     assert {row.verdict for row in rows if row.quantity.startswith("task A: smallest")} == {verdict}
     assert all(row.kind == "predicted" for row in rows if row.quantity.startswith("task A: smallest"))
 
 
 @pytest.mark.parametrize(("onset", "verdict"), [(34.0, "within"), (46.0, "outside")])
 def test_the_spring_of_the_circle_s_radius(onset, verdict):
-    found = walks(base=series(SPRINGS, onset))
-    row = row_of(turned(turning(), found), "task A: k1 whose walk")
+    row = row_of(turned(turning(hopf=None), walks(base=series(SPRINGS, onset))), "task A: k1 whose walk")
     assert row.verdict == verdict
 
 
 @pytest.mark.parametrize(
     ("letter", "spring", "label", "verdict"),
     [
-        ("A", 28.0, "bulged outside", "within"),
-        ("A", 41.0, "turned inside", "outside"),
-        ("A", 15.0, "bulged outside", "outside"),
-        ("A", 21.0, "bulged outside", "outside"),
-        ("B", 26.0, "turned inside", "outside"),
-        ("B", 15.0, "arrived", "outside"),
-        ("B", 41.0, "arrived", "outside"),
+        ("A", 28.0, "bulged outside", "within"), ("A", 41.0, "turned inside", "outside"),
+        ("A", 15.0, "bulged outside", "outside"), ("A", 21.0, "bulged outside", "outside"),
+        ("B", 26.0, "turned inside", "outside"), ("B", 15.0, "arrived", "outside"), ("B", 41.0, "arrived", "outside"),
     ],
-)
+)  # fmt: skip
 def test_what_becomes_of_the_tasks(letter, spring, label, verdict):
-    tasks = turning().tasks
-    criteria = tasks[letter].criteria
+    criteria = turning().tasks[letter].criteria
     changed = criteria.assign(outcome=criteria.outcome.where(criteria.spring != spring, label))
-    found = turning(tasks={**tasks, letter: dataclasses.replace(tasks[letter], criteria=changed)})
-    assert row_of(turned(found), f"task {letter}: what becomes").verdict == verdict
+    assert row_of(turned(with_criteria(changed, letter)), f"task {letter}: what becomes").verdict == verdict
 
 
 def test_all_repeats_have_to_arrive_at_the_paper_s_spring():
-    tasks = turning().tasks
-    criteria = tasks["A"].criteria
+    criteria = turning().tasks["A"].criteria
     late = (criteria.spring == 21.0) & (criteria.repeat == 4)
     changed = criteria.assign(outcome=criteria.outcome.where(~late, "bulged outside"))
-    found = turning(tasks={**tasks, "A": dataclasses.replace(tasks["A"], criteria=changed)})
-    assert row_of(turned(found), "task A: what becomes").verdict == "outside"
+    assert row_of(turned(with_criteria(changed)), "task A: what becomes").verdict == "outside"
 
 
 @pytest.mark.parametrize(("alone", "helped", "verdict"), [(4, 5, "within"), (5, 5, "outside"), (0, 4, "outside")])
 def test_without_leg_yaw_many_fail(alone, helped, verdict):
     arrived = [[1.0] * alone + [0.0] * (9 - alone), [1.0] * helped + [0.0] * (5 - helped) + [np.nan] * 4]
     data = turning().without.assign(arrived=(("case", "trial"), arrived))
-    assert row_of(turned(turning(without=data)), "task A without leg yaw").verdict == verdict
+    assert row_of(turned(turning(without=data, hopf=None)), "task A without leg yaw").verdict == verdict
 
 
 def test_tasks_that_are_swapped_are_noticed():
     tasks = turning().tasks
-    swapped = turned(turning(tasks={"A": tasks["B"], "B": tasks["A"]}), walks())
+    swapped = turned(turning(tasks={"A": tasks["B"], "B": tasks["A"]}, hopf=None), walks())
     outside = {row.quantity for row in swapped if row.verdict == "outside"}
     first, second = statements.TASKS.values()
     assert outside == {first.k_hat.quantity, *(each.quantity for each in second.minima.values())}
@@ -311,8 +295,9 @@ def test_minima_of_springs_all_alike_lie_where_the_body_undulates(own, best, ver
     """By the twin's own onset, or where that is not known by the robot's."""
     springs = (11.0, best, 41.0)
     hopf = task(springs, best, {}, dict.fromkeys(springs, "arrived"), wiggle=1e-3)
-    found = walks(uniform=walks().uniform.assign_attrs(critical_k=own))
-    row = row_of(turned(turning(hopf=hopf), found), "task A, Hopf: springs")
+    uniform = walks().uniform
+    found = walks(uniform=uniform.assign(end=uniform.end.where(uniform.mode == BEND, own)))
+    row = row_of(turned(turning(tasks={"A": turning().tasks["A"]}, hopf=hopf), found), "task A, Hopf: springs")
     assert (row.verdict, row.twin.words.split()[0]) == (verdict, f"{best:g}")
 
 

@@ -43,10 +43,7 @@ BOTH_SIDES = [
     (mode, "kind", "pitchfork", "fold", "kind and direction"),
     *(
         (
-            mode,
-            f"joint_{joint}",
-            paper.value + sign * 0.0049,
-            paper.value + sign * 0.0051,
+            mode, f"joint_{joint}", paper.value + sign * 0.0049, paper.value + sign * 0.0051,
             f"critical mode, joint {joint}",
         )
         for joint, paper in enumerate(printed.MODE, 1)
@@ -62,7 +59,7 @@ BOTH_SIDES = [
         for inside, outside in ((0.901, 0.899), (1.099, 1.101))
     ),
     (uniform, "kind", "Neimark-Sacker", "pitchfork", "uniform springs: kind"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("made_up", "what", "inside", "outside", "quantity"), BOTH_SIDES)

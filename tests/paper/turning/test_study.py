@@ -46,7 +46,7 @@ def test_stiff_springs_bulge_outside_soft_ones_turn_inside_and_those_between_arr
 def test_the_evaluation_time_is_the_earliest_arrival_of_all(found):
     for task in found.tasks.values():
         assert task.time == float(np.nanmin(task.criteria.arrival.values))
-        assert task.criteria.seconds.values.tolist() == [task.time, 23.0]
+        assert task.criteria.seconds.values[:2].tolist() == [task.time, 23.0]
     assert found.hopf.time == found.tasks["A"].time
 
 

@@ -32,8 +32,8 @@ def met(constants):
     return np.abs(planar_fit.residuals(planar_fit.with_constants(ROBOT, constants), DATA)).max()
 
 
-def test_ranges_are_the_projection_of_what_the_tolerances_allow():
-    ranges = planar_fit.allowed_ranges(ROBOT, DATA, BEST)
+def test_ranges_are_the_projection_of_what_the_tolerances_allow(found):
+    ranges = found.ranges
     # By a program of its own, with sequential linear programming.
     np.testing.assert_allclose(ranges, [[227.695, 259.59], [0.0622, 0.08558], [0.03524, 0.06359]], rtol=1e-3)
     # A random walk within the set stays within the ranges, and comes far along the valley.
@@ -71,13 +71,10 @@ def test_data_that_contradict_each_other_allow_nothing():
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("k1_tolerance", -1.0),
-        ("k1", np.nan),
-        ("component_tolerance", 0.0),
-        ("between", (40.0, 4.0)),
+        ("k1_tolerance", -1.0), ("k1", np.nan), ("component_tolerance", 0.0), ("between", (40.0, 4.0)),
         ("components", (6.0,) * 5),
     ],
-)
+)  # fmt: skip
 def test_data_that_are_none_are_refused(field, value):
     with pytest.raises((ParameterError, UnitError), match=field):
         CriticalMode(**{**dict(DATA), field: value})

@@ -49,7 +49,7 @@ def test_intervals_cover_the_constants_of_robots_that_are_recorded_from_any_mome
     rng, robot = np.random.default_rng(1), SOFT
     for path in FREE:
         robot = robot.with_value(path, ROBOT.get(path) * 1.2 ** rng.uniform(-1.0, 1.0))
-    record = walked(robot, 40.0, 100.0).isel(time=slice(int(rng.integers(300)), None, 5))
+    record = walked(robot, 25.0, 100.0).isel(time=slice(int(rng.integers(300)), None, 5))
     angles = np.rad2deg(record.joint_angle.values[:, 0]) + rng.normal(0.0, 0.5, (record.time.size, 5))
     angles[rng.uniform(size=angles.shape) < 0.1] = np.nan
     rows = rng.uniform(size=len(angles)) > 0.1
@@ -64,7 +64,7 @@ def test_intervals_cover_the_constants_of_robots_that_are_recorded_from_any_mome
 
 def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):
     robot = ROBOT.set_from_text(["springs.stiffness=12 N*mm/deg"])
-    record = walked(robot, 13.0).isel(time=slice(20, None))
+    record = walked(robot, 8.0).isel(time=slice(20, None))
     record["joint_angle"] += np.random.default_rng(1).normal(0.0, 0.01, record.joint_angle.shape)
     (tmp_path / "walk.nc").write_bytes(netcdf(record))
     free = {"ground.friction": ("150 N*s/m", "350 N*s/m"), "springs.stiffness": ("8 N*mm/deg", "16 N*mm/deg")}

@@ -1,4 +1,5 @@
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -199,20 +200,22 @@ def test_a_search_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         assert one.weight == other.weight
 
 
-def covered(seed, monkeypatch):
+@cache
+def covered(seed):
     """Whether the intervals of a stand-in's constants hold the truth, shape (4,), and the identification."""
     rng = np.random.default_rng(seed)
     truth = rng.uniform(size=4)
     data = scattered_data(truth, rng)
-    monkeypatch.setattr(twin, "base_series", stand_in_series)
-    found = TwinIdentification(ROBOT, data, *search(ROBOT, data, [], (100, 100), seed))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(twin, "base_series", stand_in_series)
+        found = TwinIdentification(ROBOT, data, *search(ROBOT, data, [], (100, 100), seed))
     ends = found.estimates.ends
     true = data.free.values_at(truth)
     return (ends[:, 0] <= true) & (true <= ends[:, 1]), found
 
 
-def test_a_valley_has_effective_samples_or_says_that_it_has_few(monkeypatch):
-    _, found = covered(1, monkeypatch)
+def test_a_valley_has_effective_samples_or_says_that_it_has_few():
+    _, found = covered(1)
     assert found.samples.weights.sum() == pytest.approx(1.0)
     assert 50.0 < found.samples.effective <= 100.0
     assert "effective samples of 100" in found.lines()[-1]
@@ -223,9 +226,9 @@ def test_a_valley_has_effective_samples_or_says_that_it_has_few(monkeypatch):
 
 
 @pytest.mark.slow
-def test_intervals_over_the_valley_cover(monkeypatch):
+def test_intervals_over_the_valley_cover():
     # Of 50 runs 82 to 97 % cover, which takes 90 s; of 3 runs chance leaves at least 65 %.
-    assert np.mean([covered(seed, monkeypatch)[0] for seed in range(3)]) >= 0.65
+    assert np.mean([covered(seed)[0] for seed in range(3)]) >= 0.65
 
 
 def test_what_was_found_as_json():

@@ -308,6 +308,15 @@ def _room(n: int, s: int) -> Any:
     return Step(np.empty(n), np.empty((n, n)), np.zeros((s, n)), np.empty((s, n)), jacobians, matrix, columns, reached)
 
 
+@fused_njit(error_model="numpy")
+def _spent(control: Any, steps: int, t: float) -> int:
+    """DONE if time and budget allow another step, unless the mean step is hopelessly short."""
+    if control.stop[0] != 0.0:
+        return TIME_OVER
+    far = steps * (control.t1 - control.t0) > _HOPELESS * control.most_steps * (t - control.t0)
+    return BUDGET if steps > control.most_steps or (steps > _PATIENCE and far) else DONE
+
+
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: Any) -> int:
     """Carry a state x, shape (n,), in units, over an interval in place; return the status."""
@@ -335,12 +344,8 @@ def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: A
                 h = min(t1 - t, 1.0 / rate) if rate > 0.0 else t1 - t
             fresh = False
         steps += 1
-        far = steps * (t1 - control.t0) > _HOPELESS * control.most_steps * (t - control.t0)
-        if steps > control.most_steps or (steps > _PATIENCE and far):
-            status = BUDGET
-            break
-        if control.stop[0] != 0.0:
-            status = TIME_OVER
+        status = _spent(control, steps, t)
+        if status != DONE:
             break
         h = min(h, control.longest)
         ends = h >= (1.0 - 1e-10) * (t1 - t)

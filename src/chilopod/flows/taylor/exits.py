@@ -24,6 +24,15 @@ def _bernstein(coefficients: Any, order: int, h: float, out: Any) -> None:
 
 
 @njit(error_model="numpy")
+def _halve(stack: Any, top: int, order: int) -> None:
+    """De Casteljau's halving of the interval of the polynomial on top: the right half stays, the left goes above it."""
+    for i in range(order + 1):
+        stack[top + 1, i] = stack[top, 0]
+        for j in range(order - i):
+            stack[top, j] = 0.5 * (stack[top, j] + stack[top, j + 1])
+
+
+@njit(error_model="numpy")
 def _refined(coefficients: Any, order: int, low: float, high: float) -> float:
     """The root between a nonnegative and a negative point of a polynomial, by bisection and Newton's method."""
     z = 0.5 * (low + high)
@@ -100,12 +109,7 @@ def first_exit(coefficients: Any, order: int, h: float) -> float:
                 return low
             top -= 1  # touches zero, or nearly
             continue
-        # De Casteljau: the right half stays, the left one goes on top.
-        for i in range(order + 1):
-            stack[top + 1, i] = stack[top, 0]
-            for j in range(order - i):
-                stack[top, j] = 0.5 * (stack[top, j] + stack[top, j + 1])
-        # ``stack[top]`` now holds the right half backwards in place: entry j is its coefficient j.
+        _halve(stack, top, order)
         widths[top] = widths[top + 1] = 0.5 * width
         lows[top + 1] = low
         lows[top] = low + 0.5 * width

@@ -63,11 +63,13 @@ def _unsaturated(tape: Any, values: Any, order: int, h: float) -> float:
             argument = values[program[1, i]]
             size = abs(argument[0])
             if size > (_FAR_TANH if code == ops.TANH else _FAR):
-                change = 0.0
-                for k in range(order, 0, -1):
-                    change = (change + abs(argument[k])) * h
-                if change > _CHANGE * size:
-                    h *= _CHANGE * size / change
+                change = math.inf
+                while change > _CHANGE:
+                    change = 0.0
+                    for k in range(order, 0, -1):
+                        change = (change + abs(argument[k]) / size) * h
+                    if change > _CHANGE:
+                        h *= max(_CHANGE / change, 0.5)
     return h
 
 

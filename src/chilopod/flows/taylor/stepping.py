@@ -256,8 +256,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
     block = _Block(np.empty((blocks, n, n)), np.empty((blocks, n, n)))
     factor, work = np.empty((n, columns)), np.empty(order + 1)
     t, last, unit = t0, t0 - (t1 - t0), (t1 - t0) / 8.0
-    status = DONE
-    steps, in_place, in_block, noise = 0, 0, 0, 1
+    steps, in_place, in_block, noise, status = 0, 0, 0, 1, DONE
     at_once = _AT_ONCE * max(abs(t0), abs(t1))
     if directions is not None:
         start(tape, motion, t)

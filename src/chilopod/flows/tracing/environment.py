@@ -18,6 +18,8 @@ from chilopod.flows.tracing.standins import stand_in
 from chilopod.flows.tracing.traced import as_traced
 
 _PLAIN = (int, bool, str, bytes, complex, type(None), np.integer, np.bool_)
+_FLOAT, _ROW = (float, np.floating), (tuple, list)  # np.float64 is a float
+_SHARED = (types.ModuleType, types.BuiltinFunctionType, type, np.ufunc)
 _OUTSIDE = ("numpy", "scipy", "math", "builtins", "numba")
 
 
@@ -55,20 +57,22 @@ def _parts(function: types.FunctionType) -> tuple[Any, ...]:
 
 def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
     """A hashable description of a value; all its floats are appended to a list. Raises Opaque for unknown kinds."""
-    if isinstance(value, float | np.floating):  # np.float64 is a float
+    if isinstance(value, _FLOAT):
         floats.append(float(value))
         return "f"
     if isinstance(value, _PLAIN):
         return type(value).__name__, value
-    if isinstance(value, types.ModuleType | types.BuiltinFunctionType | type | np.ufunc):
+    if isinstance(value, _SHARED):
         return "id", id(value)
     value = python_function(value)
     if isinstance(value, np.ndarray):
         if value.dtype.kind == "f":
             floats += value.ravel().tolist()
             return "a", value.shape
+        if value.dtype.kind == "O":
+            raise Opaque
         return "b", value.shape, value.dtype.str, value.tobytes()
-    if isinstance(value, tuple | list):
+    if isinstance(value, _ROW):
         return type(value).__name__, tuple(describe(part, floats, seen) for part in value)
     if isinstance(value, dict):
         return "d", tuple((describe(key, floats, seen), describe(part, floats, seen)) for key, part in value.items())
@@ -88,7 +92,7 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
 def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> Any:
     """The value with floats from an iterator, as in :func:`describe`, if given; numpy and math for traced ones."""
     value = python_function(value)
-    if isinstance(value, float | np.floating):
+    if isinstance(value, _FLOAT):
         return value if source is None else next(source)
     if isinstance(value, _PLAIN):
         return value
@@ -96,7 +100,7 @@ def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> A
         if value.dtype.kind != "f" or source is None:
             return value
         return as_traced([next(source) for _ in range(value.size)]).reshape(value.shape)
-    if isinstance(value, tuple | list):
+    if isinstance(value, _ROW):
         return type(value)([rebuild(part, source, seen) for part in value])
     if isinstance(value, dict):
         return {rebuild(key, source, seen): rebuild(part, source, seen) for key, part in value.items()}

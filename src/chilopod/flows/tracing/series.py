@@ -2,6 +2,9 @@
 
 The recurrences are those of Griewank and Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, sec. 13.2, with the
 tangents of a function phi(a) from d phi = w da, w = phi'(a), so that each costs one product of series.
+
+A value that nearly overflows is infinite, as exp(a) in 1 / (1 + exp(a)): its own coefficients are meaningless, those of
+a quotient by it or of a function that is flat there are zero.
 """
 
 from __future__ import annotations
@@ -14,6 +17,10 @@ import numpy as np
 from chilopod.compiled import fused_njit
 from chilopod.flows.tracing import tape as ops
 from chilopod.lanes import HALF, as_lanes
+
+_INFINITE = 1e300  # value that counts as infinite: it leaves room for derivatives
+_NEGLIGIBLE = 1e154  # numerator below which a quotient by such a value is negligible
+_STEEP = 0.1  # power from which on a number is negligible, or infinite, where its inverse is so
 
 
 class Series(NamedTuple):
@@ -43,11 +50,11 @@ def _function(code: int, a: float, b: float) -> float:
     if code == ops.TANH:
         return math.tanh(a)
     if code == ops.LOG:
-        return math.log(a) if a > 0.0 else math.nan
+        return math.log(a) if 0.0 < a < math.inf else math.nan
     if code == ops.SQRT:
         return math.sqrt(a) if a >= 0.0 else math.nan
     if code == ops.POWER:
-        return np.power(a, b)
+        return np.power(a, b) if a < math.inf or abs(b) > _STEEP else math.nan
     if code == ops.ATAN:
         return math.atan(a)
     return math.asin(a) if abs(a) <= 1.0 else math.nan
@@ -97,6 +104,8 @@ def values_at(
                 for j in range(1, k + 1):
                     s -= values[b, j] * values[i, k - j]
                 s = s / values[b, 0] if values[b, 0] != 0.0 else math.nan
+                if math.isinf(values[b, 0]):
+                    s = 0.0 if abs(values[a, 0]) < _NEGLIGIBLE else math.nan
             elif code in (ops.STEP, ops.FLOOR):
                 if k == 0:
                     s = branches[b] if b >= 0 else branch_at(code, values[a, 0])
@@ -104,6 +113,8 @@ def values_at(
                 s = values[b, k] if values[a, 0] > 0.0 else values[program[3, i], k]
             elif k == 0:
                 s = _function(code, values[a, 0], values[b, 0])
+            elif math.isinf(values[a, 0]):
+                s = 0.0 if values[program[3, i], 0] == 0.0 else math.nan
             else:
                 w = program[3, i]
                 half = 0 if program[5, a] != 0 else k // 2
@@ -113,7 +124,7 @@ def values_at(
                 for j in range(2 * half + 1, (1 if program[5, a] != 0 else k) + 1):
                     s += j * values[a, j] * values[w, k - j]
                 s = (s + odd) / (-k if code == ops.COS else k)
-            values[i, k] = s
+            values[i, k] = math.copysign(math.inf, s) if k == 0 and abs(s) > _INFINITE else s
         if k < order:
             for i in range(slopes.size):
                 values[i, k + 1] = values[slopes[i], k] * (unit / (k + 1))
@@ -162,6 +173,8 @@ def tangents_at(
             elif code == ops.SQUARE:
                 _convolve(tangents, values, i, a, a, 0, k, 2.0)
             elif code == ops.QUOTIENT:
+                if math.isinf(values[b, 0]):
+                    continue
                 f = 1.0 / values[b, 0]
                 if program[4, a] != 0:
                     _add(tangents, i, k, a, k, f)
@@ -171,7 +184,7 @@ def tangents_at(
                     _convolve(tangents, values, i, b, i, 1, k, -f)
             elif code == ops.SELECT:
                 _add(tangents, i, k, b if values[a, 0] > 0.0 else program[3, i], k, 1.0)
-            else:
+            elif not math.isinf(values[a, 0]):
                 _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == ops.COS else 1.0)
         if k < order:
             for i in range(slopes.size):

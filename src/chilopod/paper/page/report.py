@@ -15,12 +15,13 @@ from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
 from chilopod.output import check_files, check_folder, write_atomic
+from chilopod.paper.ahead import Studio
 from chilopod.paper.curved.sections import CURVED
 from chilopod.paper.duration import Plan
 from chilopod.paper.page.headline import pitchfork
 from chilopod.paper.page.page import Drawings, Drawn, Film, Shown, State, page
 from chilopod.paper.robot.sections import WALKS
-from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size
+from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size, nothing
 from chilopod.paper.straight import schematic
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
@@ -46,9 +47,9 @@ class Report:
     each as a whole. If films cannot be encoded, there are replays only.
 
     As a context manager it writes the page on entry and completes it on exit. Meanwhile ``news.js`` announces new
-    results. Figures are drawn in a thread beside the computation of the next section, and ``progress`` receives the
-    fraction drawn. The page begins with ``plan``, and when it is done with the duration in place of the expected
-    one. It creates a missing folder.
+    results. Figures are drawn in a thread beside the computation of the next section, films in the process of a
+    ``studio`` if there is one, and ``progress`` receives the fraction drawn. The page begins with ``plan``, and when it
+    is done with the duration in place of the expected one. It creates a missing folder.
 
     Raises
     ------
@@ -63,6 +64,7 @@ class Report:
         folder: str | Path,
         progress: SectionProgress = lambda what, done, words: None,
         plan: Plan | None = None,
+        studio: Studio | None = None,
     ) -> None:
         self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
@@ -75,7 +77,7 @@ class Report:
         self._shown: dict[Section[Any], Shown] = {}
         self._films: list[tuple[Section[Any], Movie]] = []
         self._added = self._drawn = 0
-        self._stopped = False
+        self._stopped, self._studio = False, studio
         self._thread = ThreadPoolExecutor(1, "drawing")
 
     def __enter__(self) -> Report:
@@ -88,9 +90,13 @@ class Report:
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         self._stopped = error is not None
+        if self._studio is not None and self._stopped:
+            self._studio.end(at_once=True)
         self._thread.shutdown(cancel_futures=self._stopped)
         self._over.set()
         self._alive.join()
+        if self._studio is not None:
+            self._studio.end()
         try:
             if error is None:
                 self._progress("figures and films", 1.0, "done")
@@ -114,6 +120,8 @@ class Report:
     def add(self, found: Found, sections: Collection[Section[Any]]) -> None:
         """Show sections that were computed or failed; return at once."""
         self._added += 1
+        if self._studio is not None and any(each.films is not nothing for each in sections):
+            self._studio.begin()
         self._thread.submit(self._add, found.copy(), sections)
 
     def _open(self) -> None:
@@ -152,7 +160,8 @@ class Report:
         try:
             self._shown[section] = _again(draw)
         except Exception as error:
-            self.failures[section] = error
+            if not self._stopped:
+                self.failures[section] = error
 
     def _draw(self, section: Section[Any], found: Found, new: bool) -> Shown:
         figures = tuple(self._draw_panel(panel) for panel in section.figures(found))
@@ -162,8 +171,9 @@ class Report:
         return Shown(section, figures, ())
 
     def _film(self, section: Section[Any], movie: Movie) -> Shown:
-        shown = self._shown[section]
-        return replace(shown, films=(*shown.films, write_movie(movie, self.page.parent / "movies")))
+        shown, work = self._shown[section], partial(write_movie, movie, self.page.parent / "movies")
+        drawn = work() if self._studio is None else self._studio.do(work)
+        return replace(shown, films=(*shown.films, drawn))
 
     def _draw_panel(self, panel: Panel) -> Drawn:
         folder = self.page.parent
@@ -259,7 +269,7 @@ def write_movie(shown: Movie, folder: Path) -> Film:
     """Write a movie as ``NAME.html``, ``NAME.mp4`` where films can be encoded and, of some moments of it in 3-D,
     ``NAME.png`` where it can be rendered."""
     replay(shown.record, titles=shown.titles, heading=shown.heading).write(folder / f"{shown.name}.html", replace=True)
-    look: dict[str, Any] = {name: getattr(shown, name) for name in ("titles", "heading", "speed", "follow")}
+    look: dict[str, Any] = {name: getattr(shown, name) for name in ("titles", "heading", "speed", "fps", "follow")}
     file, first, encoded = folder / f"{shown.name}.mp4", folder / f"{shown.name}-poster.png", has_encoder()
     solid, flat = film_3d.Film3D(shown.record, **look), film.Film(shown.record, **look, size=shown.size)
     rendered = encoded and "pose" in shown.record and _rendered(first, solid.poster)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -14,7 +15,7 @@ from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
 from chilopod.paper.measures import onset_point, radius_at, shares, spring_for
 from chilopod.paper.printed import Band, Said, Task
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.walks import RobotWalks
+from chilopod.paper.robot.walks import UNDULATION, RobotWalks
 from chilopod.paper.statements import listed
 from chilopod.paper.table import INCREASES, OfTwin, Result, Statement, Verdict, compared, estimated, of_twin, within
 from chilopod.paper.turning.criteria import SCALES, all_lower, around, in_words, minima, saturation, softest_minima
@@ -40,9 +41,7 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
         _fluctuation(base),
     ]
     if found.uniform is not None:
-        value, error, freedom = (found.uniform.attrs[f"critical_k{ending}"] for ending in ("", "_error", "_freedom"))
-        point = Estimate(value, error, freedom, found.uniform.sizes["repeat"], reciprocal=True)
-        rows.append(_spring(statements.UNIFORM, point))
+        rows += [_uniform(found.uniform.sel(mode=mode)) for mode in found.uniform.mode.values]
     for name, data in found.variants.items():
         lower = found.lower_steps.get(name)
         rows += variant_rows(base, data, name, "" if lower is None else "steps as high")
@@ -55,9 +54,14 @@ def _spring(statement: Statement[Band], twin: Estimate, reading: str = "") -> Of
     """Spring (N*mm/deg) beside the paper's; NaN if the trials determine no spring, or no error."""
     number = Result("", twin.value, twin.error, PAPER_UNIT, 1).words
     words = f"{number} ({100.0 * (twin.value / statement.said.middle - 1.0):+.0f} %)"
-    return estimated(
-        statement, twin, PAPER_UNIT, 1, words if np.isfinite(twin.value) else "not determined by trials", reading
-    )
+    return estimated(statement, twin, PAPER_UNIT, 1, words if np.isfinite(twin.value) else "not determined", reading)
+
+
+def _uniform(mode: xr.Dataset) -> OfTwin:
+    """Spring at which the straight walk ends by a mode, with all springs alike. Its error is no scatter of trials."""
+    point = Estimate(float(mode.end), float(mode.end_error), reciprocal=True)
+    reading = f"by {mode.mode.item()}s of {np.rad2deg(mode.amplitude):.0f} deg"
+    return replace(_spring(statements.UNIFORM, point, reading), comparison=None)
 
 
 def _straight(base: xr.Dataset) -> OfTwin:
@@ -200,7 +204,7 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
     ]
     if found.hopf is None:
         return rows
-    own = walks.uniform.attrs["critical_k"] if walks and walks.uniform is not None else np.nan
+    own = float(walks.uniform.end.sel(mode=UNDULATION)) if walks and walks.uniform is not None else np.nan
     words, below = softest_minima(found.hopf, own if np.isfinite(own) else printed.UNIFORM.value)
     both = f"{in_words(task, found.hopf)} ({saturation(task, found.hopf)})"
     return [

@@ -9,6 +9,7 @@ from chilopod.paper.robot import numerics, why
 from chilopod.paper.robot.figures import trust, turning, walks
 from chilopod.paper.robot.rows import turning_rows, walk_rows
 from chilopod.paper.robot.spread import twin_spread
+from chilopod.paper.robot.strategies import robot_strategies
 from chilopod.paper.robot.structures import structures
 from chilopod.paper.robot.turning import RobotTurning, robot_turning
 from chilopod.paper.robot.walks import RobotWalks, robot_walks
@@ -17,7 +18,7 @@ from chilopod.paper.section import Movie, Section
 CHAPTER = "The whole robot in three dimensions"
 
 WALKS: Section[RobotWalks] = Section(
-    "robot-walks", CHAPTER, "the whole robot in 3-D: its walks", robot_walks, walk_rows, walks.panels
+    "robot-walks", CHAPTER, "the whole robot in 3-D: its walks", robot_walks, walk_rows, walks.panels, ahead=True
 )
 TASKS: Section[RobotTurning] = Section(
     "robot-turning",
@@ -28,9 +29,18 @@ TASKS: Section[RobotTurning] = Section(
     turning.panels,
     needs=(WALKS,),
     beside=(WALKS,),
+    ahead=True,
+)
+STRATEGIES: Section[xr.Dataset] = Section(
+    "robot-strategies",
+    CHAPTER,
+    "the whole robot in 3-D: pitchfork against Hopf, and how far legs yaw",
+    robot_strategies,
+    panels=turning.strategies,
+    beyond=True,
 )
 FILMS: Section[list[Movie]] = Section(
-    "robot-movies", CHAPTER, "the paper's two movies in 3-D", robot_movies, films=lambda films: films
+    "robot-movies", CHAPTER, "the paper's two movies in 3-D", robot_movies, films=lambda films: films, ahead=True
 )
 SPREAD: Section[xr.Dataset] = Section(
     "robot-spread",
@@ -56,7 +66,7 @@ WHY: Section[xr.Dataset] = Section(
     "robot-why",
     CHAPTER,
     "why the robot bends earlier than the planar model",
-    why.ablation,
+    why.contributions,
     why.rows,
     trust.why,
     beyond=True,

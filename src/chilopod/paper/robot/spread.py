@@ -18,7 +18,7 @@ from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.measures import Folder, onset_point, spring_walks
 from chilopod.paper.robot.turning import TASK_DURATION
-from chilopod.paper.robot.walks import UNIFORM_DURATION, lower_steps, undulations, walk_ends
+from chilopod.paper.robot.walks import UNDULATION, lower_steps, uniform_modes, walk_ends
 from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.trials import to_target
 from chilopod.progress import Progress, silent
@@ -32,7 +32,7 @@ SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
 """k1 of the variants, N*mm/deg."""
 
 TASK_SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0)
-UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0)
+UNIFORM_SPRINGS = (30.0, 23.0, 18.0, 14.0)
 COUNT = 12
 """Number of sets of constants that predict, with the preset's."""
 
@@ -96,8 +96,8 @@ def printed_number(reading: str) -> printed.Number:
 
 
 def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size: Size = Size.FULL) -> dict[str, Any]:
-    """Onsets of curved and undulating walks outside the base series, and their radii, by few undisturbed walks, which
-    begin bent.
+    """Onsets of curved walks outside the base series, and their radii, by few undisturbed walks, which begin bent; and
+    that of an undulation with all springs alike, by multipliers.
 
     By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
     NaN where walks determine none; and ``uniform``.
@@ -108,8 +108,8 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
     for name, variant in list(variants.items()):
         if variant.gait.stride != robot.gait.stride:
             variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
-    springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[1::4], UNIFORM_SPRINGS[::3]))
-    longest, swinging = size.cut((_DURATION, UNIFORM_DURATION), (10.0, 8.0))
+    springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[1::4], UNIFORM_SPRINGS[:1]))
+    longest = size.cut(_DURATION, 10.0)
     undisturbed: dict[str, Any] = {"joint_angles": bend, "disturbance": NONE, "rate": 10.0}
     series = {}
     for name, variant in variants.items():
@@ -117,11 +117,11 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
         walks = spring_walks(variant, springs, duration, folder=folder, engine=engine, **undisturbed)
         series[name] = walk_ends(walks, variant, springs)
     base = next(iter(series.values()))
-    uniform = undulations(robot, uniform_springs, 1, duration=swinging, folder=folder, engine=engine)
+    uniform = uniform_modes(robot, uniform_springs, folder=folder, engine=engine)
     return {
         "onset": {name: onset_point(each).value for name, each in series.items()},
         "radius": {name: radius_ratio(base, each).distance.value for name, each in series.items()},
-        "uniform": uniform.attrs["critical_k"],
+        "uniform": float(uniform.end.sel(mode=UNDULATION)),
     }
 
 

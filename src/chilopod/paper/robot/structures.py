@@ -27,7 +27,7 @@ from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.criteria import minima
-from chilopod.paper.turning.trials import turning_task
+from chilopod.paper.turning.trials import strategy_tasks
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import FITTED, BaseSeries
@@ -47,7 +47,6 @@ _SPRINGS = {"pitchfork": (17.0, 21.0, 26.0), "hopf": (8.7, 11.0, 15.0)}  # N*mm/
 _REPEATS = 3
 
 _ROLL = 50.0  # N*m/rad
-_DRY = 0.05  # N*m
 _PLAY = np.deg2rad(1.0)
 _HIGHER = 0.02  # m
 _HEAVIER = 1.5
@@ -64,17 +63,8 @@ def _rolls(spec: mujoco.MjSpec, robot: Robot) -> None:
         )
 
 
-def _leg_joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
-    return [joint for joint in spec.joints if joint.name.startswith("leg")]
-
-
-def _dry(spec: mujoco.MjSpec, robot: Robot) -> None:
-    for joint in _leg_joints(spec):
-        joint.frictionloss = _DRY
-
-
 def _play(spec: mujoco.MjSpec, robot: Robot) -> None:
-    for joint in _leg_joints(spec):
+    for joint in [each for each in spec.joints if each.name.startswith("leg")]:
         joint.parent.add_joint(
             name=f"{joint.name}_play",
             axis=joint.axis,
@@ -99,7 +89,6 @@ def _heavy_front(spec: mujoco.MjSpec, robot: Robot) -> None:
 
 
 ROLLS = twin.Edited("modules that roll", _rolls)
-DRY = twin.Edited("dry leg joints", _dry)
 PLAY = twin.Edited("play in leg joints", _play)
 HIGH = twin.Edited("mass high up", _high)
 HEAVY_FRONT = twin.Edited("heavy front", _heavy_front)
@@ -124,7 +113,7 @@ class Structure:
 STRUCTURES = (
     Structure("as it is", "the preset"),
     Structure("modules roll", "against each other, held by 50 N*m/rad", edited="ROLLS"),
-    Structure("dry leg joints", "0.05 N*m of dry friction in each", edited="DRY"),
+    Structure("dry leg joints", "0.05 N*m of dry friction in each", ("twin.leg_friction=0.05 N*m",)),
     Structure("play in leg joints", "1 deg of backlash in each", edited="PLAY"),
     Structure("mass high up", "bodies' centres of mass 20 mm above the hips", edited="HIGH"),
     Structure("heavy front", "module 1 with 1.5 times the mass of a module", edited="HEAVY_FRONT"),
@@ -204,12 +193,9 @@ def _strategies(robot: Robot, folder: Folder, engine: str, size: Size) -> Array:
     target = printed.TASKS["A"].target
     repeats, duration = size.cut((_REPEATS, TASK_DURATION), (2, 3.0))
     kept: Any = {"duration": duration, "engine": engine, "folder": folder}
-    time, rows = None, []
-    for strategy, springs in _SPRINGS.items():
-        task = turning_task(robot, target, springs, repeats, strategy=strategy, time=time, **kept)
-        time = task.time
-        rows.append(minima(task.criteria)["mean"].sel(criterion=list(CRITERION_NAMES)).values)
-    return np.array(rows)
+    tasks = strategy_tasks(robot, target, _SPRINGS, repeats, **kept)
+    names = list(CRITERION_NAMES)
+    return np.array([minima(task.criteria)["mean"].sel(criterion=names).values for task in tasks.values()])
 
 
 def _law(robot: Robot, data: BaseSeries, progress: Progress) -> Array:

@@ -9,8 +9,8 @@ from typing import Any
 import xarray as xr
 
 from chilopod.paper import printed
-from chilopod.paper.section import Context, Size
-from chilopod.paper.turning.trials import DURATION, TurningTask, turning_task, without_leg_yaw
+from chilopod.paper.section import QUICK_REPEATS, Context, Size
+from chilopod.paper.turning.trials import DURATION, TurningTask, strategy_tasks, without_leg_yaw
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 
@@ -40,18 +40,20 @@ class RobotTurning:
 
 
 def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning:
-    """All turning tasks of the paper by the whole robot; if quick, all of task A with the first spring alone."""
+    """All turning tasks of the paper by the whole robot; if quick, task A with the first spring alone, with fewer
+    repeats."""
     robot, size = context.whole, context.size
-    repeats, springs, duration = size.cut((printed.REPEATS, SPRINGS, TASK_DURATION), (2, SHOWN, 6.0))
     quick = size is Size.QUICK
+    repeats = size.of(printed.REPEATS, QUICK_REPEATS, 2)
+    springs, duration = size.cut((SPRINGS, TASK_DURATION), (SHOWN, 6.0))
     same: dict[str, Any] = {"duration": duration, "engine": "twin", "folder": context.folder}
-    tasks = {}
+    tasks: dict[str, TurningTask] = {}
+    hopf = None
     for index, (letter, task) in enumerate(list(printed.TASKS.items())[: 1 if quick else None]):
-        share = part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}")
-        tasks[letter] = turning_task(robot, task.target, springs, repeats, shown=SHOWN, progress=share, **same)
-    first, share = tasks["A"], part(progress, 0.7, 0.9, "uniform springs")
-    how = {"strategy": "hopf", "time": first.time, **same}
-    hopf = None if quick else turning_task(robot, first.target, HOPF_SPRINGS, repeats, progress=share, **how)
+        share = part(progress, 0.45 * index, 0.45 * (index + 1), f"task {letter}")
+        own = {"pitchfork": springs} | ({} if quick or letter != "A" else {"hopf": HOPF_SPRINGS})
+        found = strategy_tasks(robot, task.target, own, repeats, shown=SHOWN, progress=share, **same)
+        tasks[letter], hopf = found["pitchfork"], found.get("hopf", hopf)
     one, share = {"paper's spring": printed.TASKS["A"].k_hat.value}, part(progress, 0.9, 1.0, "without leg yaw")
-    without = without_leg_yaw(robot, first.target, one, progress=share, **same)
+    without = without_leg_yaw(robot, tasks["A"].target, one, progress=share, **same)
     return RobotTurning(robot, tasks, hopf, without)

@@ -13,13 +13,19 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.special import ndtri
 
-from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT
+from chilopod.analysis.cycle_modes import CycleMode
+from chilopod.analysis.cycle_multipliers import finite_modes
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit
+from chilopod.engine import engine_named
+from chilopod.frozen import Array
 from chilopod.paper import measures, printed
-from chilopod.paper.section import Context, Size
+from chilopod.paper.section import QUICK_REPEATS, Context, Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
+from chilopod.statistics import LEVEL
 from chilopod.tasks.radius_law import DURATION, end_of_walk
 from chilopod.trials import AVERAGED
 
@@ -29,24 +35,24 @@ SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 41.0, 75.0)
 VARIANT_SPRINGS = (12.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0, 34.0)
 """k1 of the variants, N*mm/deg."""
 
-UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0, 18.0, 21.0, 30.0)
-"""All springs together, N*mm/deg."""
+UNIFORM_SPRINGS = (30.0, 26.0, 23.0, 20.0, 17.0, 14.0, 11.0)
+"""All springs together, N*mm/deg, the stiffest first."""
 
-SWINGING = 15.0
-"""Stiffest of the paper's uniform springs on the soft side of its Hopf point, N*mm/deg."""
+UNDULATION, BEND = "undulation", "bend"
+"""Modes by which the straight walk ends with all springs alike."""
 
-REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS = 10, 5, 3
+AMPLITUDE = float(np.deg2rad(5.0))
+"""Size of the bends whose multipliers are measured with all springs alike, rad: one that is seen."""
+
+REPEATS, VARIANT_REPEATS = 10, 5
 
 SHORTER = (20.0, 30.0, 40.0, 60.0)
 """Further durations of the base series, s, as the paper does not print the duration of its trials."""
 
-UNIFORM_DURATION = 60.0
-"""Duration of walks with all springs alike, which settle sooner, s."""
-
 _RATE = 50.0
 _EXAMPLES = (41.0, 15.0)
-_WINDOW = 24.0  # s, some two cycles of an undulation
-_PER_CYCLE = 6  # samples
+_CYCLES = 32  # that bends are followed
+_LOST = 0.1  # error of a modulus, beyond which the straight walk is lost
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,7 @@ class RobotWalks:
     variants: Mapping[str, xr.Dataset]  # as ``base``, of the paper's three, by name
     lower_steps: Mapping[str, xr.Dataset]  # of those that change the stride, see :func:`lower_steps`
     examples: xr.Dataset  # see :func:`chilopod.paper.measures.example_walks`
-    uniform: xr.Dataset | None  # see :func:`undulations`
+    uniform: xr.Dataset | None  # see :func:`uniform_modes`
 
     @property
     def fit(self) -> SquareRootFit | None:
@@ -68,13 +74,13 @@ class RobotWalks:
 
 
 def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
-    """All walks of the paper by the whole robot; if quick, half of those of the base series only."""
+    """All walks of the paper by the whole robot; if quick, :data:`chilopod.paper.section.QUICK_REPEATS` at
+    each spring of the base series only."""
     robot, folder, size = context.whole, context.folder, context.size
     quick = size is Size.QUICK
-    usual = VARIANT_REPEATS if quick else REPEATS
-    repeats, fewer, fewest = size.cut((usual, VARIANT_REPEATS, UNIFORM_REPEATS), (1, 1, 1))
-    springs, uniform_springs = size.cut((VARIANT_SPRINGS, UNIFORM_SPRINGS), (VARIANT_SPRINGS[1::4], (8.7, 13.0)))
-    duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (12.0, 8.0))
+    repeats, fewer = size.of((REPEATS, VARIANT_REPEATS), (QUICK_REPEATS, 0), (1, 1))
+    springs, uniform_springs = size.cut((VARIANT_SPRINGS, UNIFORM_SPRINGS), (VARIANT_SPRINGS[1::4], (30.0,)))
+    duration = size.cut(DURATION, 12.0)
     share = part(progress, 0.0, 1.0 if quick else 0.31, "as built")
     records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=share)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
@@ -92,8 +98,9 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
         walked = walk_records(variant, springs, fewer, duration=longer, folder=folder, progress=shown)
         found.append(walk_ends(walked, variant, springs))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(strides, found[len(robots) :], strict=True))
-    share = part(progress, 0.91, 1.0, "uniform springs")
-    uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=share)
+    uniform = uniform_modes(
+        robot, uniform_springs, folder=folder, progress=part(progress, 0.91, 1.0, "uniform springs")
+    )
     return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
 
 
@@ -164,46 +171,74 @@ def over_durations(series: Sequence[xr.Dataset], durations: Sequence[float]) -> 
     )
 
 
-def undulations(
+def uniform_modes(
     robot: Robot,
     springs: Sequence[float] = UNIFORM_SPRINGS,
-    repeats: int = UNIFORM_REPEATS,
     *,
-    duration: float = UNIFORM_DURATION,
+    amplitude: float = AMPLITUDE,
     engine: str = "twin",
     folder: measures.Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Walks with all springs alike: amplitude of the settled undulation.
+    """Leading modes of the straight walk with all springs alike, the stiffest first, and the spring at which each of
+    them begins to grow: an undulation, and a bend, which may sway slowly from side to side.
 
     Returns
     -------
-    Dataset over spring (N*mm/deg) and repeat: ``amplitude``, root mean square of the joint angles, averaged over gait
-    cycles, about their mean over the last 24 s (rad), and ``status``; attributes ``critical_k``, the onset of the
-    undulation by a square-root fit to springs up to :data:`SWINGING`, ``critical_k_error``, its standard error, and
-    the degrees of freedom ``critical_k_freedom``; NaN if they determine no point.
+    Dataset over mode and spring (N*mm/deg): ``modulus`` of the multiplier of bends of an amplitude (rad), half its
+    interval of 95 % ``modulus_error``, and ``period`` of the mode (s, infinite for a real multiplier), NaN where the
+    mode does not lead or the straight walk is lost; over mode ``end``, at which the modulus passes 1, and its standard
+    error ``end_error`` (N*mm/deg), NaN if it does not.
     """
-    wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(robot.body.modules - 1) * np.pi / 2.0))
-    walk: dict[str, Any] = {"joint_angles": wave, "engine": engine, "rate": _PER_CYCLE / robot.gait.period}
-    walk |= {"seeds": measures.spring_seeds(springs), "folder": folder, "progress": progress}
-    records = measures.spring_walks(robot, springs, duration, repeats=repeats, parameter=ALL, **walk)
-    shape, last, amplitudes = (len(springs), repeats), round(_WINDOW / robot.gait.period), []
-    for record in records:
-        angles = record.joint_angle.isel(robot=0).transpose("time", "joint").values[1:]
-        amplitudes.append(np.sqrt(measures.cycle_means(angles, _PER_CYCLE)[-last:].var(axis=0).sum()))
-    amplitude = np.array(amplitudes).reshape(shape)
-    status = np.array([record.status.values[0] for record in records], dtype=object).reshape(shape)
-    soft = np.asarray(springs) <= SWINGING
-    inverse = np.broadcast_to(1.0 / np.asarray(springs)[:, None], shape)
-    point = measures.point_of(measures.fitted(inverse[soft].ravel(), amplitude[soft].ravel()))
-    both = ("spring", "repeat")
+
+    def compute() -> list[Any]:
+        known: list[tuple[Array, Any]] = []  # state and leading modes of the last stable walk
+        rows = []
+        for index, spring in enumerate(springs):
+            progress(index / len(springs), f"{spring:g} {PAPER_UNIT}")
+            cycle, standing = walker.walk_cycle(robot.with_value(ALL, stiffness(spring)))
+            start, basis = known[-1] if known else (standing, None)
+            modes, settled, own = finite_modes(cycle, start, yaw, amplitude, _CYCLES, basis)
+            if abs(modes[0].multiplier) < 1.0:
+                known.append((settled, own))
+            lead = {mode.shape: mode for mode in reversed(modes) if mode.error < _LOST}
+            rows.append([_leading(lead.get(name)) for name in (UNDULATION, BEND)])
+        return rows
+
+    walker: Any = engine_named(engine)
+    yaw = [f"yaw{i}" for i in range(1, robot.body.modules)]
+    how = ("uniform", *springs, amplitude, _CYCLES, engine)
+    modulus, error, turn = np.moveaxis(np.array(measures.kept(folder, robot, how, compute)), 2, 0).swapaxes(1, 2)
+    ends = np.array([_passes_one(springs, *each) for each in zip(modulus, error, strict=True)]).T
+    with np.errstate(divide="ignore"):
+        period = 2.0 * np.pi * robot.gait.period / turn
     return xr.Dataset(
-        {"amplitude": (both, amplitude, {"units": "rad"}), "status": (both, status)},
-        coords={"spring": measures.over_springs(springs), "repeat": np.arange(repeats)},
-        attrs={
-            "robot": robot.name,
-            "critical_k": point.value,
-            "critical_k_error": point.error,
-            "critical_k_freedom": point.freedom,
+        {
+            "modulus": (("mode", "spring"), modulus),
+            "modulus_error": (("mode", "spring"), error),
+            "period": (("mode", "spring"), period, {"units": "s"}),
+            "end": ("mode", ends[0], {"units": PAPER_UNIT}),
+            "end_error": ("mode", ends[1], {"units": PAPER_UNIT}),
         },
+        coords={"mode": [UNDULATION, BEND], "spring": measures.over_springs(springs)},
+        attrs={"robot": robot.name, "amplitude": amplitude},
     )
+
+
+def _leading(mode: CycleMode | None) -> tuple[float, float, float]:
+    """Modulus of a mode, its error, and the angle by which it turns in a gait cycle, rad."""
+    nan = float("nan")
+    return (nan,) * 3 if mode is None else (abs(mode.multiplier), mode.error, abs(float(np.angle(mode.multiplier))))
+
+
+def _passes_one(springs: Sequence[float], modulus: Array, error: Array) -> tuple[float, float]:
+    """Spring below which a modulus is above 1, between neighbours linearly in 1/k, and its standard error."""
+    inverse, above = 1.0 / np.asarray(springs), modulus - 1.0
+    for i in range(len(inverse) - 1):
+        if above[i] <= 0.0 < above[i + 1]:
+            part = above[i] / (above[i] - above[i + 1])
+            gap = inverse[i + 1] - inverse[i]
+            value = 1.0 / (inverse[i] + part * gap)
+            half = np.hypot((1.0 - part) * error[i], part * error[i + 1]) * gap / (above[i + 1] - above[i])
+            return float(value), float(value**2 * half / ndtri(0.5 + 0.5 * LEVEL))
+    return float("nan"), float("nan")

@@ -1,54 +1,66 @@
-"""Reasons why the robot bends at 34 and the planar model at 12: steps from the planar model's assumptions to the
-twin's.
+"""Reasons why the robot bends at 34 and the planar model at 12: parts of the assumptions by which the planar model
+differs from the twin.
 
 The twin has a planar limit. Its legs are as stiff as the step allows, lift their feet high and put them down on the
 point. Its feet never reach the Coulomb limit, so the floor resists them like a viscous one with the coefficient of the
 planar model (see :mod:`chilopod.twin.creep`). There the two engines have to agree. Each :class:`Factor` then removes
-one assumption. Factors are switched on alone in the planar limit, switched off alone in the twin, and switched on one
-after the other.
+one assumption.
 
-The measure is the paper's: the onset of curved walks by a square-root fit to the bend of joint 1. The agreement of
-the engines in the planar limit has a finer one: the spring at which the growth rate of a bend of 1 deg changes sign.
+The measure is the spring k1 at which the straight walk ends: the largest modulus of the leading multipliers, of bends
+of 1 deg, passes 1. It is searched with every subset of the factors. Shapley values (L. S. Shapley, "A value for
+n-person games", 1953) of its logarithm share the whole change among the factors: the mean over all orders of removal.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import comb
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
+from scipy.linalg import null_space
 
-from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.analysis.bend_onset import crossing
+from chilopod.analysis.cycle_multipliers import finite_modes
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.frozen import Array
 from chilopod.paper import printed
-from chilopod.paper.measures import Folder, cycle_means, fitted, point_of, spring_walks
+from chilopod.paper.measures import Folder, kept
 from chilopod.paper.section import Context, Size
 from chilopod.paper.statements import PLANAR_LIMIT
 from chilopod.paper.table import OfPlanar, OfTwin, Result, of_twin
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
-from chilopod.tasks.radius_law import CURVED
-from chilopod.trials import NONE
+from chilopod.show.words import SPRING_UNIT, listing
+from chilopod.statistics import Interval
 from chilopod.twin.creep import foot_creep
+from chilopod.twin.cycle_map import walk_cycle
 from chilopod.twin.legs import twin_of
 
-SPRINGS = (7.0, 10.0, 15.0, 22.0, 33.0, 50.0)
-"""First springs k1 that are tried, N*mm/deg."""
+ENDS = ("end", "end_low", "end_high")
+"""Names of the end of the straight walk and of the ends of its interval, N*mm/deg."""
+
+SEARCHED = (5.0, 80.0)
+"""Springs k1 between which the straight walk is followed, N*mm/deg."""
+
+ORDERS = 0.9
+"""Part of the orders of removal in the interval of a factor's part."""
 
 PLANAR = {
     "twin.sliding_friction": 1000.0,
     "twin.servo_stiffness": 300.0,
     "twin.servo_damping": 0.75,
-    "twin.joint_inertia": 3e-4,
+    "twin.joint_inertia": 5e-4,
     "twin.clearance": 0.03,
     "twin.contact_time": 0.002,
     "twin.foot_radius": 5e-4,
     "twin.link_mass": 0.01,
-    "twin.timestep": 5e-4,
+    "twin.timestep": 1e-3,
 }
 """Constants of the planar limit instead of the twin's, SI."""
 
@@ -56,47 +68,46 @@ FINER = {
     **PLANAR,
     "twin.servo_stiffness": 1000.0,
     "twin.servo_damping": 2.0,
+    "twin.joint_inertia": 3e-4,
     "twin.contact_time": 0.001,
     "twin.control_interval": 0.001,
     "twin.timestep": 2e-4,
 }
-"""Planar limit with smaller remaining differences, at 2.5 times the work."""
+"""Planar limit with smaller remaining differences, at five times the work."""
 
 
 @dataclass(frozen=True)
 class Factor:
-    """Assumption of the planar model that the twin does not make, in a word and a sentence, and the numbers of the
-    robot that go from those of the planar limit to the twin's."""
+    """Assumption of the planar model that the twin does not make: name, what the robot does without it, and the numbers
+    of the robot that go from those of the planar limit to the twin's."""
 
     name: str
-    sentence: str
+    clause: str
     paths: tuple[str, ...]
 
 
 FACTORS = (
-    Factor("feet", "where the feet are", ("legs.forward_offset", "legs.half_width")),
-    Factor("grip", "how firmly the floor holds a foot that does not slide", ()),
+    Factor("feet", "feet are where they are", ("legs.forward_offset", "legs.half_width")),
+    Factor("grip", "standing feet stick", ()),
     Factor("dry friction", "feet slide beyond the Coulomb limit", ("twin.sliding_friction",)),
-    Factor(
-        "soft legs", "servos give way under load", ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia")
-    ),
-    Factor("dragging feet", "swing feet are hardly lifted and touch the floor", ("twin.clearance",)),
-    Factor("joint damping", "friction in the yaw joints", ("springs.damping",)),
+    Factor("soft legs", "servos give way", ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia")),
+    Factor("dragging feet", "swinging feet drag", ("twin.clearance",)),
+    Factor("joint damping", "yaw joints have friction", ("springs.damping",)),
     Factor(
         "legs and floor",
-        "mass of the legs, size of the feet, softness of the floor",
+        "legs have mass, feet a size, and the floor is soft",
         ("twin.link_mass", "twin.foot_radius", "twin.contact_time"),
     ),
 )
-"""Factors, in the order in which they are switched on one after the other."""
+"""Factors, in the order of the table."""
 
-_BEND = float(np.deg2rad(1.0))
-_DURATION, _SKIPPED = 18.0, 6.0  # s
-_SAMPLES = 6  # per period
-_BENT, _WALK = 0.5, 60.0  # rad (root of the sum of squares) and s, of the walks that a square root is fitted to
-_AVERAGED, _PER_SECOND = 12.0, 10.0  # s, a cycle of the undulation that the twin has besides; Hz
-_BESIDE = (0.75, 0.85, 0.95)  # of a point, springs for a finer one
+_FIRST, _FACTOR = 20.0, 2.0  # N*mm/deg, from where the search goes by this factor until the walk's stability changes
+_CYCLES, _FEWER = 16, 12  # that bends are followed
+_TOLERANCE = 0.005  # of a modulus
+_BENT, _SCATTER = np.deg2rad(5.0), 0.1  # yaw, rad, and error of a modulus, beyond which the straight walk is lost
+_GROWS = 0.1  # excess of a walk that is lost
 _SOFT_STEP = 2e-3  # s, enough for soft legs
+_ONCE = 1e3  # factor with which the search ends where it begins
 
 
 def planar_limit(robot: Robot, planar: Robot, constants: Mapping[str, float] = PLANAR) -> Robot:
@@ -131,140 +142,150 @@ def with_factors(robot: Robot, planar: Robot, names: Sequence[str]) -> Robot:
     return with_grip(limit, foot_creep(robot).across if "grip" in names else planar.ground.friction)
 
 
-def growth(robot: Robot, springs: Sequence[float], folder: Folder = None, duration: float = _DURATION) -> Array:
-    """Growth rates of a small bend of the twin, averaged over gait cycles, with each spring (N*mm/deg), 1/s; NaN where
-    a walk failed."""
-    bend, rate = _BEND * _shape(robot), _SAMPLES / robot.gait.period
-    records = [_walks(robot, springs, duration, folder, sign * bend, rate) for sign in (1.0, -1.0)]
-    rates = []
-    for pair in zip(*records, strict=True):
-        one, other = (each.joint_angle.isel(robot=0).transpose("time", "joint").values for each in pair)
-        cycles = cycle_means(0.5 * (one - other), _SAMPLES)
-        times = (np.arange(len(cycles)) + 0.5) * robot.gait.period
-        late = times > _SKIPPED
-        rates.append(np.polyfit(times[late], np.log(np.linalg.norm(cycles[late], axis=1)), 1)[0])
-    return np.array(rates)
+def straight_end(robot: Robot, first: float = _FIRST, factor: float = _FACTOR, cycles: float = _CYCLES) -> Interval:
+    """Spring k1 at which the straight walk ends, with an interval of 95 %, N*mm/deg.
 
-
-def sign_change(springs: ArrayLike, growth: Array) -> float:
-    """The stiffest spring below which a growth rate is positive, between values linearly in 1/k; NaN if there is
-    none."""
-    inverse = 1.0 / np.asarray(springs)
-    for i in range(len(inverse) - 1, 0, -1):
-        if growth[i] <= 0.0 < growth[i - 1]:
-            part = growth[i] / (growth[i] - growth[i - 1])
-            return float(1.0 / (inverse[i] + part * (inverse[i - 1] - inverse[i])))
-    return float("nan")
-
-
-def onset(robot: Robot, folder: Folder = None, size: Size = Size.FULL) -> float:
-    """Onset of curved walks, N*mm/deg, by the paper's method: the square-root fit to the bend of joint 1 of walks that
-    begin bent. The first fit is over the three stiffest springs that curve, the second over three beside its point.
-
-    Infinite if walks curve at the stiffest spring tried, NaN if at fewer than two, or if their bends point beyond it.
-    If not full, without the second fit.
+    The search goes from ``first`` by steps of a factor. The value is one end of :data:`SEARCHED` if the walk is
+    unstable or stable throughout; the interval is then from there to infinity or 0.
     """
-    springs = size.cut(SPRINGS, SPRINGS[::3])
-    duration = size.cut(_WALK, 2.5)
-    bends = _bends(robot, springs, duration, folder)
-    if bends[-1] > 0.0:
-        return float("inf")
-    point = _point(springs, bends)
-    if size is not Size.FULL or np.isnan(point):
-        return point
-    finer = [round(point * part, 2) for part in _BESIDE]
-    refined = _point(finer, _bends(robot, finer, duration, folder))
-    return refined if refined <= max(springs) else point
+    yaw = [f"yaw{i}" for i in range(1, robot.body.modules)]
+    known: list[tuple[Array, Any]] = []  # state and leading modes of the last stable walk
+
+    def excess(spring: float) -> tuple[float, float]:
+        """Largest modulus of the leading multipliers less 1, and its error."""
+        cycle, standing = walk_cycle(robot.with_value(K1, stiffness(spring)))
+        joints = [cycle.names.index(name) for name in yaw]
+        for start, basis in (*known, (standing, None)):
+            modes, settled, own = finite_modes(cycle, start, yaw, cycles=round(cycles), basis=basis)
+            above, error = abs(modes[0].multiplier) - 1.0, modes[0].error
+            if np.abs(settled[joints]).max() < _BENT and error < _SCATTER:
+                known[:] = [(settled, own)] if above < 0.0 else known
+                return above, error
+        return _GROWS, 0.0
+
+    a, at_a = first, excess(first)[0]
+    while True:
+        b = a * factor if at_a > 0.0 else a / factor
+        if not SEARCHED[0] <= b <= SEARCHED[1]:
+            return Interval(a, a, np.inf) if at_a > 0.0 else Interval(a, 0.0, a)
+        at_b = excess(b)[0]
+        if at_a * at_b <= 0.0:
+            return crossing(excess, (a, at_a), (b, at_b), _TOLERANCE)
+        a, at_a = b, at_b
 
 
-def _walks(
-    robot: Robot, springs: Sequence[float], duration: float, folder: Folder, bend: Array, rate: float
-) -> list[xr.Dataset]:
-    """Undisturbed walks of the twin that begin bent."""
-    how: dict[str, Any] = {"disturbance": NONE, "rate": rate, "engine": "twin", "folder": folder}
-    return spring_walks(robot, springs, duration, joint_angles=tuple(bend), **how)
+def _kept_end(robot: Robot, folder: Folder, *how: float) -> Interval:
+    return Interval(*kept(folder, robot, ("end", *how), lambda: [*vars(straight_end(robot, *how)).values()]))
 
 
-def _bends(robot: Robot, springs: Sequence[float], duration: float, folder: Folder) -> Array:
-    """Mean angle of joint 1 at the end of walks, rad; 0 where the body is straight, or the walk failed."""
-    records = _walks(robot, springs, duration, folder, _BENT * _shape(robot), _PER_SECOND)
-    kept = round(_AVERAGED * _PER_SECOND)
-    last = np.abs([record.joint_angle.isel(robot=0).values[-kept:].mean(axis=0) for record in records])
-    return np.where(last.sum(axis=1) > CURVED, last[:, 0], 0.0)
+def limit_end(robot: Robot, planar: Robot, constants: Mapping[str, float], folder: Folder, cycles: int) -> float:
+    """Spring at which the straight walk ends in the planar limit, N*mm/deg, searched from 5 % below the planar model's
+    pitchfork by steps of a tenth."""
+    first = 0.95 * pitchfork(planar, normal_form=False).value
+    return _kept_end(planar_limit(robot, planar, constants), folder, first, 1.05 / 0.95, cycles).value
 
 
-def _point(springs: Sequence[float], bends: Array) -> float:
-    curved = np.flatnonzero(bends > 0.0)[-3:]
-    if len(curved) < 2:
-        return float("nan")
-    # Two springs have a point too: a third that is as straight as it gets does not move it.
-    inverse = np.array([*(1.0 / springs[i] for i in curved), 1e-3])
-    point = point_of(fitted(inverse, [*bends[curved], 0.0])).value
-    # Beyond a spring at which walks are straight there is no point.
-    return point if point <= max(springs) or bends[-1] > 0.0 else float("nan")
+def shapley(on: NDArray[np.bool_], values: Array) -> Array:
+    """Shapley values, (factors, ...), of a game with values (subsets, ...) of some subsets of its factors.
+
+    ``on`` tells which factors a subset has, (subsets, factors); the first has none, the last all. The values are those
+    of the weighted least squares of Charnes et al. (1988): exact from all subsets, an estimate from some of them.
+    """
+    factors = on.shape[1]
+    size = on.sum(axis=1)
+    weight = np.array([1.0 / np.sqrt(comb(factors, s) * s * (factors - s)) if 0 < s < factors else 0.0 for s in size])
+    whole = values[-1] - values[0]
+    free = null_space(np.ones((1, factors)))  # contributions that sum to 0
+    rest = values - values[0] - np.multiply.outer(size / factors, whole)
+    law = np.linalg.pinv(weight[:, None] * on @ free) * weight
+    return whole / factors + np.tensordot(free @ law, rest, 1)
 
 
-def limit_point(
-    robot: Robot,
-    planar: Robot,
-    constants: Mapping[str, float] = FINER,
-    folder: Folder = None,
-    duration: float = _DURATION,
-) -> float:
-    """Spring at which a small bend neither grows nor dies out in the planar limit, N*mm/deg, near the planar model's
-    pitchfork; NaN if there is none."""
-    springs = [round(part * pitchfork(planar, normal_form=False).value, 2) for part in (0.95, 1.05)]
-    return sign_change(springs, growth(planar_limit(robot, planar, constants), springs, folder, duration))
+def over_orders(on: NDArray[np.bool_], values: Array, factor: int) -> tuple[float, float]:
+    """Ends of the middle :data:`ORDERS` of what a factor adds, over the orders in which factors may be removed."""
+    rows = {tuple(row): value for row, value in zip(on.tolist(), values.tolist(), strict=True)}
+    found = []
+    for row, value in rows.items():
+        without = (*row[:factor], False, *row[factor + 1 :])
+        if row[factor] and without in rows:
+            found.append((value - rows[without], 1.0 / comb(len(row) - 1, sum(without))))
+    if not found:
+        return float("nan"), float("nan")
+    added, weight = np.array(sorted(found)).T
+    below = (np.cumsum(weight) - 0.5 * weight) / weight.sum()
+    low, high = np.interp([0.5 - 0.5 * ORDERS, 0.5 + 0.5 * ORDERS], below, added)
+    return float(low), float(high)
 
 
-def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
-    """The point with factors switched on and off.
+def subsets(size: Size) -> NDArray[np.bool_]:
+    """Subsets of the factors, (subsets, factors): all; if quick none, each alone, all but one, and all; if tiny none
+    and all."""
+    count = len(FACTORS)
+    sizes = size.of(range(count + 1), (0, 1, count - 1, count), (0, count))
+    chosen = [set(each) for many in sizes for each in itertools.combinations(range(count), many)]
+    return np.array([[factor in each for factor in range(count)] for each in chosen])
 
-    The planar limit takes feet and friction from the robot of the planar model. If not full, only the path from the
-    planar limit to the twin, without the second fit.
+
+def contributions(context: Context, progress: Progress = silent) -> xr.Dataset:
+    """Parts of the factors in the end of the straight walk.
+
+    Every subset is kept beside the folder of the trials.
 
     Returns
     -------
-    Dataset over factor: ``alone``, the point in the planar limit with only this one (N*mm/deg); ``without``, in the
-    twin without it; ``path``, with it and all before it. Infinite where walks curve at all springs tried, NaN where at
-    none. Attributes: ``limit`` and ``twin``, the point without factors and with all; ``vouched`` and ``exact``, the
-    points of the planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep coefficient,
-    and ``viscous``, the planar model's (N*s/m).
+    Dataset over subset and factor: ``on``, True if a subset has a factor; over subset: :data:`ENDS`, the results of
+    :func:`straight_end`; over factor: ``share``, by which the end is multiplied, ``share_low`` and ``share_high``, see
+    :func:`over_orders`, ``share_error``, half an interval of 95 % by the errors of the ends, relative, ``alone`` and
+    ``without``, the ends with this one alone and with all others (N*mm/deg). Attributes: ``vouched`` and ``exact``, the
+    ends of the planar limit by :func:`limit_end` and of the planar model; ``grip`` and ``viscous``, the creep
+    coefficients of the twin and of the planar model (N*s/m).
     """
     robot, planar, folder, size = context.whole, context.robot, context.folder, context.size
-    names = [factor.name for factor in FACTORS]
-    every = frozenset(names)
-    wanted = {"path": [frozenset(names[: i + 1]) for i in range(len(names))]}
-    if size is Size.FULL:
-        wanted |= {"alone": [frozenset([name]) for name in names], "without": [every - {name} for name in names]}
-    points = dict.fromkeys([frozenset[str](), *(on for sets in wanted.values() for on in sets)], np.nan)
-    for index, on in enumerate(points):
-        progress(index / len(points), ", ".join(sorted(on)) or "planar limit")
-        points[on] = onset(with_factors(robot, planar, sorted(on)), folder, size)
-    data = xr.Dataset(coords={"factor": names})
-    for name in ("alone", "without", "path"):
-        values = [points[on] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
-        data[name] = ("factor", np.array(values), {"units": PAPER_UNIT})
-    data["about"] = ("factor", np.array([factor.sentence for factor in FACTORS], dtype=object))
-    progress(1.0, "planar limit by growth")
+    on, cycles = subsets(size), size.of(_CYCLES, _FEWER, _FEWER)
+    how = _FIRST, size.cut(_FACTOR, _ONCE), cycles
+    names, ends = np.array([factor.name for factor in FACTORS]), []
+    for index, row in enumerate(on):
+        progress(index / len(on), ", ".join(names[row]) or "planar limit")
+        ends.append(_kept_end(with_factors(robot, planar, names[row].tolist()), folder, *how))
+    progress(1.0, "finer planar limit")
+    data = shares(on, np.array([[end.value, end.low, end.high] for end in ends]))
+    data = data.assign_coords(factor=names).assign(about=("factor", [factor.clause for factor in FACTORS]))
     data.attrs = {
         "robot": robot.name,
-        "vouched": limit_point(
-            robot, planar, FINER if size is Size.FULL else PLANAR, folder, size.cut(_DURATION, 12.0)
-        ),
+        "vouched": limit_end(robot, planar, size.of(FINER, PLANAR, PLANAR), folder, cycles),
         "exact": pitchfork(planar, normal_form=False).value,
-        "limit": points[frozenset()],
-        "twin": points[every],
         "grip": foot_creep(robot).across,
         "viscous": planar.ground.friction,
     }
     return data
 
 
-def _shape(robot: Robot) -> Array:
-    """Shape of the bend at the start."""
-    mode = np.array(printed.mode_shape(robot))
-    return mode / np.linalg.norm(mode)
+def shares(on: NDArray[np.bool_], ends: Array) -> xr.Dataset:
+    """Part of the results of :func:`contributions` that follows from the ends, with their intervals, (subsets, 3)."""
+    inside, logs = np.isfinite(ends[:, 2]) & (ends[:, 1] > 0.0), np.log(ends[:, 0])
+    half = np.where(inside, ends[:, 2] - ends[:, 0], 0.0) / ends[:, 0]
+    error = np.sqrt(shapley(on, np.eye(len(on))) ** 2 @ half**2)
+    span = np.array([over_orders(on, logs, factor) for factor in range(on.shape[1])]).T
+    columns = {name: ("subset", column, {"units": PAPER_UNIT}) for name, column in zip(ENDS, ends.T, strict=True)}
+    size, found = on.sum(axis=1), np.exp([shapley(on, logs), *span])
+    for name, many in (("alone", 1), ("without", on.shape[1] - 1)):
+        rows = {int((on[i] if many == 1 else ~on[i]).argmax()): ends[i, 0] for i in np.flatnonzero(size == many)}
+        values = [rows.get(factor, np.nan) for factor in range(on.shape[1])]
+        columns[name] = ("factor", np.array(values), {"units": PAPER_UNIT})
+    for name, values in zip(("share", "share_low", "share_high"), found, strict=True):
+        columns[name] = ("factor", values, {"units": "1"})
+    return xr.Dataset({"on": (("subset", "factor"), on), **columns, "share_error": ("factor", error)})
+
+
+def cause(data: xr.Dataset) -> str:
+    """Sentence on the factors that raise the end of the straight walk, the largest first: those whose part is above 1
+    in at least :data:`ORDERS` of the orders."""
+    said = {factor.name: factor.clause for factor in FACTORS}
+    largest = data.sortby("share", ascending=False)
+    clauses = [said[str(name)] for name in largest.factor[(largest.share_low > 1.0).values].values]
+    reason = f"because {listing(clauses)}" if clauses else "for no reason that holds in every order"
+    robot, planar = printed.ONSET.value, printed.CRITICAL_K1.value
+    return f"The robot bends at {robot:g} {SPRING_UNIT} and the planar model at {planar:g} {reason}"
 
 
 def rows(data: xr.Dataset) -> list[OfTwin | OfPlanar]:

@@ -18,9 +18,9 @@ from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.measures import Folder, over_springs
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.steering import Outcome, Target, earliest_arrival, evaluate
+from chilopod.steering import LegYawController, Outcome, Target, earliest_arrival, evaluate
 from chilopod.steering.criteria import efforts
 from chilopod.steering.strategies import strategy_named
 from chilopod.trials import Trial
@@ -49,10 +49,11 @@ class TurningTask:
     """Outcome of walks to a target with many springs.
 
     ``criteria``, over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1
-    to 3, at the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); their means over
-    repeats and standard errors as ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so
-    long). Over (spring, repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if never),
-    ``nearest`` (m), ``outcome`` and ``status``.
+    to 3, at the ``seconds`` of "earliest arrival" and "paper" (:data:`DURATION`), and at each walk's "own" arrival or,
+    without one, where it is nearest; their means over repeats and standard errors as ``distance_mean``,
+    ``distance_error`` and so on (NaN where a repeat did not walk so long). Over (spring, repeat):
+    ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if never), ``nearest`` (m), ``outcome``
+    and ``status``.
 
     ``paths``, over (shown, repeat, time): ``x`` and ``y`` (m) of module 1, ``distance`` (m) and ``bearing`` (rad,
     continuous) of the target, of three springs: the best, and the grid's nearest to 15/21 and 41/21 of it as in the
@@ -82,10 +83,14 @@ def to_target(
     *,
     duration: float = DURATION,
     rate: float = RATE,
+    limit: float | None = None,
     **walk: Any,
 ) -> Trial:
-    """A walk towards a target by a strategy with its spring (N*mm/deg); ``walk`` are other fields of a trial."""
+    """A walk towards a target by a strategy with its spring (N*mm/deg); ``limit`` is the largest yaw of the legs, rad,
+    if it is not that of the controller, ``walk`` are other fields of a trial."""
     walker, controller, _ = strategy_named(strategy).prepare(robot, None, stiffness(float(spring)))
+    if limit is not None and isinstance(controller, LegYawController):
+        controller = replace(controller, limit=limit)
     return Trial(walker, duration, target=target, controller=controller, rate=rate, **walk)
 
 
@@ -94,41 +99,56 @@ def turning_task(
     target: Target,
     springs: Sequence[float] = SPRINGS,
     repeats: int = printed.REPEATS,
+    strategy: str = "pitchfork",
+    **walk: Any,
+) -> TurningTask:
+    """Task of :func:`strategy_tasks` with one strategy."""
+    return strategy_tasks(robot, target, {strategy: springs}, repeats, **walk)[strategy]
+
+
+def strategy_tasks(
+    robot: Robot,
+    target: Target,
+    springs: Mapping[str, Sequence[float]],
+    repeats: int = printed.REPEATS,
     *,
     time: float | None = None,
-    shown: Sequence[float] | None = None,
+    shown: Sequence[float] = (),
     folder: Folder = None,
     progress: Progress = silent,
     **walk: Any,
-) -> TurningTask:
-    """Walk towards a target with every spring (N*mm/deg), several times, with the seeds 0, 1, ...
+) -> dict[str, TurningTask]:
+    """Walk towards a target by every strategy with its springs (N*mm/deg), several times, with the seeds 0, 1, ...
 
-    Epsilon 1 to 3 are taken at ``time`` (s), by default the earliest arrival of any of these trials, as in the paper,
-    and their duration if none arrives. ``shown`` are the springs of ``paths`` (N*mm/deg). ``walk`` is the rest of
-    :func:`to_target`: strategy, duration (s, at least the paper's), engine, disturbance.
+    Epsilon 1 to 3 are taken at ``time`` (s), by default the earliest arrival over all strategies, and the duration if
+    none arrives. ``shown`` are the springs of ``paths`` (N*mm/deg), of a strategy that has them. ``walk`` is the rest
+    of :func:`to_target`: duration (s, at least the paper's), engine, disturbance, limit.
     """
-    asked: list[Trial] = []
-    for spring in springs:
-        one = to_target(robot, target, spring, **walk)
-        asked += [replace(one, seed=seed) for seed in range(repeats)]
-    record = trials.together(trials.run(asked, folder, progress))
-    earliest, duration = earliest_arrival(record), asked[0].duration
-    when = time if time is not None else earliest if np.isfinite(earliest) else duration
-    criteria = _criteria(record, (when, DURATION), springs, repeats)
-    criteria.attrs = {
-        "robot": robot.name,
-        "target": str(target),
-        "strategy": walk.get("strategy", "pitchfork"),
-        "duration_s": duration,
-        "earliest_arrival_s": earliest,
-        "radius_m": target.radius,
-    }
-    if shown is None:
-        wanted = [part / 21.0 * _best(criteria) for part in (15.0, 21.0, 41.0)]
-        shown = [springs[int(np.abs(np.log(np.asarray(springs) / each)).argmin())] for each in wanted]
-    paths = _paths(record, springs, repeats, shown)
-    paths.attrs = {**criteria.attrs, "target_x_m": target.position[0], "target_y_m": target.position[1]}
-    return TurningTask(target, criteria, paths)
+    tasks, records, duration = {}, {}, 0.0
+    for index, (strategy, own) in enumerate(springs.items()):
+        asked = [to_target(robot, target, spring, strategy, **walk) for spring in own for _ in range(repeats)]
+        seeded = [replace(trial, seed=number % repeats) for number, trial in enumerate(asked)]
+        share = part(progress, index / len(springs), (index + 1) / len(springs), strategy)
+        records[strategy], duration = trials.together(trials.run(seeded, folder, share)), asked[0].duration
+    earliest = {strategy: earliest_arrival(record) for strategy, record in records.items()}
+    when = time if time is not None else float(np.nanmin([*earliest.values(), np.inf]))
+    for strategy, record in records.items():
+        own = springs[strategy]
+        criteria = _criteria(record, (when if np.isfinite(when) else duration, DURATION), own, repeats)
+        criteria.attrs = {
+            "robot": robot.name,
+            "target": str(target),
+            "strategy": strategy,
+            "duration_s": duration,
+            "earliest_arrival_s": earliest[strategy],
+            "radius_m": target.radius,
+        }
+        wanted = [ratio / 21.0 * _best(criteria) for ratio in (15.0, 21.0, 41.0)]
+        nearest = [own[int(np.abs(np.log(np.asarray(own) / each)).argmin())] for each in wanted]
+        paths = _paths(record, own, repeats, shown if shown and set(shown) <= set(own) else nearest)
+        paths.attrs = {**criteria.attrs, "target_x_m": target.position[0], "target_y_m": target.position[1]}
+        tasks[strategy] = TurningTask(target, criteria, paths)
+    return tasks
 
 
 def _best(criteria: xr.Dataset) -> float:
@@ -138,15 +158,23 @@ def _best(criteria: xr.Dataset) -> float:
 def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequence[float], repeats: int) -> xr.Dataset:
     shape = (len(springs), repeats)
     found = [evaluate(record, time) for time in instants]
-    last = float(record.time[-1])
+    last, away = float(record.time[-1]), record.distance.transpose("robot", "time")
     ends = np.where(np.isfinite(found[0].arrival), found[0].arrival, last).tolist()
+    nearest = record.time.values[away.fillna(np.inf).argmin("time").values]
+    own = np.where(np.isfinite(found[0].arrival), found[0].arrival, nearest).tolist()
+    alone = [evaluate(record.isel(robot=[index]), time) for index, time in enumerate(own)]
     until = np.array([efforts(record.isel(robot=[index]), end)[0] for index, end in enumerate(ends)])
     both = ("spring", "repeat")
-    names = {"spring": over_springs(springs), "instant": ["earliest arrival", "paper"], "repeat": np.arange(repeats)}
+    names = {
+        "spring": over_springs(springs),
+        "instant": ["earliest arrival", "paper", "own"],
+        "repeat": np.arange(repeats),
+    }
     data = xr.Dataset(coords=names)
-    data["seconds"] = ("instant", np.array(instants), {"units": "s"})
+    data["seconds"] = ("instant", np.array([*instants, np.nan]), {"units": "s"})
     for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
-        values = np.stack([getattr(each, name).reshape(shape) for each in found])
+        frozen = np.concatenate([getattr(each, name) for each in alone])
+        values = np.stack([each.reshape(shape) for each in (*(getattr(one, name) for one in found), frozen)])
         data[name] = (("instant", *both), values, {"units": unit})
     data["effort_until_arrival"] = (both, until.reshape(shape), {"units": "rad^2*s"})
     for name in CRITERIA:

@@ -138,7 +138,7 @@ def null_vector(bordered: Array) -> Array:
     n = len(bordered) - 1
     if not np.isfinite(bordered).all():
         raise AnalysisError("the return map is not finite", field="flow")
-    least = _UNCERTAIN / max(1.0, float(np.linalg.norm(bordered, 2)))
+    least = _UNCERTAIN / max(1.0, float(np.linalg.svd(bordered, compute_uv=False)[0]))
     tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=least)[0]
     if not tangent.any():
         raise AnalysisError("the curve has no direction here", field="step")

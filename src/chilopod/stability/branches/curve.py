@@ -181,7 +181,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             (x, value, mapped), moved, corrections = solved.found, solved.moved, solved.corrections
             # The residual shows one direction.
             off = _CLEAR * float(np.linalg.norm(solved.inverse @ solved.residual))
-            weakest = float(np.linalg.norm(solved.inverse, 2))
+            weakest = float(np.linalg.svd(solved.inverse, compute_uv=False)[0])
             image, matrix = self.matrix_at(x, value, timed.section, last.tangent, bounded, mapped)
         tangent = null_vector(within_space(space, matrix))
         if not tangent @ last.tangent >= SHARPEST_TURN:

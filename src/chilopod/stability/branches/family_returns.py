@@ -58,14 +58,16 @@ class FamilyReturns:
                 allowed = f"{self._dimension} states"
                 raise AnalysisError("changes its dimension", field="family", value=value, allowed=allowed)
             if len(self._known) >= _KEPT:
-                self._known.clear()
+                self._known.pop(next(iter(self._known)))
             whole = self.symmetric or (own.symmetry is None and self.periods == 1)
             self._known[value] = own if whole else whole_period(own, self.periods)
         return self._known[value]
 
     def units(self, count: int) -> Array:
         """Sizes of the states and scale of the parameter, shape (n+1,)."""
-        return np.append(np.ones(count) if self.sizes is None else self.sizes, self.scale)
+        units = np.full(count + 1, self.scale, dtype=np.float64)
+        units[:-1] = 1.0 if self.sizes is None else self.sizes
+        return units
 
     def image(self, x: Array, value: float, section: Section | None = None, with_error: bool = False) -> ReturnMap:
         """The return map and its derivative."""

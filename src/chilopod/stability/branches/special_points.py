@@ -32,6 +32,7 @@ SAME_ORBIT = 1e-6
 
 _FURTHER = 0.1  # factor on the precision of orbits within a step
 _OFF = 1e-5  # error of the cubic, relative to the step, above which an orbit is corrected
+_CORRECTED = 3  # returns to correct the cubic, by the matrix between those of the ends, before the corrector does
 _LEAVING = 0.05  # distance from a branch point at which the search begins, relative to the step
 _SIDE = 1e-3  # distance from a crossing at which the curve's sides are compared, relative to the step
 
@@ -70,22 +71,27 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
 
     def near_jacobian(self, place: float) -> Array:
-        """Derivative at a place, by the cubic through the ends of the step if that is close enough."""
+        """Derivative at a place, by the cubic through the ends of the step, corrected until it is close enough."""
         step, start = self.step, self.step.start
         if place in (0.0, step.size):
             return self.jacobian(place)
-        moved, matrix = step.between(place)
-        matrix[-1] = start.tangent
-        x, value = self.curve.reached(start.last, moved)
+        guess, matrix = step.between(place)
+        matrix[-1], moved = start.tangent, guess
         try:
-            image = self.curve.image(x, value, start.section)
-            off = np.append((image.state - x) / self.curve.units(x.size)[:-1], 0.0)
-            if float(np.abs(np.linalg.solve(matrix, off)).max()) <= _OFF * step.size:
-                return image.jacobian
+            for _ in range(_CORRECTED):
+                x, value = self.curve.reached(start.last, moved)
+                image = self.curve.image(x, value, start.section)
+                off = np.append((image.state - x) / self.curve.units(x.size)[:-1], 0.0)
+                correction = np.linalg.solve(matrix, off)
+                if float(np.abs(correction).max()) <= _OFF * step.size:
+                    return image.jacobian
+                moved = moved - correction
+                if not float(np.linalg.norm(moved - guess)) <= AWAY * step.size:
+                    break
         except (AnalysisError, np.linalg.LinAlgError):  # a return may magnify the error of the cubic
             pass
         exact = self.at(place)
-        if not float(np.linalg.norm(exact.moved - moved)) <= AWAY * step.size:
+        if not float(np.linalg.norm(exact.moved - guess)) <= AWAY * step.size:
             raise AnalysisError("the curve is not smooth within the step", field="step")
         return exact.found.image.jacobian
 

@@ -319,4 +319,6 @@ def _product(factors: ComplexArray, sizes: Array, errors: Array) -> tuple[float,
     scaled = factors / sizes
     value = float(np.prod(scaled).real)
     without = [float(np.abs(np.prod(np.delete(scaled, i)))) for i in range(scaled.size)]
-    return value, float(np.dot(without, errors / sizes)) if scaled.size else 0.0
+    with np.errstate(invalid="ignore"):  # an unknown error of a factor beside another factor of zero
+        error = float(np.dot(without, errors / sizes)) if scaled.size else 0.0
+    return value, np.inf if np.isnan(error) else error

@@ -172,33 +172,39 @@ def _formed(
 def _by_quadratic_term(
     system: SystemLike, orbit: Orbit, modes: ComplexArray, symmetry: SymmetricCrossing
 ) -> tuple[Kind, SymmetricCrossing]:
-    """Kind of a crossing at +1 whose symmetry allows quadratic terms, by their coefficient along an axial branch: among
-    the states with its symmetries the multiplier is simple."""
+    """Kind of a crossing at +1 whose symmetry allows quadratic terms, by their coefficients along the axial branches:
+    transcritical if one is significant, pitchfork if all are negligible, else a branch point."""
     axes = [i for i, branch in enumerate(symmetry.branches) if not branch.reversed]
-    if not axes:
+    kinds = {_along_axis(system, orbit, modes[:, i].real) for i in axes}
+    if Kind.TRANSCRITICAL in kinds:
         return Kind.TRANSCRITICAL, symmetry
+    if kinds == {Kind.PITCHFORK}:
+        return Kind.PITCHFORK, replace(symmetry, kind=SymmetricKind.EQUIVARIANT_PITCHFORK)
+    return Kind.BRANCH_POINT, symmetry
+
+
+def _along_axis(system: SystemLike, orbit: Orbit, mode: Array) -> Kind:
+    """Kind of a crossing at +1 among the states with the symmetries of an axial branch, where the multiplier is simple;
+    a branch point if that cannot be computed."""
     x, image, size = orbit.state, orbit.image, sizes(system, orbit.state, orbit.image.duration)
-    ahead = modes[:, axes[0]].real
-    basis = symmetric_basis(system, x + ahead / np.linalg.norm(ahead / size), size)
+    basis = symmetric_basis(system, x + mode / np.linalg.norm(mode / size), size)
     if basis is None:
-        return Kind.TRANSCRITICAL, symmetry
+        return Kind.BRANCH_POINT
     units, start = size / size[:, None], basis.T @ (x / size)
     jacobian = basis.T @ (image.jacobian * units) @ basis
     error = np.abs(basis.T) @ (np.nan_to_num(image.error, posinf=0.0) * units) @ np.abs(basis)
     within = replace(image, state=start, jacobian=jacobian, error=error, velocity=None, normal=None)
     spec = spectrum(within)
-    mode, left = (each[:, spec.nearest(1.0)].real.astype(np.complex128) for each in (spec.right, spec.left))
+    right, left = (each[:, spec.nearest(1.0)].real.astype(np.complex128) for each in (spec.right, spec.left))
 
     def mapped(states: Array) -> Array:
         moved = returned_states(system, x + size * ((states - start) @ basis.T), orbit.section)
         return np.asarray(start + ((moved - x) / size) @ basis)
 
     try:
-        kind = kind_at_plus_one(normal_form(mapped, CriticalOrbit(start, within, 1.0 + 0.0j, mode, left)))
+        return kind_at_plus_one(normal_form(mapped, CriticalOrbit(start, within, 1.0 + 0.0j, right, left)))
     except (AnalysisError, SpentError, ValueError):
-        return Kind.BRANCH_POINT, symmetry
-    pitchfork = SymmetricKind.EQUIVARIANT_PITCHFORK
-    return kind, replace(symmetry, kind=pitchfork) if kind is Kind.PITCHFORK else symmetry
+        return Kind.BRANCH_POINT
 
 
 def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: SymmetricCrossing | None) -> Kind:

@@ -75,7 +75,7 @@ class Free:
 
 def node_count(jacobian: Array, sizes: Array) -> int:
     """Number of nodes with little growth of deviations in between, from the derivative of a return."""
-    growth = float(np.linalg.norm(jacobian * sizes / sizes[:, None], 2))
+    growth = float(np.linalg.svd(jacobian * sizes / sizes[:, None], compute_uv=False)[0])
     return int(np.clip(np.ceil(np.log(max(growth, 1.0)) / np.log(_GROWTH)), 1, _MOST))
 
 
@@ -109,7 +109,7 @@ def shot(
     )
     rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
     correction: Nodes | None = None
-    whole = True
+    whole, obstacle = True, ""
     cutoff = _CUTOFF if free is not None else _SINGULAR if len(start.states) == 1 else _FAMILY
     for _ in range(_EVALUATIONS if free is None else FEW_ROUNDS):
         if correction is None:
@@ -123,9 +123,14 @@ def shot(
                 break
             best = min(best, equations.residual)
             correction = equations.correction(equations, cutoff)
-        there = equations.after(correction, part)
+        try:
+            there = equations.after(correction, part)
+        except AnalysisError as error:
+            if free is not None:
+                raise
+            there, obstacle = None, f": {error.problem}"
         if there is not None and (free is not None or equations.is_nearer(there, correction, part, cutoff, best)):
-            equations, part, correction, whole = there, min(1.0, 2.0 * part), None, part == 1.0
+            equations, part, correction, whole, obstacle = there, min(1.0, 2.0 * part), None, part == 1.0, ""
         elif part > _SHORTEST:
             part *= 0.5
         elif cutoff == _SINGULAR:
@@ -134,7 +139,7 @@ def shot(
             correction = equations.correction(equations, cutoff)
         else:
             break
-    said = f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)"
+    said = f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size){obstacle}"
     raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
 
 
@@ -288,8 +293,8 @@ class _Equations:
         states = np.array([every[:n], *(total @ every for total in totals[:-1])])
         return Nodes(states, float(every[n]), float(every[n + 1]))
 
-    def after(self, correction: Nodes, part: float) -> _Equations | None:
-        """The equations after part of a correction, or less; None if the motion ends, for a given parameter."""
+    def after(self, correction: Nodes, part: float) -> _Equations:
+        """The equations after part of a correction, or less."""
         here = self.nodes
         part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
         frame = self.frame
@@ -302,12 +307,7 @@ class _Equations:
         there = Nodes(here.states + part * states, here.duration + part * time, here.value + part * value)
         # The states may just be growing.
         astray, reach = frame.astray and self.residual > _NEAR, frame.reach * (1.0 if frame.astray else _FARTHER)
-        try:
-            return _Equations(self._problem, there, frame._replace(reach=reach, astray=astray))
-        except AnalysisError:
-            if self._problem.free is not None:
-                raise
-            return None
+        return _Equations(self._problem, there, frame._replace(reach=reach, astray=astray))
 
     def is_nearer(self, there: _Equations, correction: Nodes, part: float, cutoff: float, best: float) -> bool:
         """True if other equations, after part of a correction, have half the residual, or a smaller correction by the

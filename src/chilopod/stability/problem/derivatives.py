@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -18,9 +19,16 @@ _OWN = __name__.partition(".")[0]
 _COMPARED: dict[int, object] = {}  # code by its identity: a family's functions share it
 
 
+def _code(function: Any) -> object:
+    """Code of a function, also of a partial one; the class of another callable object."""
+    while isinstance(function, functools.partial):
+        function = function.func
+    return getattr(function, "__code__", type(function))
+
+
 def is_new(function: Any) -> bool:
     """True if a user's function was not compared yet."""
-    return id(getattr(function, "__code__", type(function))) not in _COMPARED
+    return id(_code(function)) not in _COMPARED
 
 
 def compare(
@@ -31,7 +39,7 @@ def compare(
 
     Those to both sides differ by curvature, noise or a kink: a smaller error is not refused.
     """
-    code = getattr(function, "__code__", type(function))
+    code = _code(function)
     _COMPARED[id(code)] = code  # first, as the comparison calls the function
     if str(getattr(function, "__module__", "")).partition(".")[0] == _OWN:
         return

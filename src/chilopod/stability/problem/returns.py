@@ -12,7 +12,7 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
@@ -115,8 +115,7 @@ class ReturnMap(ReadOnlyArrays):
         """Projection along the motion onto the section, shape (n, n); the unit matrix without a section."""
         if self.velocity is None or self.normal is None:
             return read_only(np.eye(self.state.size))
-        along = np.outer(self.velocity, self.normal) / float(self.normal @ self.velocity)
-        return read_only(np.eye(self.state.size) - along)
+        return read_only(_projection(self.velocity, self.normal))
 
 
 _STATED = "dimension", "spatial_symmetry", "scale", "velocity"
@@ -218,18 +217,20 @@ def on_section(
 ) -> ReturnMap:
     """The return map from a return, to a section if given, and its derivative; ``error`` bounds that of the flow."""
     check_finite(state, matrix)
-    count = returns_per_period(system)
-    image = ReturnMap(state, matrix, error, count, count * time)
-    turned_across = None if system.symmetry is None else np.abs(system.symmetry)
+    count, wrong = returns_per_period(system), None if system.symmetry is None else np.abs(system.symmetry)
+    velocity = normal = None
     if section is not None and is_autonomous(system):
-        image = replace(image, velocity=_velocity(system, state), normal=section.normal)
-        across = np.abs(image.across)
-        turned_across = across if turned_across is None else across @ turned_across
-        image = replace(image, jacobian=image.across @ matrix)
-    if turned_across is None:
-        return image
-    error = turned_across @ error if isinstance(error, np.ndarray) else error * float(turned_across.sum(axis=1).max())
-    return replace(image, error=error)
+        velocity, normal = _velocity(system, state), section.normal
+        across = _projection(velocity, normal)
+        matrix, wrong = across @ matrix, np.abs(across) if wrong is None else np.abs(across) @ wrong
+    if wrong is not None:
+        error = wrong @ error if isinstance(error, np.ndarray) else error * float(wrong.sum(axis=1).max())
+    return ReturnMap(state, matrix, error, count, count * time, velocity, normal)
+
+
+def _projection(velocity: Array, normal: Array) -> Array:
+    """Projection along a motion onto the section with a normal, shape (n, n)."""
+    return np.asarray(np.eye(normal.size) - np.outer(velocity, normal) / float(normal @ velocity))
 
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:

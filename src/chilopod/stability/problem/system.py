@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
-from chilopod.flows.arguments import LARGEST, check_symmetry, checked_count, finite_array, positive
+from chilopod.flows.arguments import LARGEST, Claim, checked_count, finite_array, positive
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.events import Event
 from chilopod.flows.rhs import TOLERANCE, Method, RightHandSide
+from chilopod.flows.tracing.environment import Opaque, describe
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.problem.capabilities import spatial_symmetries
 
@@ -146,6 +148,8 @@ def _order(entries: bytes, n: int) -> int:
     return 0
 
 
+_MOST_STATED = 16
+_STATED: dict[Any, _Stated] = {}
 _TIMES = np.array([0.01, 0.023])  # in periods: just after its start, as a pulse may be given for one period alone
 
 
@@ -208,20 +212,67 @@ def from_rhs(
     NotAnalytic
         If the derivative of such a function needs differences.
     """
-    autonomous = period is None
-    length = positive("guess_period" if autonomous else "period", guess_period if autonomous else period)
-    given = RightHandSide(rhs, dimension, length, autonomous, args, events, switch_times, orbit, method, tolerance)
-    slopes, members = given.flows()
-    members |= {"scale": scale, "symmetry": symmetry, "spatial_symmetry": spatial_symmetry, "orbit": given.start}
-    if autonomous:
-        members |= {"velocity": lambda x: slopes(np.zeros(1), x[:, None])[:, 0], "guess_period": length}
-    system = PeriodicSystem(given.dimension, None if autonomous else length, **members)
-    if not autonomous:
-        check_symmetry("period", np.eye(given.dimension), length, slopes, _TIMES * length, given.base, np.inf)
-    if not given.events:  # a symmetry would also have to hold for these
-        if system.symmetry is not None:
-            shift = 0.0 if autonomous else length / system.symmetry_order
-            check_symmetry("symmetry", system.symmetry, shift, slopes, given.times, given.base, length)
-        for matrix in spatial_symmetries(system):
-            check_symmetry("spatial_symmetry", matrix, 0.0, slopes, given.times, given.base, length)
+    about: dict[str, Any] = {"switch_times": switch_times, "orbit": orbit, "method": method, "tolerance": tolerance}
+    symmetries: dict[str, Any] = {"symmetry": symmetry, "spatial_symmetry": spatial_symmetry, "scale": scale}
+    key = () if events else _key((dimension, period, guess_period, *about.values(), *symmetries.values()))
+    stated = _STATED.get(key) or _Stated(events, dimension, period, guess_period, about, symmetries)
+    if key:
+        if len(_STATED) >= _MOST_STATED:
+            _STATED.clear()
+        _STATED[key] = stated
+    slopes, members = stated.given.flows(rhs, args)
+    if period is None:
+        members["velocity"] = lambda x: slopes(np.zeros(1), x[:, None])[:, 0]
+    found, first = slopes(stated.times, stated.states), 0
+    for claim in stated.claims:
+        claim.check(found[:, first : first + claim.times.size])
+        first += claim.times.size
+    system = object.__new__(PeriodicSystem)  # all but its functions is checked
+    system.__dict__.update(stated.system.__dict__, **members)
     return system
+
+
+class _Stated:
+    """Checked properties of right-hand sides, the same throughout most families, whose members differ in ``args``."""
+
+    def __init__(
+        self,
+        events: Sequence[Event],
+        dimension: int,
+        period: float | None,
+        guess_period: float | None,
+        about: dict[str, Any],
+        symmetries: dict[str, Any],
+    ) -> None:
+        autonomous = period is None
+        length = positive("guess_period" if autonomous else "period", guess_period if autonomous else period)
+        given = RightHandSide(dimension, length, autonomous, events, **about)
+        own: dict[str, Any] = {"velocity": _unknown, "guess_period": length} if autonomous else {}
+        timed = None if autonomous else length
+        system = PeriodicSystem(given.dimension, timed, _unknown, orbit=given.start, **symmetries, **own)
+        one, base = np.eye(given.dimension), given.base
+        part, shift = (0.1234, 0.4444) if autonomous else (_TIMES, 1.0)
+        field = "timeless" if autonomous else "period"
+        claims = [Claim(field, one, shift * length, np.atleast_1d(part * length), base, np.inf)]
+        if not given.events:  # a symmetry would also have to hold for these
+            if system.symmetry is not None:
+                later = 0.0 if autonomous else length / system.symmetry_order
+                claims.append(Claim("symmetry", system.symmetry, later, given.times, base, length))
+            for matrix in spatial_symmetries(system):
+                claims.append(Claim("spatial_symmetry", matrix, 0.0, given.times, base, length))
+        self.given, self.system, self.claims = given, system, claims
+        self.times = np.concatenate([claim.times for claim in claims])
+        self.states = np.concatenate([claim.states for claim in claims], axis=1)
+
+
+def _unknown(*_: Any) -> Any:
+    """Stand-in for a function that a right-hand side gives."""
+
+
+def _key(options: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Options as a key; empty if there is none."""
+    floats: list[float] = []
+    try:
+        return describe(options, floats, {}), array("d", floats).tobytes()
+    except (Opaque, TypeError, ValueError):  # not hashable, an empty cell
+        return ()

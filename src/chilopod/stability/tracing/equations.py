@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -82,7 +83,7 @@ class Step(Generic[A, S]):
     missed: float = 0.0  # distance from its predicted end
     end: Any = None  # the anchor at the end; None for a part of a step
 
-    @property
+    @functools.cached_property
     def size(self) -> float:
         """Length along the first tangent."""
         return float(self.start.tangent @ self.moved)
@@ -190,7 +191,7 @@ class Equations(ABC, Generic[A, S, R]):
             wanted = anchor.values + widths * moved[parameters]
             if plane.edge is not None:
                 wanted[plane.edge[0]] = plane.edge[1]
-            values = np.clip(wanted, *self.box.T)
+            values = np.minimum(np.maximum(wanted, self.box[:, 0]), self.box[:, 1])
             # The corrector may leave the box on its way to a curve that turns back at an edge.
             strays = (wanted - values) / widths
             self._check_inside(strays, values, wanted, tolerances.STRAYS * float(np.linalg.norm(guess.moved)))

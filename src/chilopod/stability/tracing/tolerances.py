@@ -7,7 +7,9 @@ Lengths are in the units of a curve, or parts of a step; angles are cosines.
 SHORTEST = 1e-5
 GROWTH, FALL, RETRY = 1.5, 0.6, 0.5  # factors after few corrections, after many, and after a failure
 FEW, MANY = 4, 7  # corrections up to which the next step grows, and above which it is shorter
-EASY = 1e-5  # distance from the prediction, relative to the step, above which no step is longer than the longest
+# Distance from the prediction, relative to the step, above which no step is longer than the longest. The cubic through
+# both ends, for places in between, errs 64 times less: just within what these allow.
+EASY = 5e-4
 OVER = 2.0  # largest ratio of a step to an edge of the box to its planned length
 
 # Corrections.

@@ -17,14 +17,13 @@ import numpy as np
 from scipy.optimize import linprog
 
 from chilopod import stability, units
-from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import ALL, K1
+from chilopod.analysis.quantities import Measured, Onset
 from chilopod.analysis.straight_walk import first_loss
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.frozen import Array
 from chilopod.notebook import Shown, aligned
 from chilopod.planar import PlanarModel
-from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
@@ -34,7 +33,6 @@ from chilopod.tasks.identify.planar_fit import FREE, determined, jacobian, scale
 
 _STEP, _AGREE = 1e-3, 0.05  # of differences, in units of `scale_of`, and how well they agree with those of its double
 _CHANGES = {ALL: (0.5, 0.7, 1.5), "gait.stride": (0.6, 1.5), "gait.stance": (1.5,)}  # factors
-_ORBIT = 1e-10  # tolerance of the flow of curved walks
 
 
 @dataclass(frozen=True)
@@ -205,13 +203,5 @@ def _rate(spring: float, robot: Robot) -> Array:
 
 
 def _radius(spring: float, above: float) -> Callable[[Robot], Array]:
-    orbits: list[Array] = []  # the first is followed from the pitchfork, the others are beside it
-
-    def of(robot: Robot) -> Array:
-        if not orbits:
-            orbits.append(curved_walks(robot, K1, (spring, above)).orbit.values[-1])
-        model = FollowedModel(robot.with_value(K1, spring), _ORBIT, use_symmetry=False)
-        orbit = np.asarray(stability.find_orbit(model, orbits[0], with_error=False, settle=False))
-        return np.asarray(robot.axis_radius(walk_means([model], [orbit]).mean_angle))
-
-    return of
+    radius = Measured(Onset(K1, (spring, above), spring)).function("radius")
+    return lambda robot: np.array([radius(robot)])

@@ -10,13 +10,14 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from chilopod import units
 from chilopod.paper import printed
 from chilopod.paper.robot.spread import printed_number
 from chilopod.paper.robot.structures import TOLERANCE
 from chilopod.paper.robot.walks import SPRINGS
-from chilopod.paper.robot.why import SPRINGS as TRIED
+from chilopod.paper.robot.why import ORDERS, SEARCHED, cause
 from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
@@ -28,7 +29,6 @@ from chilopod.tasks.identify.valley import LEAST, Samples
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
 _STRUCTURES = (style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
-_BEYOND = 60.0  # N*mm/deg, where bars that have no end are cut off
 _MET = 1.0  # misfit at which the base series is met
 _FARTHEST = 60.0  # per cent, where predictions are cut off
 _MOST = 100.0  # chi squared, where bars are cut off
@@ -37,30 +37,30 @@ _SETS = (style.BLUE, *style.CURVES[1:])
 
 
 def why(data: xr.Dataset) -> Panel:
-    """The point with the planar model's assumptions taken back."""
-    limit, twin = data.attrs["limit"], data.attrs["twin"]
-    steps = [limit, *(float(value) for value in data.path.values)]
-    moves = np.diff([min(value, _BEYOND) if not np.isnan(value) else 0.0 for value in steps])
-    largest = [str(data.factor.values[i]) for i in np.argsort(-np.abs(moves))[:2]]
+    """Parts of the assumptions of the planar model in the end of the straight walk."""
+    inside = int((np.isfinite(data.end_high) & (data.end_low > 0.0)).sum())
+    parts = [
+        f"{about} {_times(share)} ({_times(low)} to {_times(high)}; ± {100.0 * error:.0f}\u00a0%)"
+        for about, share, low, high, error in zip(
+            data.about.values, data.share, data.share_low, data.share_high, data.share_error.values, strict=True
+        )
+    ]
     return Panel(
         name="robot-why",
         title=f"Why {printed.ONSET.value:g} and not {printed.CRITICAL_K1.value:g}: from the planar model to the robot",
         draw=lambda narrow: _draw_why(data, narrow),
-        alt="A: where curved walks set in, from the planar limit to the twin, one assumption after the other. B: each "
-        "of them alone, and the twin without each.",
+        alt="A: by how much each assumption of the planar model multiplies the spring at which the straight walk ends. "
+        "B: that spring in the planar limit with one assumption less, and of the twin with one more.",
         text=(
             "With stiff legs that lift their feet high and a floor that holds feet as a viscous one does, the twin is "
-            f"the planar model in another engine: it loses the straight walk at {_spring(data.attrs['vouched'], 4)}, "
-            f"the planar model at {_spring(data.attrs['exact'], 4)}. By the paper's method, a square-root fit to "
-            f"walks, curved ones set in at {_spring(limit)} there, and with everything at {_spring(twin)}.",
-            "In A the planar model's assumptions are taken back one after the other, from the top down: "
-            + "; ".join(
-                f"{name} ({about}): {_spring(float(value))}"
-                for name, about, value in zip(data.factor.values, data.about.values, data.path.values, strict=True)
-            )
-            + f". The largest steps are {listing(largest)}. They are no independent contributions: B shows each "
-            "alone in the planar limit and the twin without each. Where a bar runs out of the picture, walks "
-            f"curve at every spring tried, up to {max(TRIED):g}; where there is none, their bends determine no point.",
+            f"the planar model in another engine: its straight walk ends at {_spring(data.attrs['vouched'], 4)}, that "
+            f"of the planar model at {_spring(data.attrs['exact'], 4)}.",
+            f"{cause(data)}. Multipliers of bends of 1° tell where the straight walk ends, in the planar limit at "
+            f"{_spring(float(data.end[0]))}, in the twin at {_spring(float(data.end[-1]))}. "
+            f"{data.sizes['subset']} subsets of {data.sizes['factor']} assumptions were removed; {inside} of them end "
+            f"between {SEARCHED[0]:g} and {_spring(SEARCHED[1])}, the others count as the end that they are beyond. A "
+            f"is the mean over all orders in which assumptions are removed, with what {100.0 * ORDERS:.0f} % of the "
+            f"orders give (and the error by the multipliers): {listing(parts)}.",
             f"The viscous coefficient of the planar model's feet is {number(data.attrs['viscous'], 4)}\u00a0N·s/m. A "
             f"foot of the twin that does not slide creeps like one of {number(data.attrs['grip'], 2)}\u00a0N·s/m: it "
             "is held, and lets go only beyond the Coulomb limit.",
@@ -70,33 +70,34 @@ def why(data: xr.Dataset) -> Panel:
 
 
 def _spring(value: float, digits: int = 3) -> str:
-    if np.isinf(value):
-        return "beyond all springs tried"
-    return "none" if np.isnan(value) else f"{number(value, digits)}\u00a0{SPRING_UNIT}"
+    return f"{number(value, digits)}\u00a0{SPRING_UNIT}"
+
+
+def _times(value: float) -> str:
+    return f"×{number(float(value), 3)}" if np.isfinite(value) else "?"
 
 
 def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_WHY, narrow)
-    names = ["planar limit", *(f"+ {name}" for name in data.factor.values)]
-    values = np.array([data.attrs["limit"], *data.path.values])
-    colors = [style.GREY, *([style.BLUE] * (len(values) - 1))]
-    _bars(axes["A"], np.arange(len(values)), values, colors, 0.6)
-    axes["A"].set_yticks(range(len(names)), names)
-    axes["A"].set_title("A  One after the other")
     rows = np.arange(data.sizes["factor"])
+    span = np.abs(np.array([data.share_low, data.share_high]) - data.share.values)
+    axes["A"].errorbar(data.share, rows, xerr=np.nan_to_num(span), fmt="o", color=style.BLUE, capsize=3.0)
+    axes["A"].axvline(1.0, color=style.GREY, lw=1.2, linestyle=DASHED)
+    axes["A"].set(xscale="log", title="A  Part of each")
+    axes["A"].xaxis.set_major_locator(FixedLocator([0.5, 1.0, 2.0, 4.0]))
+    axes["A"].xaxis.set_major_formatter("×{x:g}")
+    axes["A"].xaxis.set_minor_locator(NullLocator())
     _bars(axes["B"], rows - 0.19, data.alone.values, [style.SKY] * len(rows), 0.34)
     _bars(axes["B"], rows + 0.19, data.without.values, [style.ORANGE] * len(rows), 0.34)
-    axes["B"].set_yticks(rows, [str(name) for name in data.factor.values])
     axes["B"].set_title("B  Each by itself")
+    for value, color, name in ((data.end[0], style.GREY, "planar limit"), (data.end[-1], style.VERMILLION, "twin")):
+        label = f"{name}, {number(float(value), 2)}"
+        axes["B"].axvline(value, color=color, lw=1.2, linestyle=DASHED, label=label)
     for letter in "AB":
-        for value, color, name in (
-            (data.attrs["exact"], style.GREY, "planar model"),
-            (printed.ONSET.value, style.VERMILLION, "robot, paper"),
-        ):
-            label = f"{name}, {number(value, 2)}"
-            axes[letter].axvline(value, color=color, lw=1.2, linestyle=DASHED, label=label)
+        axes[letter].set_yticks(rows, [str(name) for name in data.factor.values] if letter == "A" or narrow else [])
         axes[letter].invert_yaxis()
-        finish(axes[letter], "x", xlim=(0.0, _BEYOND), xlabel=f"point ({SPRING_UNIT})")
+    finish(axes["A"], "x", xlabel="part in the spring where the walk ends")
+    finish(axes["B"], "x", xlim=(0.0, SEARCHED[1]), xlabel=f"end of the straight walk ({SPRING_UNIT})")
     handles, labels = axes["B"].get_legend_handles_labels()
     handles += [Patch(color=style.SKY), Patch(color=style.ORANGE)]
     labels += ["planar limit and this alone", "twin without this"]
@@ -108,10 +109,10 @@ def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], h
     for row, value, color in zip(rows, values, colors, strict=True):
         if np.isnan(value):
             continue
-        axes.barh(row, min(value, _BEYOND), height, color=color)
-        text, at = "all springs tried" if np.isinf(value) else number(value, 3), (min(value, _BEYOND), row)
-        away, side, ink = (-4, "right", "white") if value > 0.8 * _BEYOND else (4, "left", style.BLACK)
-        style.note(axes, text, at, (away, 0), va="center", ha=side, color=ink)
+        axes.barh(row, value, height, color=color)
+        text = f"{value:g} or more" if value == SEARCHED[1] else number(float(value), 3)
+        away, side, ink = (-4, "right", "white") if value > 0.8 * SEARCHED[1] else (4, "left", style.BLACK)
+        style.note(axes, text, (value, row), (away, 0), va="center", ha=side, color=ink)
 
 
 def spread(data: xr.Dataset) -> Panel:

@@ -106,9 +106,10 @@ def different(found: RobotWalks, uniform: xr.Dataset) -> Panel:
         text=(
             "Nothing here was fitted. Where curved walks set in by the paper's method, in "
             f"{SPRING_UNIT}: {listing(said)}. "
-            f"Bars in C are what counts as within, {printed.ONSET.band.condition}; with all springs alike the body "
-            "undulates. At equal springs (A) a variant that sets in at a softer spring turns more widely by that "
-            f"alone; so the table compares radii at equal distance from each one's own onset {k(1)}* (B)."
+            f"Bars in C are what counts as within, {printed.ONSET.band.condition}; with all springs alike the straight "
+            "walk ends by an undulation or by a slow bend, from multipliers. At equal springs (A) a variant that sets "
+            f"in at a softer spring turns more widely by that alone; so the table compares radii at equal distance "
+            f"from each one's own onset {k(1)}* (B)."
             + (
                 " The paper does not say whether the leg tips swing as high with the shorter stride, or lower in "
                 "proportion: both are shown."
@@ -214,7 +215,7 @@ def _draw_onsets(axes: Axes, found: RobotWalks, uniform: xr.Dataset) -> None:
     found_at = [
         ("base series (fitted)", printed.ONSET, onset_point(found.base).value),
         *((title, printed.onset(name), onset_point(data).value) for title, (name, data) in _variants(found).items()),
-        ("all springs alike", printed.UNIFORM, uniform.attrs["critical_k"]),
+        *((f"alike, {name}", printed.UNIFORM, float(uniform.end.sel(mode=name))) for name in uniform.mode.values),
     ]
     shapes.draw_bands(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
     twin = [at for *_, at in found_at]

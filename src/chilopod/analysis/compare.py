@@ -1,0 +1,274 @@
+"""Comparison of two robots: differing numbers, and the part of each in the difference of onset, growth and radius.
+
+A quantity of the robots between the two, with some of the differing numbers taken from the first and the others from
+the second, gives for every number its effect alone on the first robot, its effect as the last change to the second, and
+the mean over all orders of the changes (Shapley 1953). The last ones add up to the whole difference.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chilopod import units
+from chilopod.analysis.parameters import numbers_read
+from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, known_names, unit_of
+from chilopod.errors import ChilopodError, ParameterError
+from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.notebook import Summary, finite, tornado
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+EXACT = 8
+"""Number of differences up to which all orders are computed; above it some orders are sampled."""
+
+_ORDERS = 64  # that are sampled
+_DERIVED = "body.yaw_inertia"
+
+
+@dataclass(frozen=True, eq=False)
+class Effects(ReadOnlyArrays):
+    """A quantity of two robots, SI, and the part of each differing number in the difference: alone, as the last change,
+    and in the mean over orders, with its standard error, zero for all orders; shape (numbers,) each. NaN where a robot
+    in between has no such quantity."""
+
+    first: float
+    second: float
+    alone: Array
+    last: Array
+    mean: Array
+    error: Array
+
+
+@dataclass(frozen=True, eq=False)
+class RobotComparison(Summary):
+    """Comparison of two robots.
+
+    Attributes
+    ----------
+    first, second, onset
+        Robots, and the number that bends them, with the value at which walks are studied.
+    paths
+        Paths of the differing numbers that the planar model reads; ``body.modules`` stands for the number of modules,
+        which repeats or drops the last springs.
+    others
+        Paths of other differing numbers, without an effect on planar walks.
+    effects
+        :class:`Effects` by the name of the quantity.
+    """
+
+    first: Robot
+    second: Robot
+    onset: Onset
+    paths: tuple[str, ...]
+    others: tuple[str, ...]
+    effects: dict[str, Effects]
+
+    def _shown(self, name: str, value: float) -> str:
+        unit = unit_of(name, self.first, self.onset)
+        return f"{units.from_si(value, unit):.4g} {unit}" if math.isfinite(value) else "none"
+
+    def as_json(self) -> dict[str, Any]:
+        """Differences and effects as plain numbers, SI; null where a robot has no such quantity."""
+
+        return {
+            "robots": [self.first.name, self.second.name],
+            "parameter": self.onset.parameter,
+            "differences_si": {
+                path: [robot.get(path) if _has(robot, path) else None for robot in (self.first, self.second)]
+                for path in self.paths
+            },
+            "without_effect": list(self.others),
+            "quantities": {
+                name: {
+                    "values_si": [finite(found.first), finite(found.second)],
+                    "effects_si": {
+                        path: dict(zip(("alone", "last", "mean", "error"), map(finite, row), strict=True))
+                        for path, row in zip(
+                            self.paths,
+                            np.array([found.alone, found.last, found.mean, found.error]).T.tolist(),
+                            strict=True,
+                        )
+                    },
+                }
+                for name, found in self.effects.items()
+            },
+        }
+
+    @property
+    def title(self) -> str:
+        """Both robots with their quantities."""
+        said = []
+        for name, found in self.effects.items():
+            said.append(f"{name} {self._shown(name, found.first)} and {self._shown(name, found.second)}")
+        return f"{self.first.name} and {self.second.name}: {', '.join(said)}"
+
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        tail = [f"no effect on planar walks: {', '.join(self.others)}"] * bool(self.others)
+        if not self.paths:
+            return [], [], ["no number that the planar model reads differs", *tail]
+        heads = [f"{name} ({unit_of(name, self.first, self.onset)})" for name in self.effects]
+        cells: list[Sequence[str]] = [("number", self.first.name, self.second.name, *heads)]
+        first = next(iter(self.effects.values()))
+        for at in np.argsort(-np.abs(np.nan_to_num(first.mean))).tolist():
+            row = [self.paths[at], *(_text(robot, self.paths[at]) for robot in (self.first, self.second))]
+            for name, found in self.effects.items():
+                mean, error = (
+                    units.from_si(float(x[at]), unit_of(name, self.first, self.onset))
+                    for x in (found.mean, found.error)
+                )
+                scatter = f" ± {error:.1g}" if error > 0.0 else ""
+                row.append((f"{mean:+.4g}{scatter}" if mean else "0") if math.isfinite(mean) else "unknown")
+            cells.append(row)
+        sampled = any(found.error.any() for found in self.effects.values())
+        orders = f"{_ORDERS} of the orders" if sampled else "all orders"
+        said = [f"parts are means over {orders} of the changes, and add up to the difference"]
+        if any(np.isnan(found.mean).any() for found in self.effects.values()):
+            said.append("unknown: a robot in between has no such quantity")
+        return [], cells, [*said, *tail]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the parts of the numbers in the difference of the first quantity, largest on top."""
+        name, found = next(iter(self.effects.items()))
+        unit = unit_of(name, self.first, self.onset)
+        parts = {path: units.from_si(float(each), unit) for path, each in zip(self.paths, found.mean, strict=True)}
+        return tornado(axes, parts, f"part in the difference of the {name} ({unit})", self.title.partition(":")[0])
+
+
+def compare(
+    first: Robot,
+    second: Robot,
+    onset: Onset = Onset(),  # noqa: B008 (frozen)
+    quantities: Sequence[str] = ("onset", "growth", "speed"),
+    seed: int = 0,
+    progress: Progress = silent,
+) -> RobotComparison:
+    """Compare two robots number by number.
+
+    Parameters
+    ----------
+    first, second, onset
+        Robots, and the number whose change bends them, with the value at which growth and radius are taken, by default
+        that of each robot; at one value that number is no difference.
+    quantities
+        Some of :data:`chilopod.analysis.quantities.QUANTITIES`.
+    seed
+        Seed of the orders that are sampled for more than :data:`EXACT` differences.
+    progress
+        Function of the fraction done (0 to 1) and a few words.
+    """
+    names, measured = known_names(quantities, QUANTITIES, "quantities"), Measured(onset)
+    one, other = _comparable(first, second)
+    paths, others = differences(one, other, onset)
+    effects = {}
+    for done, name in enumerate(names):
+        show = part(progress, done / len(names), (done + 1) / len(names), name)
+        effects[name] = _effects(one, other, paths, measured.function(name), np.random.default_rng(seed), show)
+    return RobotComparison(one, other, onset, paths, others, effects)
+
+
+def differences(first: Robot, second: Robot, onset: Onset) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Paths of differing numbers that the planar model reads, and those of others; without that of the onset where
+    walks are studied at one value of it."""
+    resized = first.body.modules != second.body.modules
+    alike = first.with_value("body.modules", second.body.modules) if resized else first
+    shared = [path for path in second.parameters() if path in alike.parameters() and path != "body.modules"]
+    replaced = [path for path in shared if onset.at is not None and onset.parameter in (path, path.partition("[")[0])]
+    differing = [path for path in shared if alike.get(path) != second.get(path) and path not in replaced]
+    read = {*numbers_read(alike), *numbers_read(second)}
+    paths = ["body.modules"] * resized + _grouped([path for path in differing if path in read], alike, second, onset)
+    only = sorted({*alike.parameters()} ^ {*second.parameters()})
+    return tuple(paths), tuple([path for path in differing if path not in read and path != _DERIVED] + only)
+
+
+def _grouped(paths: list[str], first: Robot, second: Robot, onset: Onset) -> list[str]:
+    """Paths with one for all springs or dampers that are alike in each robot."""
+    for stem in ("springs.stiffness", "springs.damping"):
+        group = f"{stem}[1:]" if onset.at is not None and onset.parameter == f"{stem}[0]" else stem
+        own = [path for path in paths if path.startswith(f"{stem}[")]
+        if len(own) > 1 and _has(first, group) and _has(second, group):
+            paths = [group if path == own[0] else path for path in paths if path not in own[1:]]
+    return paths
+
+
+def _has(robot: Robot, path: str) -> bool:
+    """True if a robot has a number; a group of springs has one if all are alike."""
+    try:
+        robot.get(path)
+    except ParameterError:
+        return False
+    return True
+
+
+def _comparable(first: Robot, second: Robot) -> tuple[Robot, Robot]:
+    """The robots, both with a yaw inertia of their own and without a twin if only one has either."""
+    if [each.twin is None for each in (first, second)].count(True) != 1 and (
+        (first.body.yaw_inertia is None) == (second.body.yaw_inertia is None)
+    ):
+        return first, second
+
+    def plain(robot: Robot) -> Robot:
+        origins = {path: text for path, text in robot.provenance.items() if not path.startswith("twin.")}
+        return robot.with_(twin=None, provenance=origins).with_value(_DERIVED, robot.module_yaw_inertia)
+
+    return plain(first), plain(second)
+
+
+def _text(robot: Robot, path: str) -> str:
+    """A number with its unit; nothing for a spring that a robot does not have."""
+    if not _has(robot, path):
+        return "-"
+    return units.format(robot.get(path), robot.unit_of(path), digits=5)
+
+
+def _effects(
+    first: Robot,
+    second: Robot,
+    paths: Sequence[str],
+    function: Callable[[Robot], float],
+    rng: np.random.Generator,
+    show: Progress,
+) -> Effects:
+    count, known = len(paths), dict[frozenset[int], float]()
+    most = 2**count if count <= EXACT else _ORDERS * count
+
+    def value(changed: frozenset[int]) -> float:
+        """The quantity of the first robot with some numbers of the second; NaN where it has none."""
+        if changed not in known:
+            try:
+                robot = first
+                for at in sorted(changed):
+                    if _has(robot, paths[at]):  # a spring of a module that is not there has no effect
+                        robot = robot.with_value(paths[at], second.get(paths[at]))
+                known[changed] = function(robot)
+            except ChilopodError:
+                known[changed] = math.nan
+            show(min(1.0, len(known) / most), f"{len(known)} robots")
+        return known[changed]
+
+    whole = frozenset(range(count))
+    ends = value(frozenset()), value(whole)
+    alone = [value(frozenset([at])) - ends[0] for at in whole]
+    last = [ends[1] - value(whole - {at}) for at in whole]
+    exact = count <= EXACT
+    orders = (
+        itertools.permutations(range(count)) if exact else (rng.permutation(count).tolist() for _ in range(_ORDERS))
+    )
+    parts = []
+    for order in orders:
+        so_far, row = frozenset[int](), np.zeros(count)
+        for at in order:
+            row[at] = value(so_far | {at}) - value(so_far)
+            so_far |= {at}
+        parts.append(row)
+    rows = np.array(parts)
+    scatter = np.zeros(count) if exact else rows.std(axis=0, ddof=1) / math.sqrt(len(rows))
+    return Effects(*ends, np.array(alone), np.array(last), rows.mean(axis=0), scatter)

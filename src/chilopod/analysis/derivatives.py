@@ -1,0 +1,53 @@
+"""Derivatives of smooth functions by extrapolated differences, each with an error.
+
+Central differences at halved steps h are extrapolated to h = 0 (Richardson 1911; Stoer and Bulirsch, *Introduction to
+Numerical Analysis*, section 3.5). The extrapolation allows all powers of h: second derivatives of a return map jump
+where two feet change their order of touching down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.frozen import Array
+
+LEVELS = 4
+"""Number of steps on each side."""
+
+_STEP = 1e-3  # largest step, relative to the size of the argument
+_SAFETY = 4.0  # factor on the last change of the extrapolation: switches within the steps slow its convergence
+_ROUND_OFF = 8.0 * 2.0**-52  # error of a value, relative to the values
+
+
+def derivative(function: Callable[[float], Array], at: float, size: float) -> tuple[Array, Array]:
+    """Derivative of a function of one number at a place, and its error; both have the shape of the function's values.
+
+    The ``size`` of the number sets the steps. Where the function raises a ParameterError on one side, as at the end of
+    a range, the derivative is that towards the other side. AnalysisError if it cannot be evaluated on both sides.
+    """
+    steps = _STEP * size * 0.5 ** np.arange(LEVELS)
+    here = np.asarray(function(at), dtype=np.float64)
+    found: list[Array] = []
+    for side in (1.0, -1.0):
+        try:
+            found.append(np.array([function(at + side * step) for step in steps.tolist()], dtype=np.float64))
+        except ParameterError:
+            found.append(np.empty(0))
+        except ChilopodError as failure:
+            raise AnalysisError(f"has no derivative at {at:.6g}: {failure}", field="robot") from None
+    above, below = found
+    if not (above.size or below.size):
+        raise AnalysisError(f"has no derivative at {at:.6g}: neighbouring values are out of range", field="robot")
+    widths = steps.reshape(-1, *[1] * here.ndim)
+    noise = _ROUND_OFF * np.maximum(np.abs(here), max(float(np.abs(each).max()) for each in found if each.size))
+    noise = noise * 2.0**LEVELS / steps[-1]
+    if above.size and below.size:
+        slopes = (above - below) / (2.0 * widths)
+    else:
+        slopes = (above - here) / widths if above.size else (here - below) / widths
+    for power in range(1, LEVELS):
+        before, slopes = slopes, (2.0**power * slopes[1:] - slopes[:-1]) / (2.0**power - 1.0)
+    return slopes[0], _SAFETY * np.abs(slopes[0] - before[-1]) + noise

@@ -1,0 +1,163 @@
+"""Maps of the straight walk over two numbers of a robot: where it holds, where it bends or undulates, and the curves
+between."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from chilopod.analysis.growth import FATES, Fate, growth_rates
+from chilopod.analysis.map_axes import Given, Plane
+from chilopod.analysis.map_curves import Search
+from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
+from chilopod.analysis.map_result import StabilityMap
+from chilopod.errors import ParameterError
+from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
+from chilopod.output import write_atomic
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+
+VERSION = 1
+"""Version of the file of growth rates, increased whenever their meaning or computation changes."""
+
+POINTS = 129
+"""Default number of values along an axis."""
+
+_MOST_POINTS = 4097
+_LONG = 600.0  # s: a map that takes longer is announced
+_CURVE_RATES = 5e3  # growth rates that take as long as a curve
+
+
+def map(
+    robot: Robot,
+    x: Given,
+    y: Given,
+    *,
+    points: int = POINTS,
+    folds: bool = False,
+    kept: str | Path | None = None,
+    remark: Callable[[str], None] = lambda sentence: None,
+    progress: Progress = silent,
+) -> StabilityMap:
+    """Map the stability of the straight walk over two numbers of a robot.
+
+    A coarse grid of growth rates is refined where neighbours differ in what becomes of a disturbance. Where they differ
+    in the number of unstable multipliers, the bifurcation between them is located, and continued as a curve through the
+    plane; cells on curves are refined, and the search repeats until every difference is on a curve.
+
+    Parameters
+    ----------
+    robot
+        Robot.
+    x, y
+        Path of a number, such as ``legs.forward_offset``, ``springs.stiffness[0]`` or, for a group,
+        ``springs.stiffness[1:]``; or ``speed``, at the same stride and duty factor, or ``modules``, of the same length
+        and mass each; then the lower and the upper end of the range, in SI units or as text with a unit.
+    points
+        Least number of values along an axis; of modules there are all whole numbers.
+    folds
+        True to follow the folds of the curved walks too, which takes a minute.
+    kept
+        File that holds growth rates while they are computed; a map that was cut off goes on from it.
+    remark
+        Function that receives a sentence if the map will take long.
+    progress
+        Function that receives the progress.
+
+    Raises
+    ------
+    ParameterError
+        If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number.
+    """
+    plane = Plane.over(robot, x, y)
+    if not 2 <= points <= _MOST_POINTS:
+        raise ParameterError("must be a number of values", field="points", value=points, allowed=f"2 to {_MOST_POINTS}")
+    file = None if kept is None else Path(kept)
+    grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
+    if file is not None:
+        _take(grid, file)
+    _announce(grid, remark)
+    wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
+    grid.refine(wanted, part(progress, 0.0, 0.5))
+    search = Search(plane, grid, folds, part(progress, 0.5, 1.0))
+    search.run()
+    while (search.cells() & ~wanted).any():
+        wanted |= search.cells()
+        grid.refine(wanted, part(progress, 0.5, 1.0))
+        search.run()
+    remarks = [*dict.fromkeys(search.remarks), *_invalid(grid)]
+    values = grid.values
+    whole = values[UNSTABLE].astype(np.int16), values[FATE].astype(np.int8)
+    columns = plane.x, plane.y, grid.x, grid.y, values[GROWTH], values[FREQUENCY], values[ERROR]
+    return StabilityMap(robot, *columns, *whole, grid.computed, tuple(search.curves), tuple(remarks))
+
+
+def _invalid(grid: Grid) -> list[str]:
+    """A sentence about the values that have no robot, with the reason at one of them."""
+    rows, columns = np.nonzero(grid.values[FATE] == FATES.index(Fate.INVALID))
+    reasons = [*grid.robots(grid.x[columns[:1]].tolist(), grid.y[rows[:1]].tolist())]
+    return [f"at {rows.size} of the values there is no robot: {why}" for why in reasons]
+
+
+def _announce(grid: Grid, remark: Callable[[str], None]) -> None:
+    """Say how long a map will take, if that is long, from the time of its corners."""
+    corners = grid.robots(grid.x[[0, -1]].tolist(), grid.y[[-1, 0]].tolist())
+    robots = [robot for robot in corners if isinstance(robot, Robot)]
+    growth_rates([grid.plane.robot.with_value("body.modules", 2)], 1)  # compiles
+    for _ in range(2):  # the first call prepares what all others share
+        begun = time.perf_counter()
+        growth_rates(robots, len(robots))
+        each = (time.perf_counter() - begun) / max(len(robots), 1)
+        if each > 1.0:
+            break
+    rows, columns = (size // step for size, step in zip(grid.computed.shape, grid.step, strict=True))
+    rates = rows * columns + 10 * sum(grid.computed.shape) + 2 * _CURVE_RATES - grid.computed.sum()
+    if each * rates > _LONG:
+        hours = each * rates / 3600.0
+        said = f"{hours:.2g} hours" if hours > 1.0 else f"{60.0 * hours:.2g} minutes"
+        remark(f"the map takes about {said}: {each:.2g} s a growth rate; fewer points or modules take less")
+
+
+# -- growth rates that are kept
+# -------------------------------------------------------------------------------------------------------------------
+
+
+def _key(plane: Plane) -> str:
+    # Numbers that vary do not matter, but then neither do their axes.
+    said = repr((VERSION, plane.robot.to_toml(), plane.x.path, plane.y.path))
+    return hashlib.sha256(said.encode()).hexdigest()
+
+
+def _keep(grid: Grid, file: Path) -> None:
+    rows, columns = np.nonzero(grid.computed)
+    found = {"x": grid.x[columns], "y": grid.y[rows]}
+    data = xr.Dataset(
+        {name: ("node", each) for name, each in found.items()}
+        | {"values": (("row", "node"), grid.values[:, rows, columns])}
+    )
+    data.attrs["key"] = _key(grid.plane)
+    write_atomic(file, sealed(netcdf(data)))
+
+
+def _take(grid: Grid, file: Path) -> None:
+    """Take growth rates from a file, if they are of this robot and these axes."""
+    try:
+        data = xr.load_dataset(io.BytesIO(unsealed(file)), engine="h5netcdf")
+    except (FileNotFoundError, UnsoundError):
+        return
+    if data.attrs.get("key") != _key(grid.plane):
+        return
+    at = [
+        np.searchsorted(axis, data[name].values).clip(max=axis.size - 1)
+        for axis, name in ((grid.x, "x"), (grid.y, "y"))
+    ]
+    same = (grid.x[at[0]] == data.x.values) & (grid.y[at[1]] == data.y.values)
+    columns, rows = (each[same] for each in at)
+    grid.values[:, rows, columns] = data["values"].values[:, same]
+    grid.computed[rows, columns] = True

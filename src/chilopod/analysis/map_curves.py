@@ -1,0 +1,232 @@
+"""Curves of bifurcations of the straight walk through a map: found where neighbours on its grid differ in the number of
+unstable multipliers, and continued from there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod import stability
+from chilopod.analysis.map_axes import Plane
+from chilopod.analysis.map_grid import Grid
+from chilopod.errors import ChilopodError
+from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.planar import PlanarModel
+from chilopod.planar.along import FollowedModel
+from chilopod.progress import Progress
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Curve2, Ending, Kind, Point2, follow2, switch2
+
+_LONGEST = 0.04  # step along a curve, in units of the box
+_MOST = 12  # curves
+_COVERED = 1.5  # cells between an edge of the grid and the curve that crosses it
+_FOLD_TOLERANCE = 1e-12  # of the flow; a fold is known to about its square root
+_FOLD_POINTS = 100
+_ENDS = Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS
+
+
+@dataclass(frozen=True, eq=False)
+class MapPoint(ReadOnlyArrays):
+    """A point where two conditions hold at once, such as the meeting of two curves: kind, values of both numbers in SI
+    units and bounds on their errors, shape (2,)."""
+
+    kind: CodimensionTwo
+    values: Array
+    error_bound: Array
+
+
+@dataclass(frozen=True, eq=False)
+class MapCurve(ReadOnlyArrays):
+    """Bifurcation points of the straight walk, or folds of the curved walks.
+
+    Attributes
+    ----------
+    kind
+        Kind of the bifurcation.
+    values, error_bound
+        Values of both numbers in SI units, and bounds on their errors, shape (points, 2).
+    coefficient
+        Coefficient of the normal form, negative where it is supercritical, NaN where it is not known, shape (points,).
+    special
+        Points of codimension two on it.
+    line
+        True if the points follow each other on a curve, False if each belongs to a number of modules.
+    """
+
+    kind: Kind
+    values: Array
+    error_bound: Array
+    coefficient: Array
+    special: tuple[MapPoint, ...] = ()
+    line: bool = True
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Two computed neighbours on the finest grid, at row j and column i and the next column (across) or row."""
+
+    j: int
+    i: int
+    across: bool
+
+
+@dataclass
+class Search:
+    """Search for the curves of a map.
+
+    Attributes
+    ----------
+    curves, remarks
+        Curves found so far; sentences about those that may be missing.
+    """
+
+    plane: Plane
+    grid: Grid
+    with_folds: bool
+    progress: Progress
+    curves: list[MapCurve] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    _tried: set[Edge] = field(default_factory=set)
+
+    def run(self) -> None:
+        """Find a curve for every two neighbours that differ; along an axis of modules, points."""
+        if self.plane.x.whole or self.plane.y.whole:
+            self._points()
+            return
+        left = self._uncovered(self._edges())
+        while left and len(self.curves) < _MOST:
+            edge = left[len(left) // 2]
+            self._tried.add(edge)
+            for point in self._located(edge):
+                self._follow(point, edge)
+            left = self._uncovered(left)
+
+    def cells(self) -> NDArray[np.bool_]:
+        """Cells of the finest grid through which the curves pass, shape (rows - 1, columns - 1)."""
+        rows, columns = self.grid.computed.shape
+        found = np.zeros((rows - 1, columns - 1), dtype=bool)
+        for curve in self.curves:
+            if curve.line and curve.kind is not Kind.FOLD:
+                for start, end in pairwise(self._indices(curve.values)):
+                    count = int(np.ceil(4.0 * np.abs(end - start).max())) + 1
+                    i, j = np.floor(start + (end - start) * np.linspace(0.0, 1.0, count)[:, None]).astype(int).T
+                    found[np.clip(j, 0, rows - 2), np.clip(i, 0, columns - 2)] = True
+        return found
+
+    def _points(self) -> None:
+        """Points at every number of modules, one set for each kind."""
+        by_kind: dict[Kind, list[tuple[Array, Array, float]]] = {}
+        for edge in self._edges():
+            if edge.across is self.plane.y.whole:  # along the other axis the number of modules changes
+                for point in self._located(edge):
+                    place, error = self._place(point, edge), np.array([point.error_bound, 0.0])
+                    coefficient = np.nan if point.coefficient is None else point.coefficient
+                    by_kind.setdefault(point.kind, []).append(
+                        (place, error if edge.across else error[::-1], coefficient)
+                    )
+        for kind, found in by_kind.items():
+            values, errors, coefficients = (np.array(column) for column in zip(*found, strict=True))
+            self.curves.append(MapCurve(kind, values, errors, coefficients, line=False))
+
+    def _edges(self) -> list[Edge]:
+        """Neighbours that differ in the number of unstable multipliers."""
+        count, found = self.grid.unstable, []
+        for across in (True, False):
+            one, other = (count[:, :-1], count[:, 1:]) if across else (count[:-1], count[1:])
+            places = np.argwhere((one >= 0) & (other >= 0) & (one != other))
+            found += [Edge(int(j), int(i), across) for j, i in places]
+        return found
+
+    def _uncovered(self, edges: list[Edge]) -> list[Edge]:
+        """Edges that no curve crosses, and that are not beside one that was tried in vain."""
+        lines = [self._indices(curve.values) for curve in self.curves if curve.kind is not Kind.FOLD]
+        tried = np.array([(edge.i, edge.j) for edge in self._tried]).reshape(-1, 2)
+        found = []
+        for edge in edges:
+            middle = np.array([edge.i + 0.5 * edge.across, edge.j + 0.5 * (not edge.across)])
+            near = [_distance(line, middle) for line in lines] + np.abs(tried - middle).max(axis=1).tolist()
+            if min(near, default=np.inf) > _COVERED:
+                found.append(edge)
+        return found
+
+    def _indices(self, values: Array) -> Array:
+        """Columns and rows, in fractions, of SI values of both numbers."""
+        ends = np.array([[axis[0], axis[-1]] for axis in (self.grid.x, self.grid.y)])
+        sizes = np.array([self.grid.x.size - 1, self.grid.y.size - 1])
+        return np.asarray((values - ends[:, 0]) / (ends[:, 1] - ends[:, 0]) * sizes)
+
+    def _place(self, point: BifurcationPoint, edge: Edge) -> Array:
+        x, y = self.grid.x[edge.i], self.grid.y[edge.j]
+        return np.array([point.value, y] if edge.across else [x, point.value])
+
+    def _located(self, edge: Edge) -> list[BifurcationPoint]:
+        values, first, fixed = (
+            (self.grid.x, edge.i, float(self.grid.y[edge.j]))
+            if edge.across
+            else (self.grid.y, edge.j, float(self.grid.x[edge.i]))
+        )
+
+        def family(value: float) -> PlanarModel:
+            return self.plane.model(value, fixed) if edge.across else self.plane.model(fixed, value)
+
+        try:
+            ends = float(values[first]), float(values[first + 1])
+            return list(stability.locate(family, ends, normal_form=self.plane.x.whole or self.plane.y.whole))
+        except ChilopodError as error:
+            self.remarks.append(f"a bifurcation between two neighbours is not located: {error}")
+            return []
+
+    def _follow(self, point: BifurcationPoint, edge: Edge) -> None:
+        """Continue a curve through a located point, and the folds that begin on it."""
+        box, turned = self._box(), not edge.across
+        second = float(self.grid.x[edge.i] if turned else self.grid.y[edge.j])
+        how: dict[str, Any] = {"between": box[::-1] if turned else box, "longest": _LONGEST, "progress": self._told}
+
+        def family(p: float, q: float) -> PlanarModel:
+            return self.plane.model(q, p) if turned else self.plane.model(p, q)
+
+        def loose(p: float, q: float) -> PlanarModel:
+            return FollowedModel(family(p, q).robot, _FOLD_TOLERANCE)
+
+        try:
+            curve = follow2(family, point, second=second, points=400, **how)
+            self._add(curve, turned)
+            for special in curve.special if self.with_folds else ():
+                if special.kind is CodimensionTwo.DEGENERATE_PITCHFORK:
+                    # Both starts are mirror images of one curve.
+                    start, *_ = switch2(family, special, how["between"])
+                    self._add(follow2(loose, start, points=_FOLD_POINTS, coefficients=False, **how), turned)
+        except ChilopodError as error:
+            self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
+
+    def _add(self, curve: Curve2, turned: bool) -> None:
+        """Keep a curve in the order of the map's axes, and say where it ends before it should."""
+        order = [1, 0] if turned else [0, 1]
+        special = tuple(MapPoint(each.kind, each.values[order], each.error_bound[order]) for each in curve.special)
+        coefficients = [np.nan if each.coefficient is None else each.coefficient for each in curve.points]
+        errors = np.array([each.error_bound for each in curve.points])[:, order]
+        self.curves.append(MapCurve(curve.kind, curve.values[:, order], errors, np.array(coefficients), special))
+        for ending in set(curve.endings) & set(_ENDS):
+            self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {ending.sentence}")
+
+    def _told(self, count: int, point: Point2) -> None:
+        self.progress(0.5, f"curve {len(self.curves) + 1}, {count} points")
+
+    def _box(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Part of the plane in which there are results."""
+        rows, columns = np.nonzero(self.grid.unstable >= 0)
+        x, y = self.grid.x[[columns.min(), columns.max()]], self.grid.y[[rows.min(), rows.max()]]
+        return (float(x[0]), float(x[1])), (float(y[0]), float(y[1]))
+
+
+def _distance(line: Array, point: Array) -> float:
+    """Distance of a point from a line of straight pieces."""
+    start, along = line[:-1], np.diff(line, axis=0)
+    if not len(start):
+        return float(np.linalg.norm(line - point, axis=1).min())
+    length = np.maximum((along**2).sum(1), 1e-300)
+    part = np.clip(((point - start) * along).sum(1) / length, 0.0, 1.0)
+    return float(np.linalg.norm(start + part[:, None] * along - point, axis=1).min())

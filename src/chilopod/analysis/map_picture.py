@@ -1,0 +1,110 @@
+"""Picture of a map: what becomes of a disturbance in colours, growth rates or frequencies, and the curves over it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chilopod import units
+from chilopod.analysis.growth import FATES, Fate
+from chilopod.errors import ParameterError, nearest_name
+from chilopod.frozen import Array
+from chilopod.notebook import axes_for
+from chilopod.stability import Kind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from chilopod.analysis.map_curves import MapCurve
+
+SHOWN = {
+    "kind": "What becomes of a disturbance",
+    "growth": "Growth rate of the leading disturbance (1/s)",
+    "frequency": "Frequency of the leading disturbance (rad/s)",
+}
+"""Titles of the pictures of a map."""
+
+# Okabe and Ito (2008), pale; what is stable is nearly white.
+_COLORS = {
+    Fate.STRAIGHT: "#f4f4f4",
+    Fate.BENDS: "#efb44d",
+    Fate.UNDULATES: "#7cc3e8",
+    Fate.ALTERNATES: "#d9a0c0",
+    Fate.UNDECIDED: "#ffffff",
+    Fate.INVALID: "#bdbdbd",
+    Fate.FAILED: "#6f6f6f",
+}
+_CURVES = {Kind.PITCHFORK: "#1a1a1a", Kind.NEIMARK_SACKER: "#0072b2", Kind.FOLD: "#d55e00"}
+_MARK = "#d55e00"
+
+
+def draw(found: Any, axes: Axes | None, show: str) -> Axes:
+    """Draw a :class:`StabilityMap` on axes of matplotlib or on new ones, see its ``plot``; without a legend."""
+    if show not in SHOWN:
+        allowed, nearest = ", ".join(SHOWN), nearest_name(show, SHOWN)
+        raise ParameterError("must be a picture", field="show", value=show, allowed=allowed, nearest=nearest)
+    axes = axes_for(axes)
+    x, y = found.x.shown(found.x_values), found.y.shown(found.y_values)
+    if show == "kind":
+        from matplotlib.colors import ListedColormap
+
+        look: dict[str, Any] = {"cmap": ListedColormap([_COLORS[fate] for fate in FATES]), "vmin": -0.5}
+        axes.pcolormesh(x, y, found.fate, shading="nearest", rasterized=True, vmax=len(FATES) - 0.5, **look)
+    else:
+        _field(axes, x, y, found, show)
+    for curve in found.curves:
+        _curve(axes, found, curve)
+    for point in found.special:
+        at = units.from_si(point.values[0], found.x.unit), units.from_si(point.values[1], found.y.unit)
+        axes.plot(*at, "D", color=_MARK, markeredgecolor="white", markersize=7, zorder=6, label="codimension two")
+    half = [np.array([-0.5, 0.5]) * axis.whole for axis in (found.x, found.y)]
+    axes.set(xlabel=found.x.label, ylabel=found.y.label, title=SHOWN[show])
+    axes.set(xlim=x[[0, -1]] + half[0], ylim=y[[0, -1]] + half[1])
+    return axes
+
+
+def keys(found: Any, axes: Axes) -> list[Any]:
+    """Handles of a legend: colours of the fates that occur, and each kind of line and point on the axes once."""
+    from matplotlib.patches import Patch
+
+    patches = [Patch(facecolor=_COLORS[fate], edgecolor="#767676", label=fate.label) for fate in found.shares]
+    handles, labels = axes.get_legend_handles_labels()
+    return [*patches, *dict(zip(labels, handles, strict=True)).values()]
+
+
+def _field(axes: Axes, x: Array, y: Array, found: Any, show: str) -> None:
+    """Colours of growth rates, red where a disturbance grows, or of the frequencies of oscillations, grey elsewhere."""
+    from matplotlib.colors import TwoSlopeNorm
+
+    axes.set_facecolor(_COLORS[Fate.INVALID])
+    values = found.growth if show == "growth" else np.where(found.frequency > 0.0, found.frequency, np.nan)
+    inside = values[np.isfinite(values)]
+    if not inside.size:
+        return
+    if show == "growth":
+        # One side far longer than the other would leave no colours for it.
+        most = float(np.percentile(np.abs(inside), 98.0)) or 1.0
+        look: dict[str, Any] = {"cmap": "RdBu_r", "norm": TwoSlopeNorm(0.0, -most, most)}
+    else:
+        look = {"cmap": "viridis"}
+    mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", rasterized=True, **look)
+    assert axes.figure is not None
+    axes.figure.colorbar(mesh, ax=axes, extend="both" if show == "growth" else "neither")
+
+
+def _curve(axes: Axes, found: Any, curve: MapCurve) -> None:
+    """A curve, dashed where it is subcritical."""
+    x, y = (axis.shown(curve.values[:, k]) for k, axis in enumerate((found.x, found.y)))
+    color, label = _CURVES.get(curve.kind, "#009e73"), curve.kind.label
+    if not curve.line:
+        axes.plot(x, y, "o", color=color, label=label)
+        return
+    hard = np.nan_to_num(curve.coefficient, nan=-1.0) > 0.0
+    for style, chosen, name in (("-", ~hard, label), ("--", hard, f"{label}, subcritical")):
+        if curve.kind is Kind.FOLD:
+            style, name = ":", "fold of curved walks"
+        # A piece between two points belongs to the side of its first one; at a turning point both sides meet.
+        shown = chosen | np.append(False, chosen[:-1])
+        if chosen.any():
+            axes.plot(np.where(shown, x, np.nan), y, style, color=color, label=name, linewidth=2.0)

@@ -1,0 +1,180 @@
+"""Result of a map of the straight walk over two numbers of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.analysis.growth import FATES, Fate
+from chilopod.analysis.map_axes import Axis
+from chilopod.analysis.map_curves import MapCurve, MapPoint
+from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.notebook import Summary
+from chilopod.robot import Robot
+from chilopod.stability.shown import bounded
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SAME = 3.0  # bounds within which two points of codimension two are one
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityMap(Summary, ReadOnlyArrays):
+    """Stability of the straight walk over two numbers of a robot.
+
+    Attributes
+    ----------
+    robot, x, y
+        Robot and both axes.
+    x_values, y_values
+        Values in SI units, shape (columns,) and (rows,).
+    growth, frequency, error, unstable, fate
+        Growth rate of the leading disturbance (1/s), its angular frequency (rad/s), and what becomes of it, as of
+        :class:`chilopod.analysis.growth.Growth`, shape (rows, columns). Within cells whose corners agree, growth and
+        frequency are interpolated.
+    computed
+        True where they were computed, shape (rows, columns).
+    curves
+        Curves of bifurcations.
+    remarks
+        Sentences about what may be missing, and why robots are invalid.
+    """
+
+    robot: Robot
+    x: Axis
+    y: Axis
+    x_values: Array
+    y_values: Array
+    growth: Array
+    frequency: Array
+    error: Array
+    unstable: NDArray[np.int16]
+    fate: NDArray[np.int8]
+    computed: NDArray[np.bool_]
+    curves: tuple[MapCurve, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def special(self) -> tuple[MapPoint, ...]:
+        """Points of codimension two, each once where two curves meet."""
+        found: list[MapPoint] = []
+        for point in (each for curve in self.curves for each in curve.special):
+            for other in found:
+                apart = np.abs(point.values - other.values)
+                if point.kind is other.kind and (apart <= _SAME * (point.error_bound + other.error_bound)).all():
+                    break
+            else:
+                found.append(point)
+        return tuple(found)
+
+    @property
+    def shares(self) -> dict[Fate, float]:
+        """Share of the nodes with each fate that occurs."""
+        counts = np.bincount(self.fate.ravel(), minlength=len(FATES)) / self.fate.size
+        return {fate: float(count) for fate, count in zip(FATES, counts, strict=True) if count}
+
+    @property
+    def title(self) -> str:
+        """Robot and axes in words."""
+        return f"{self.robot.name}: straight walk over {self.x.path} and {self.y.path}"
+
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        shares = ", ".join(f"{fate.label} {100.0 * share:.3g} %" for fate, share in self.shares.items())
+        rows, columns = self.fate.shape
+        above = [f"{shares} of {columns} x {rows} values, {self.computed.sum()} of which were computed"]
+        kinds = [curve.kind.label for curve in self.curves]
+        counts = [f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)]
+        above.append(f"curves: {', '.join(counts) or 'none'}")
+        table: list[Sequence[str]] = [("on them", self.x.label, self.y.label)]
+        for point in self.special:
+            axes = zip((self.x, self.y), point.values, point.error_bound, strict=True)
+            shown = (bounded(units.from_si(value, axis.unit), _size(axis, error)) for axis, value, error in axes)
+            table.append((point.kind.label, *shown))
+        return above, table if self.special else [], list(self.remarks)
+
+    def plot(self, axes: Axes | None = None, show: str = "kind") -> Axes:
+        """Draw the map on axes of matplotlib or on new ones.
+
+        Parameters
+        ----------
+        axes
+            Axes to draw on.
+        show
+            ``kind``: what becomes of a disturbance; ``growth``: growth rate; ``frequency``: frequency of undulations.
+        """
+        from chilopod.analysis.map_picture import draw, keys
+
+        axes = draw(self, axes, show)
+        axes.legend(handles=keys(self, axes), loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+        return axes
+
+    def as_json(self) -> dict[str, Any]:
+        """Curves, special points and shares as plain numbers, in SI units; the grid is that of :meth:`to_dataset`."""
+
+        def plain(found: MapCurve | MapPoint) -> dict[str, Any]:
+            errors = found.error_bound.tolist()
+            return {"kind": found.kind.label, "values_si": found.values.tolist(), "error_bounds_si": errors}
+
+        def coefficients(curve: MapCurve) -> dict[str, Any]:
+            return {"coefficients": [None if np.isnan(each) else each for each in curve.coefficient.tolist()]}
+
+        return {
+            "robot": self.robot.name,
+            "x": asdict(self.x),
+            "y": asdict(self.y),
+            "values": [self.x_values.size, self.y_values.size],
+            "computed": int(self.computed.sum()),
+            "shares": {fate.label: share for fate, share in self.shares.items()},
+            "curves": [{**plain(curve), **coefficients(curve), "line": curve.line} for curve in self.curves],
+            "special": [plain(point) for point in self.special],
+            "remarks": list(self.remarks),
+        }
+
+    def to_dataset(self) -> xr.Dataset:
+        """Dataset of the grid over (y, x), in the units of the axes and of the attributes, and of the curves over
+        ``point``, with the number of the curve."""
+        grid = ("y", "x")
+        meanings = ", ".join(f"{index}: {fate.label}" for index, fate in enumerate(FATES))
+        found: dict[str, Any] = {
+            "growth": (grid, self.growth, {"units": "1/s"}),
+            "frequency": (grid, self.frequency, {"units": "rad/s"}),
+            "growth_error": (grid, self.error, {"units": "1/s"}),
+            "unstable": (grid, self.unstable),
+            "fate": (grid, self.fate, {"meaning": meanings}),
+            "computed": (grid, self.computed),
+        }
+        none = np.empty((0, 2))
+        values = np.concatenate([none, *(curve.values for curve in self.curves)])
+        errors = np.concatenate([none, *(curve.error_bound for curve in self.curves)])
+        for column, (name, axis) in enumerate((("x", self.x), ("y", self.y))):
+            bounds = np.array([_size(axis, each) for each in errors[:, column]])
+            found[f"curve_{name}"] = (("point",), axis.shown(values[:, column]), {"units": axis.unit})
+            found[f"curve_{name}_error"] = (("point",), bounds, {"units": axis.unit})
+        sizes = [len(curve.values) for curve in self.curves]
+        kinds = np.array([curve.kind.label for curve in self.curves], dtype=object)
+        coefficients = np.concatenate([none[:, 0], *(curve.coefficient for curve in self.curves)])
+        found["curve_coefficient"] = (("point",), coefficients)
+        found["curve"] = (("point",), np.repeat(np.arange(len(sizes)), sizes))
+        found["curve_kind"] = (("point",), np.repeat(kinds, sizes))
+        coords = {
+            name: (name, axis.shown(values), {"units": axis.unit, "long_name": axis.path})
+            for name, axis, values in (("x", self.x, self.x_values), ("y", self.y, self.y_values))
+        }
+        attrs = {
+            "robot": self.robot.name,
+            "varied": f"{self.x.path}, {self.y.path}",
+            "robot_toml": self.robot.to_toml(),
+        }
+        return xr.Dataset(found, coords=coords, attrs=attrs)
+
+
+def _size(axis: Axis, error: float) -> float:
+    """An error in the unit of an axis."""
+    return abs(units.from_si(float(error), axis.unit))

@@ -1,0 +1,291 @@
+"""Numbers that describe how a robot walks straight and bends, as functions of its description."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import eig
+
+from chilopod import units
+from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, first_loss, interval_text
+from chilopod.errors import AnalysisError, ParameterError, nearest_name
+from chilopod.frozen import Array, ComplexArray
+from chilopod.planar import PlanarModel
+from chilopod.planar.along import WalkMeans, walk_means
+from chilopod.robot import Robot
+from chilopod.robot.parameters import place_of
+from chilopod.stability import find_orbit
+from chilopod.stability.problem.returns import ReturnMap, return_map
+
+_ROUNDS = 12  # of the secant method for a critical value
+_SETTLED = 1e-11  # relative change at which it ends
+_APART = 0.3  # relative change within which a critical value is looked for beside a known one
+_ALIKE = 1e-9  # relative difference of the moduli of a pair
+_BESIDE = 1e-3  # relative distance of its second value
+_CORRECTIONS = 20  # of a neighbouring curved walk
+_CORRECTED = 1e-12  # last correction of its state, SI
+_BENT = 1e-6  # least sum of its joint angles, rad
+
+QUANTITIES = {
+    "onset": "", "growth": "1/s", "frequency": "rad/s", "coefficient": "1/rad^2", "radius": "m", "speed": "m/s",
+    "settling": "s", "margin": "", "friction": "", "work": "J",
+}  # fmt: skip
+"""Units by the name of the quantity, a method of :class:`Measured`; that of the onset is that of its number."""
+
+
+class Mode(NamedTuple):
+    """Leading mode of the straight walk: the multiplier of largest modulus, its left and right eigenvectors with a
+    product of 1, shape (2N+1,), the duration of the return map, s, and the number of returns in a period."""
+
+    multiplier: complex
+    left: ComplexArray
+    right: ComplexArray
+    duration: float
+    returns: int
+
+    @property
+    def growth(self) -> float:
+        """Growth rate, 1/s."""
+        return float(np.log(abs(self.multiplier))) / self.duration
+
+    @property
+    def frequency(self) -> float:
+        """Frequency, rad/s; 0 for a real multiplier of half a period."""
+        turns = abs(np.angle(self.multiplier**self.returns))
+        return float(turns) / (self.returns * self.duration)
+
+
+def straight_return(robot: Robot, symmetric: bool = True) -> ReturnMap:
+    """Return map of the straight walk, over half a period where the gait has that symmetry."""
+    model = PlanarModel(robot, use_symmetry=symmetric)
+    return return_map(model, model.orbit, with_error=False)
+
+
+def leading_mode(robot: Robot, symmetric: bool = True) -> Mode:
+    """The leading mode of the straight walk; of a pair, that which turns forward over the whole period."""
+    image = straight_return(robot, symmetric)
+    values, left, right = eig(image.jacobian, left=True)
+    first = np.abs(values) >= np.abs(values).max() * (1.0 - _ALIKE)
+    at = int(np.where(first, (values**image.returns).imag, -np.inf).argmax())
+    bra, ket = left[:, at].conj(), right[:, at]
+    return Mode(complex(values[at]), bra / (bra @ ket), ket, image.duration, image.returns)
+
+
+@dataclass(frozen=True)
+class Onset:
+    """The number whose change bends the robot, the interval in which its critical value is searched, and the value at
+    which straight and curved walks are studied, by default that of each robot; SI.
+
+    Most robots bend as a spring falls. Where the straight walk is unstable at the upper end of the interval and stable
+    at the lower one, the robot bends as the number rises.
+    """
+
+    parameter: str = K1
+    between: tuple[float, float] = (stiffness(2.0), stiffness(75.0))
+    at: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.between).all() and self.between[0] < self.between[1]):
+            raise ParameterError("must rise and be finite", field="between", value=self.between)
+
+    def there(self, robot: Robot) -> Robot:
+        """The robot at the value at which walks are studied."""
+        return robot if self.at is None else robot.with_value(self.parameter, self.at)
+
+    def first(self, robot: Robot, normal_form: bool = False) -> WalkBifurcation:
+        """Bifurcation at which the straight walk loses stability as the number changes; AnalysisError if there is none,
+        or the walk is unstable at both ends of the interval."""
+        if not self.rises(robot):
+            return first_loss(robot, self.parameter, self.between, None, normal_form)
+        if leading_mode(robot.with_value(self.parameter, self.between[0])).growth > 0.0:
+            said = interval_text(robot, self.parameter, self.between)
+            raise AnalysisError("the straight walk is unstable at both ends", field=self.parameter, value=said)
+        return bifurcations(robot, self.parameter, self.between, normal_form)[0]
+
+    def beside(self, robot: Robot, value: float) -> float:
+        """Critical value in the interval near that of a similar robot, where the largest modulus of a multiplier is 1,
+        by the secant method; by :meth:`first` where that fails."""
+        k, other = value, value * (1.0 + _BESIDE)
+        growth, others = (leading_mode(robot.with_value(self.parameter, each)).growth for each in (k, other))
+        for _ in range(_ROUNDS):
+            step = growth * (k - other) / (growth - others) if growth != others else np.nan
+            k, other, others = k - step, k, growth
+            if not abs(k - value) <= _APART * abs(value):
+                break
+            if abs(step) <= _SETTLED * abs(k):
+                if self.between[0] <= k <= self.between[1]:
+                    return float(k)
+                break
+            growth = leading_mode(robot.with_value(self.parameter, k)).growth
+        return self.first(robot).point.value
+
+    def rises(self, robot: Robot) -> bool:
+        """True if the straight walk is unstable at the upper end of the interval."""
+        return leading_mode(robot.with_value(self.parameter, self.between[1])).growth > 0.0
+
+
+class Measured:
+    """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before.
+
+    Each of :data:`QUANTITIES` is a method of a robot, and raises AnalysisError where the robot has no such quantity.
+
+    Attributes
+    ----------
+    number
+        Number that bends the robots.
+    branches
+        Number of branches of curved walks that were followed so far, which take a second or more each.
+    """
+
+    def __init__(self, number: Onset) -> None:
+        self.number, self.branches = number, 0
+        self._critical: float | None = None
+        self._near: tuple[Array, Array] | None = None  # state of a curved walk, inverse of the slope of what it lacks
+        self._last: tuple[Robot, WalkMeans] | None = None
+
+    def function(self, name: str) -> Callable[[Robot], float]:
+        """A quantity as a function of a robot, at the value of the number at which walks are studied."""
+        return lambda robot: float(getattr(self, name)(self.number.there(robot)))
+
+    def onset(self, robot: Robot) -> float:
+        """Critical value of the number."""
+        known = self._critical
+        self._critical = self.number.first(robot).point.value if known is None else self.number.beside(robot, known)
+        return self._critical
+
+    def coefficient(self, robot: Robot) -> float:
+        """Cubic coefficient of the normal form at the onset, 1/rad^2."""
+        found = self.number.first(robot, normal_form=True).coefficient
+        if found is None:
+            raise AnalysisError("has no coefficient of a normal form", field="coefficient")
+        return found
+
+    def growth(self, robot: Robot) -> float:
+        """Growth rate of the leading mode of the straight walk, 1/s."""
+        return leading_mode(robot).growth
+
+    def frequency(self, robot: Robot) -> float:
+        """Frequency of that mode, rad/s."""
+        return leading_mode(robot).frequency
+
+    def radius(self, robot: Robot) -> float:
+        """Radius of the arc of the body on the curved walk, m, by the paper's measure."""
+        return float(robot.axis_radius(self._means(robot).mean_angle[0]))
+
+    def most_bent(self, robot: Robot) -> float:
+        """Largest angle of any joint within a period of the curved walk, rad."""
+        return float(self._means(robot).most_bent[0])
+
+    def speed(self, robot: Robot) -> float:
+        """Speed along the curved walk, or along the straight one if that is stable, m/s."""
+        return self._means(robot).drifts[0].speed if self.growth(robot) > 0.0 else robot.gait.speed
+
+    def settling(self, robot: Robot) -> float:
+        """Time in which a small disturbance of that walk falls to 1/e, s."""
+        growth = self.growth(robot)
+        if growth > 0.0:
+            model, state = PlanarModel(robot, use_symmetry=False), self.state(robot)
+            largest = np.abs(np.linalg.eigvals(model.flow(state, 0.0, model.period)[1])).max()
+            growth = float(np.log(largest)) / model.period
+        if growth >= 0.0:
+            raise AnalysisError("the walk does not settle", field="settling")
+        return -1.0 / growth
+
+    def margin(self, robot: Robot) -> float:
+        """Relative distance of the robot's number from the onset, negative if the robot bends."""
+        apart = robot.get(self.number.parameter) / self.onset(robot) - 1.0
+        return -apart if self.number.rises(robot) else apart
+
+    def friction(self, robot: Robot) -> float:
+        """Relative change of the onset by a relative change of the friction of the floor, of one per cent."""
+        value, path = self.onset(robot), "ground.friction"
+        ends = (robot.with_value(path, robot.get(path) * (1.0 + part)) for part in (0.01, -0.01))
+        more, less = (self.number.beside(each, value) for each in ends)
+        return (more - less) / (0.02 * value)
+
+    def work(self, robot: Robot) -> float:
+        """Work of an actuator that stiffens the spring of the curved walk, at its mean angles, to the onset, J; 0 if
+        the straight walk is stable."""
+        if not self.number.parameter.startswith("springs.stiffness"):
+            raise AnalysisError("must be a spring that bends the robot", field="work", value=self.number.parameter)
+        if self.growth(robot) <= 0.0:
+            return 0.0
+        joints = place_of(self.number.parameter).joints(robot.body.modules - 1)
+        angles = self._means(robot).mean_angle[0][joints]
+        return 0.5 * (self.onset(robot) - robot.get(self.number.parameter)) * float(angles @ angles)
+
+    def state(self, robot: Robot) -> Array:
+        """State at time 0 of the curved walk that leaves the straight one at the onset, shape (2N+1,); AnalysisError if
+        the robot walks straight, or the branch does not reach it."""
+        if self.growth(robot) <= 0.0:
+            path = self.number.parameter
+            value = units.format(robot.get(path), robot.unit_of(path), digits=4)
+            raise AnalysisError("the straight walk is stable there: nothing curves", field=path, value=value)
+        model = PlanarModel(robot, use_symmetry=False)
+        found = None if self._near is None else _corrected(model, *self._near)
+        if found is None:
+            state = self._followed(robot, model)
+            slope = model.flow(state, 0.0, model.period)[1] - np.eye(state.size)
+            found = state, np.asarray(np.linalg.inv(slope), dtype=np.float64)
+        self._near = found
+        return found[0]
+
+    def _means(self, robot: Robot) -> WalkMeans:
+        if self._last is None or self._last[0] != robot:
+            self._last = robot, walk_means([PlanarModel(robot)], self.state(robot)[None])
+        return self._last[1]
+
+    def _followed(self, robot: Robot, model: PlanarModel) -> Array:
+        """State of the curved walk from its branch."""
+        self.branches += 1
+        path, (low, high) = self.number.parameter, self.number.between
+        at = robot.get(path)
+        walks = curved_walks(robot, path, (low, at) if self.number.rises(robot) else (at, high))
+        if float(walks.parameter_si[-1]) != at:
+            raise AnalysisError(f"has no curved walk there: the branch ends, {walks.attrs['ending']}", field=path)
+        return np.asarray(find_orbit(model, walks.orbit.values[-1]).state)
+
+
+def _corrected(model: PlanarModel, state: Array, inverse: Array) -> tuple[Array, Array] | None:
+    """State of the curved walk near that of a similar robot, by Broyden's method, and the inverse there; None if that
+    fails, or ends at the straight walk or the mirror image."""
+    if state.size != model.dimension:
+        return None
+    joints = slice(3, model.modules + 2)
+    side = np.sign(state[joints].sum())
+    with np.errstate(all="ignore"):
+        try:
+            left = model.flow_states(state[None], 0.0, model.period)[0] - state
+            for _ in range(_CORRECTIONS):
+                step = -inverse @ left
+                state, before = state + step, left
+                if float(np.abs(step).max()) <= _CORRECTED:
+                    return (state, inverse) if side * state[joints].sum() > _BENT else None
+                left = model.flow_states(state[None], 0.0, model.period)[0] - state
+                change = inverse @ (left - before)
+                inverse = inverse + np.outer(step - change, step @ inverse) / (step @ change)
+        except AnalysisError:
+            return None
+    return None
+
+
+def unit_of(quantity: str, robot: Robot, onset: Onset) -> str:
+    """Unit in which a quantity is shown."""
+    return robot.unit_of(onset.parameter) if quantity == "onset" else QUANTITIES[quantity]
+
+
+def known_names(names: Sequence[str], known: Iterable[str], field: str) -> tuple[str, ...]:
+    """Names without repetitions; ParameterError with the nearest one if there is none, or one is not known."""
+    known = tuple(known)
+    if isinstance(names, str) or not names:
+        raise ParameterError("must be names", field=field, value=names, allowed=", ".join(known))
+    for name in names:
+        if name not in known:
+            near = nearest_name(name, known)
+            raise ParameterError("is not known", field=field, value=name, allowed=", ".join(known), nearest=near)
+    return tuple(dict.fromkeys(names))

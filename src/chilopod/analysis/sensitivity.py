@@ -1,0 +1,282 @@
+"""Derivatives of a robot's onset of bending, growth, radius and coefficient with respect to every number of its file.
+
+The return map H of the straight walk is computed exactly for any robot. With the left and right eigenvectors l, r of a
+multiplier nu, l r = 1, its derivative by a number p is nu' = l H' r (first-order perturbation; Kato, *Perturbation
+Theory for Linear Operators*, section II.2), where H' comes from extrapolated differences
+(:mod:`chilopod.analysis.derivatives`). The growth rate is log |nu| / tau, with the duration tau of a return. It is zero
+at the onset k, so dk/dp = -(growth by p) / (growth by k). The radius is that of the curved walk corrected at
+neighbouring robots; the coefficient is that of their normal forms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chilopod import units
+from chilopod.analysis.derivatives import derivative
+from chilopod.analysis.parameters import numbers_read
+from chilopod.analysis.quantities import (
+    QUANTITIES,
+    Measured,
+    Mode,
+    Onset,
+    known_names,
+    leading_mode,
+    straight_return,
+    unit_of,
+)
+from chilopod.errors import ParameterError, nearest_name
+from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.notebook import Summary, tornado
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DEFAULT = ("onset", "growth", "frequency")
+"""Quantities that take little time."""
+
+_RELATIVE = "onset", "radius"  # shown in % per %; the others may be near zero
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity(Summary, ReadOnlyArrays):
+    """Derivatives of quantities with respect to the numbers of a robot.
+
+    Attributes
+    ----------
+    robot, onset
+        Robot at the value of the onset's number that is studied, and that number.
+    paths, numbers
+        Paths of the numbers, and their values, SI, shape (numbers,).
+    quantities, values
+        Names of the quantities, of :data:`chilopod.analysis.quantities.QUANTITIES`, and their values, SI, shape
+        (quantities,).
+    derivatives, errors
+        Derivatives and estimates of their errors, SI, shape (quantities, numbers).
+    """
+
+    robot: Robot
+    onset: Onset
+    paths: tuple[str, ...]
+    numbers: Array
+    quantities: tuple[str, ...]
+    values: Array
+    derivatives: Array
+    errors: Array
+
+    def of(self, quantity: str) -> dict[str, float]:
+        """Derivatives of one quantity by the path of the number, SI."""
+        return dict(zip(self.paths, self.derivatives[self._row(quantity)].tolist(), strict=True))
+
+    def percent(self, quantity: str) -> dict[str, float]:
+        """Change of one quantity by 1 % of each number, by its path: in % of onset and radius, else in the unit of the
+        quantity; 0 for a number that is zero."""
+        row = self._row(quantity)
+        changes = self.derivatives[row] * self.numbers
+        changes = changes / self.values[row] if quantity in _RELATIVE else 0.01 * changes
+        return dict(zip(self.paths, changes.tolist(), strict=True))
+
+    def _row(self, quantity: str) -> int:
+        if quantity not in self.quantities:
+            near = nearest_name(quantity, self.quantities)
+            allowed = ", ".join(self.quantities)
+            raise ParameterError("is not computed", field="quantity", value=quantity, allowed=allowed, nearest=near)
+        return self.quantities.index(quantity)
+
+    def _unit(self, quantity: str) -> str:
+        return unit_of(quantity, self.robot, self.onset)
+
+    def as_json(self) -> dict[str, Any]:
+        """Values, derivatives and errors as plain numbers, SI, and the changes by 1 % of every number."""
+        found: dict[str, Any] = {"robot": self.robot.name, "parameter": self.onset.parameter}
+        own = dict(zip(self.paths, self.numbers.tolist(), strict=True)).get(self.onset.parameter)
+        found["at_si"] = own if self.onset.at is None else self.onset.at
+        found["numbers_si"] = dict(zip(self.paths, self.numbers.tolist(), strict=True))
+        for row, name in enumerate(self.quantities):
+            found[name] = {
+                "value_si": float(self.values[row]),
+                "derivatives_si": self.of(name),
+                "errors_si": dict(zip(self.paths, self.errors[row].tolist(), strict=True)),
+                "percent_per_percent" if name in _RELATIVE else "change_per_percent": self.percent(name),
+            }
+        return found
+
+    @property
+    def title(self) -> str:
+        """Robot, and the values of the quantities."""
+        shown = zip(self.quantities, self.values.tolist(), strict=True)
+        said = (f"{name} {units.format(value, self._unit(name), digits=5)}" for name, value in shown)
+        return f"{self.robot.name}: {', '.join(said)}"
+
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        known = np.abs(self.derivatives) > self.errors
+        names = [name for name, row in zip(self.quantities, known, strict=True) if row.any()]  # no frequency of a bend
+        rows = [self._row(name) for name in names]
+        heads = [f"{name} ({'%' if name in _RELATIVE else QUANTITIES[name]} per %)" for name in names]
+        columns = [self.percent(name) for name in names]
+        cells: list[Sequence[str]] = [("number", "value", *heads)]
+        below, without = [], []
+        largest = -np.abs(self.derivatives[rows[0]] * self.numbers) if rows else np.zeros(len(self.paths))
+        for at in np.argsort(largest, kind="stable").tolist():
+            path = self.paths[at]
+            unit = self.robot.unit_of(path)
+            if not known[:, at].any():
+                without.append(path)
+            elif self.numbers[at] == 0.0:
+                for name, row in zip(names, rows, strict=True):
+                    slope = units.from_si(self.derivatives[row, at], self._unit(name)) / units.from_si(1.0, unit)
+                    said = f"changes by {slope:+.4g} {self._unit(name)} for 1 {unit}"
+                    below += [f"{path} is 0: {name} {said}"] * bool(known[row, at])
+            else:
+                value = units.format(self.robot.get(path), unit, digits=5)
+                changes = [f"{c[path]:+.4g}" if known[row, at] else "0" for row, c in zip(rows, columns, strict=True)]
+                cells.append((path, value, *changes))
+        below += [f"no effect to first order: {', '.join(without)}"] * bool(without)
+        return [], cells, below
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the changes of the first quantity by 1 % of each number, largest on top."""
+        name = self.quantities[0]
+        known = np.abs(self.derivatives[0] * self.numbers) > self.errors[0] * np.abs(self.numbers)
+        changes = {path: each for (path, each), sure in zip(self.percent(name).items(), known, strict=True) if sure}
+        unit = "%" if name in _RELATIVE else QUANTITIES[name]
+        return tornado(axes, changes, f"change of the {name} by 1 % of a number ({unit})", self.robot.name)
+
+
+def sensitivity(
+    robot: Robot,
+    onset: Onset = Onset(),  # noqa: B008 (frozen)
+    quantities: Sequence[str] = DEFAULT,
+    paths: Sequence[str] | None = None,
+    progress: Progress = silent,
+) -> Sensitivity:
+    """Derivatives of quantities with respect to numbers of a robot.
+
+    Parameters
+    ----------
+    robot, onset
+        Robot, and the number whose fall bends it, with the value at which growth, frequency and radius are taken.
+    quantities
+        Some of :data:`chilopod.analysis.quantities.QUANTITIES`. The coefficient takes a hundred normal forms, the
+        radius a branch of curved walks.
+    paths
+        Numbers, by default all that the planar model reads.
+    progress
+        Function of the fraction done (0 to 1) and a few words.
+
+    Raises
+    ------
+    AnalysisError
+        If a quantity does not exist, as the radius of a robot that walks straight, or has no derivative.
+    ParameterError
+        If a quantity or a number is not known.
+    """
+    wanted = known_names(quantities, QUANTITIES, "quantities")
+    robot = onset.there(robot)
+    read = numbers_read(robot)
+    for path in paths or ():
+        if path not in read:
+            near = nearest_name(path, read)
+            said = "must be a number that the planar model reads"
+            if path == "body.yaw_inertia":
+                said = "follows from other numbers of this robot, which has none of its own"
+            raise ParameterError(said, field="paths", value=path, allowed=", ".join(read), nearest=near)
+    paths = tuple(dict.fromkeys(paths or read))
+    found: dict[str, _Row] = {}
+    for name in wanted:
+        if name not in found:
+            rows = _EXACT.get(name, partial(_differentiated, name))
+            found |= rows(robot, onset, paths, progress)
+    values, slopes, errors = (np.array([found[name][i] for name in wanted]) for i in range(3))
+    numbers = np.array([robot.get(path) for path in paths])
+    return Sensitivity(robot, onset, paths, numbers, wanted, values, slopes, errors)
+
+
+_Row = tuple[float, list[float], list[float]]
+"""Value of a quantity, its derivatives and their errors."""
+
+
+def size_of(robot: Robot, path: str) -> float:
+    """Size of a number for steps, SI: its own, or a typical one if it is zero."""
+    typical = {
+        "springs.damping": max(robot.springs.stiffness) * robot.gait.period,
+        "legs.forward_offset": robot.module_length,
+    }
+    return abs(robot.get(path)) or typical.get(path.partition("[")[0], 1.0)
+
+
+class _Leading:
+    """Leading mode of a robot, and derivatives of its exponent."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.mode = cache(partial(leading_mode, robot))
+
+    def slope(self, path: str, like: str | None = None) -> tuple[complex, float]:
+        """Derivative of the exponent of the leading mode by a number, and its error, by the return map that serves for
+        a change of another number."""
+        # A gait with another phase between the sides has no symmetry of half a period.
+        mode: Mode = self.mode((like or path) != "gait.side_phase")
+
+        def projected(value: float) -> Array:
+            image = straight_return(self._robot.with_value(path, value), mode.returns == 2)
+            product = mode.left @ image.jacobian @ mode.right / mode.multiplier  # 1 at the robot itself
+            return np.array([product.real, product.imag, image.duration])
+
+        (real, imaginary, longer), errors = derivative(projected, self._robot.get(path), size_of(self._robot, path))
+        exponent = complex(mode.growth, mode.frequency)
+        slope = (complex(real, imaginary) - exponent * longer) / mode.duration
+        return slope, float(np.hypot(errors[0], errors[1]) + abs(exponent) * errors[2]) / mode.duration
+
+
+def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
+    value = onset.first(robot).point.value
+    of = _Leading(robot.with_value(onset.parameter, value))
+    slopes, errors = [], []
+    for done, path in enumerate(paths):
+        show(done / len(paths), f"onset by {path}")
+        slope, error = 0.0, 0.0
+        if onset.parameter not in (path, path.partition("[")[0]):  # else it is replaced
+            (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, path), of.slope(path)
+            slope = -by_path.real / by_onset.real
+            error = (off + abs(slope) * uncertain) / abs(by_onset.real)
+        slopes.append(slope)
+        errors.append(error)
+    return {"onset": (value, slopes, errors)}
+
+
+def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
+    of = _Leading(onset.there(robot))
+    mode: Mode = of.mode(True)
+    found = []
+    for done, path in enumerate(paths):
+        show(done / len(paths), f"growth by {path}")
+        found.append(of.slope(path))
+    errors, turns = [error for _, error in found], mode.frequency > 0.0
+    return {
+        "growth": (mode.growth, [slope.real for slope, _ in found], errors),
+        "frequency": (mode.frequency, [turns * slope.imag for slope, _ in found], [turns * each for each in errors]),
+    }
+
+
+def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
+    function, found = getattr(Measured(onset), name), []
+    value = function(robot)
+    for done, path in enumerate(paths):
+        show(done / len(paths), f"{name} by {path}")
+
+        def at(value: float, path: str = path) -> Array:
+            return np.array(function(robot.with_value(path, value)))
+
+        found.append(derivative(at, robot.get(path), size_of(robot, path)))
+    return {name: (value, [float(slope) for slope, _ in found], [float(error) for _, error in found])}
+
+
+_EXACT = {"onset": _onset, "growth": _growth, "frequency": _growth}

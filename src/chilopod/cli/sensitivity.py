@@ -1,0 +1,137 @@
+"""``chilopod sensitivity``: effect of each number of a robot on where it bends, and its spread with tolerances."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chilopod.cli.options import (
+    BetweenOption,
+    OutOption,
+    ParameterOption,
+    RobotOptions,
+    deliver_result,
+    free_result,
+    interval,
+    reading,
+    with_options,
+)
+from chilopod.cli.progress import progress_bar
+from chilopod.errors import ParameterError
+
+if TYPE_CHECKING:
+    from chilopod.notebook import Summary
+    from chilopod.robot import Robot
+
+AtOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="VALUE",
+        help="Value of this number at which growth, frequency and radius are taken; by default that of the robot.",
+    ),
+]
+
+
+@with_options
+def sensitivity(
+    options: RobotOptions,
+    parameter: ParameterOption = "springs.stiffness[0]",
+    between: BetweenOption = ("2 N*mm/deg", "75 N*mm/deg"),
+    at: AtOption = None,
+    show: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Quantities, with commas: onset, growth, frequency (these by default), coefficient (takes a hundred "
+            "normal forms), radius and speed (of the curved walk), settling, margin, friction, work.",
+        ),
+    ] = None,
+    uncertain: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SHARE|PATH=TOLERANCE",
+            help='Tolerance of all numbers, such as "10%", or of one, such as "body.mass=0.3 kg" or '
+            '"ground.friction=20%"; may be repeated.',
+        ),
+    ] = None,
+    samples: Annotated[int, typer.Option(metavar="N", min=16, help="Samples with --uncertain, a power of two.")] = 128,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the samples.")] = 0,
+    out: OutOption = None,
+) -> None:
+    """Effect of each number of a robot on where it bends: derivatives with respect to every number of its file.
+
+    The onset is the value of the number at which the straight walk begins to bend, as it falls or as it rises. Growth
+    and frequency are those of the leading mode of the straight walk. With --uncertain it prints the spread of the onset
+    where numbers are uniform within tolerances, and the share of each number in it.
+
+    Example: chilopod sensitivity aoi2022-planar --uncertain 10%
+    """
+    described = options.described
+    limits = interval(described, parameter, between)
+    with reading("at"):
+        studied = None if at is None else described.override(parameter, at).get(parameter)
+    tolerances = _tolerances(described, parameter, uncertain or [])
+    for option, given in (("show", show), ("at", at)):
+        if tolerances and given:
+            raise ParameterError("goes without --uncertain only", field=option, value=given, allowed="the onset alone")
+    name = "uncertainty" if tolerances else "sensitivity"
+    free_result(name, out, options.force)
+    from chilopod import analysis
+    from chilopod.analysis.quantities import QUANTITIES, known_names
+    from chilopod.analysis.sensitivity import DEFAULT
+
+    with reading("show"):
+        names = known_names(show.split(",") if show else DEFAULT, QUANTITIES, "show")
+    found: Summary
+    onset = analysis.Onset(parameter, limits, studied)
+    with progress_bar(name) as bar:
+        progress = partial(bar, name)
+        if tolerances:
+            found = analysis.uncertainty(described, tolerances, onset, samples, seed, progress)
+        else:
+            found = analysis.sensitivity(described, onset, names, progress=progress)
+    deliver_result(found, name, options, out)
+
+
+def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, float]:
+    """Tolerances by path, SI; a share of all numbers leaves out those that are zero and that which varies."""
+    from chilopod import units
+    from chilopod.analysis.parameters import check_parameter, numbers_read
+
+    found: dict[str, float] = {}
+    others = [path for path in numbers_read(robot) if parameter not in (path, path.partition("[")[0])]
+    for text in given:
+        path, equals, tolerance = (each.strip() for each in text.partition("="))
+        with reading("uncertain"):
+            share = _share(tolerance if equals else path)
+            if share is None and not equals:
+                said = "must be a share, or a number with its tolerance"
+                raise ParameterError(said, value=text, allowed="10%, body.mass=0.3 kg")
+            if share is not None and not 0.0 < share < math.inf:
+                raise ParameterError("must be positive and finite", value=text)
+            if equals:
+                check_parameter(robot, path)
+                paths = [each for each in others if each.partition("[")[0] == path] or [path]
+            else:
+                paths = [each for each in others if robot.get(each) and each not in found]
+            for each in paths:
+                if share is None:
+                    found[each] = units.parse(tolerance, robot.si_unit_of(each))
+                elif robot.get(each) == 0.0:
+                    raise ParameterError(f"{each} is 0, which has no share", value=text, allowed=f"{each}=VALUE")
+                else:
+                    found[each] = share * abs(robot.get(each))
+    return found
+
+
+def _share(text: str) -> float | None:
+    """Number before a percent sign, as a share; None without one."""
+    if not text.endswith("%"):
+        return None
+    try:
+        return 0.01 * float(text[:-1])
+    except ValueError:
+        return None

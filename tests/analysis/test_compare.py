@@ -1,0 +1,96 @@
+"""Two robots, number by number."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from chilopod.analysis import Onset, bifurcations, compare
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.quantities import leading_mode
+from chilopod.errors import ParameterError
+from chilopod.robot import load_robot
+
+ROBOT = load_robot("aoi2022-planar")
+WIDE = stiffness(5.0), stiffness(75.0)
+
+
+def onset(robot):
+    return bifurcations(robot, K1, WIDE, normal_form=False)[-1].point.value
+
+
+def test_parts_are_means_over_all_orders():
+    changes = ["body.mass=10 kg", "legs.half_width=6 cm", "springs.stiffness[1]=30 N*mm/deg"]
+    found = compare(ROBOT, ROBOT.set_from_text(changes), quantities=("onset",))
+    assert found.paths == ("body.mass", "springs.stiffness[1]", "legs.half_width")
+    by_path = dict(zip(found.paths, range(3), strict=True))
+    parts = np.zeros(3)
+    for order in itertools.permutations(changes):
+        for count, change in enumerate(order):
+            step = onset(ROBOT.set_from_text(order[: count + 1])) - onset(ROBOT.set_from_text(order[:count]))
+            parts[by_path[change.partition("=")[0]]] += step / 6.0
+    effects = found.effects["onset"]
+    assert effects.mean == pytest.approx(parts, rel=1e-7)
+    assert effects.mean.sum() == pytest.approx(effects.second - effects.first, rel=1e-9)
+    alone = onset(ROBOT.set_from_text(changes[:1])) - onset(ROBOT)
+    assert effects.alone[by_path["body.mass"]] == pytest.approx(alone, rel=1e-7)
+    last = onset(ROBOT.set_from_text(changes)) - onset(ROBOT.set_from_text(changes[1:]))
+    assert effects.last[by_path["body.mass"]] == pytest.approx(last, rel=1e-7)
+    assert not effects.error.any()
+
+
+def test_many_differences_are_changed_in_sampled_orders():
+    paths = ["body.mass", "body.length", "legs.half_width", "legs.forward_offset", "gait.stride", "ground.friction"]
+    paths += [f"springs.stiffness[{joint}]" for joint in range(1, 5)]
+    other = ROBOT
+    for count, path in enumerate(paths):
+        other = other.with_value(path, (1.0 + 0.002 * count) * ROBOT.get(path) + 1e-4)
+    found = compare(ROBOT, other, quantities=("growth",))
+    effects = found.effects["growth"]
+    assert len(found.paths) == 10
+    assert effects.mean.sum() == pytest.approx(effects.second - effects.first, rel=1e-9)
+    # Small changes hardly depend on their order.
+    assert effects.mean == pytest.approx(effects.alone, rel=0.1, abs=1e-4)
+    assert "64 of the orders" in found.lines()[-1]
+
+
+def test_planar_numbers_of_a_robot_with_a_twin_are_compared():
+    found = compare(ROBOT, load_robot("aoi2022"), quantities=("onset",))
+    assert set(found.paths) == {"legs.forward_offset", "legs.half_width", "ground.friction", "springs.damping"}
+    assert found.effects["onset"].second == pytest.approx(onset(load_robot("aoi2022")), rel=1e-9)
+    twins = compare(load_robot("aoi2022"), load_robot("aoi2022").with_value("twin.timestep", 1e-3))
+    assert (twins.paths, twins.others) == ((), ("twin.timestep",))
+    assert "no number that the planar model reads differs" in twins.lines()[1]
+
+
+def test_other_numbers_of_modules_and_springs_that_are_not_there():
+    longer = ROBOT.set_from_text(["body.modules=8", "springs.stiffness[6]=30 N*mm/deg"])
+    found = compare(ROBOT, longer, quantities=("onset", "speed"))
+    assert found.paths == ("body.modules", "springs.stiffness[6]")
+    assert found.effects["onset"].mean.sum() == pytest.approx(onset(longer) - onset(ROBOT), rel=1e-9)
+    assert abs(found.effects["onset"].alone[1]) < 1e-12
+    assert not found.effects["speed"].mean.any()
+    assert found.as_json()["differences_si"]["springs.stiffness[6]"] == [None, stiffness(30.0)]
+    assert [row for row in found.lines() if row.split()[:2] == ["springs.stiffness[6]", "-"]]
+
+
+def test_what_a_robot_in_between_has_not_is_unknown():
+    found = compare(ROBOT, ROBOT.with_value("body.mass", 9.0), Onset(at=stiffness(20.0)), ("radius",))
+    assert np.isnan(found.effects["radius"].mean).all()
+    assert found.as_json()["quantities"]["radius"]["values_si"] == [None, None]
+    assert any("unknown" in line for line in found.lines())
+    springs = Onset(between=(stiffness(20.0), stiffness(75.0)))
+    lines = compare(ROBOT, ROBOT.with_value("body.mass", 9.0), springs, ("onset", "growth")).lines()
+    assert "onset none and none, growth -0.235 1/s" in lines[0]
+    with pytest.raises(ParameterError, match="radius"):
+        compare(ROBOT, ROBOT, quantities=("radios",))
+
+
+def test_each_robot_is_compared_at_its_own_spring():
+    other = ROBOT.with_value(K1, stiffness(20.0))
+    found = compare(ROBOT, other, quantities=("growth", "onset"))
+    assert found.paths == (K1,)
+    assert found.effects["growth"].second == leading_mode(other).growth
+    assert found.effects["growth"].mean[0] > 0.05
+    assert found.effects["onset"].mean[0] == pytest.approx(0.0, abs=1e-10)
+    assert compare(ROBOT, other, Onset(at=stiffness(20.0)), ("growth",)).paths == ()

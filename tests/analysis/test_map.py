@@ -1,0 +1,244 @@
+"""Maps of the straight walk over two numbers of a robot."""
+
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.optimize import root
+
+from chilopod.analysis import bifurcations, map_curves, map_grid, straight_walk
+from chilopod.analysis.growth import FATES, Fate
+from chilopod.analysis.map import map as mapped
+from chilopod.analysis.map_axes import Plane
+from chilopod.analysis.map_curves import Search
+from chilopod.analysis.map_grid import Grid
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.errors import AnalysisError, ChilopodError
+from chilopod.progress import silent
+from chilopod.robot import load_robot
+from chilopod.stability import CodimensionTwo, Kind
+
+from peer_model import N_MM_PER_DEG, flow, mirror, with_springs
+
+ROBOT = load_robot("aoi2022-planar")
+OTHERS = "springs.stiffness[1:]"
+X, Y = (K1, "2.05 N*mm/deg", "2.45 N*mm/deg"), (OTHERS, "6.5 N*mm/deg", "6.9 N*mm/deg")
+OFFSET = ("legs.forward_offset", "0 mm", "60 mm")
+
+
+@pytest.fixture(scope="module")
+def found():
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(map_curves, "_LONGEST", 0.1)  # the curves are nearly straight here
+        return mapped(ROBOT, X, Y, points=49)
+
+
+def test_curves_are_where_lines_across_them_change(found):
+    assert [curve.kind for curve in found.curves].count(Kind.PITCHFORK) == 1
+    assert {curve.kind for curve in found.curves} == {Kind.PITCHFORK, Kind.NEIMARK_SACKER}
+    rng = np.random.default_rng(4)
+    for curve in found.curves:
+        # Lines along the axis that the curve crosses more steeply.
+        inside = 1 + rng.choice(len(curve.values) - 2, 4, replace=False)
+        for index in inside:
+            along = np.abs(curve.values[index + 1] - curve.values[index - 1])
+            p, q = (0, 1) if along[1] >= along[0] else (1, 0)
+            paths, value = (K1, OTHERS), curve.values[index]
+            beside = value[p] * np.array([1.0 - 1e-3, 1.0 + 1e-3])
+            line = ROBOT.with_value(paths[q], value[q])
+            nearest = min(
+                bifurcations(line, paths[p], tuple(beside), normal_form=False),
+                key=lambda at: abs(at.point.value - value[p]),
+            )
+            bound = curve.error_bound[index]
+            allowed = bound[p] + bound[q] * along[p] / along[q] + nearest.point.error_bound
+            assert nearest.point.kind is curve.kind
+            assert abs(nearest.point.value - value[p]) <= allowed
+
+
+def test_pitchfork_and_pair_meet_where_another_model_has_both(found):
+    (meeting,) = found.special
+    assert meeting.kind is CodimensionTwo.PITCHFORK_NEIMARK_SACKER
+
+    def conditions(springs):
+        """Distances from -1 of the real multiplier and from 1 of the modulus of the pair, by the plain model."""
+        robot = with_springs(*springs)
+        nu = np.linalg.eigvals(mirror(robot) @ flow(robot, 0.5, reach=8.0))
+        real, pair = nu[np.abs(nu.imag) < 1e-9].real, np.abs(nu[nu.imag > 1e-3])
+        return [real[np.abs(real + 1.0).argmin()] + 1.0, pair[np.abs(pair - 1.0).argmin()] - 1.0]
+
+    solved = root(conditions, [2.25, 6.7], tol=1e-13)
+    assert solved.success
+    np.testing.assert_allclose(meeting.values / N_MM_PER_DEG, solved.x, atol=0.0, rtol=1e-9)
+    assert (np.abs(meeting.values - solved.x * N_MM_PER_DEG) < meeting.error_bound + 1e-11).all()
+
+
+def test_every_value_is_on_its_side_of_the_curves_but_by_a_cell(found):
+    search = Search(Plane.over(ROBOT, X, Y), Grid(Plane.over(ROBOT, X, Y), 49), False, silent, list(found.curves))
+    near = np.zeros_like(found.computed)
+    for j, i in np.argwhere(search.cells()):
+        near[j : j + 2, i : i + 2] = True
+    assert 0.05 < near.mean() < 0.5
+    assert not found.computed.all()
+    rng = np.random.default_rng(5)
+    for j, i in rng.permutation(np.argwhere(~near))[:12]:
+        walk = straight_walk(ROBOT.with_value(K1, found.x_values[i]).with_value(OTHERS, found.y_values[j]))
+        assert bool(found.fate[j, i] == FATES.index(Fate.STRAIGHT)) is walk.stable
+        assert found.unstable[j, i] == (walk.moduli > 1.0).sum()
+        if found.computed[j, i]:
+            assert found.growth[j, i] == pytest.approx(walk.exponents.values[0].real, rel=1e-9)
+    # Neighbours differ only across a curve.
+    differ = np.zeros(search.cells().shape, dtype=bool)
+    for j, i in np.ndindex(differ.shape):
+        differ[j, i] = len(set(found.unstable[j : j + 2, i : i + 2].ravel())) > 1
+    assert not (differ & ~near[:-1, :-1]).any()
+
+
+def test_it_is_shown_and_stored(found):
+    assert str(found).count("\n") < 10
+    assert "pitchfork-Neimark-Sacker" in str(found)
+    data = found.to_dataset()
+    assert data.growth.dims == ("y", "x")
+    assert (data.x.attrs["units"], float(data.x[0]), float(data.y[-1])) == (
+        "N*mm/deg",
+        pytest.approx(2.05),
+        pytest.approx(6.9),
+    )
+    assert data.sizes["point"] == sum(len(curve.values) for curve in found.curves)
+    plain = found.as_json()
+    assert sum(plain["shares"].values()) == pytest.approx(1.0)
+    assert plain["special"][0]["values_si"] == found.special[0].values.tolist()
+    for show in ("kind", "growth", "frequency"):
+        axes = found.plot(Figure().add_subplot(), show)
+        assert axes.get_xlabel() == "springs.stiffness[0] (N·mm/deg)"
+        named = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert {"straight", "bends", "undulates", "Neimark-Sacker", "codimension two"} <= set(named)
+    with pytest.raises(ChilopodError, match="did you mean 'growth'"):
+        found.plot(Figure().add_subplot(), "grwth")
+
+
+def test_folds_begin_where_the_pitchfork_turns(monkeypatch):
+    given = []
+
+    def without_fold(family, point, between):
+        given.append((family(*point.values).robot.get(K1), point.kind, between))
+        raise AnalysisError("no fold is near")
+
+    monkeypatch.setattr(map_curves, "switch2", without_fold)
+    monkeypatch.setattr(map_curves, "_LONGEST", 0.2)
+    ranges = (0.675, 0.686), (0.0474, 0.0482)
+    found = mapped(ROBOT, (K1, *ranges[0]), (OFFSET[0], *ranges[1]), points=3, folds=True)
+    (curve,), ((k1, kind, between),) = found.curves, given
+    assert (kind, between) == (CodimensionTwo.DEGENERATE_PITCHFORK, ranges)
+    assert curve.special[0].values[0] == k1
+    assert found.remarks == ("a curve that begins at a pitchfork is not followed to its end: no fold is near",)
+
+
+def test_pitchfork_turns_along_its_curve():
+    """Where the coefficients of points located one by one pass through zero."""
+    offset = "legs.forward_offset"
+    turned = mapped(ROBOT, (K1, stiffness(11.5), stiffness(12.5)), (offset, 0.045, 0.05), points=3)
+    (point,) = turned.special
+    assert point.kind is CodimensionTwo.DEGENERATE_PITCHFORK
+    offsets = point.values[1] + np.array([-1e-4, 1e-4])
+    beside = [
+        bifurcations(ROBOT.with_value(offset, value), K1, (stiffness(11.8), stiffness(12.1)))[0] for value in offsets
+    ]
+    low, high = (each.point.coefficient for each in beside)
+    assert low > 0.0 > high
+    assert point.values[1] == pytest.approx(offsets[0] + 2e-4 * low / (low - high), abs=1e-7)
+    assert point.error_bound[1] < 1e-8
+    np.testing.assert_allclose(point.values[0], np.mean([each.point.value for each in beside]), rtol=1e-6)
+
+
+def test_modules_are_whole_and_each_has_its_points():
+    found = mapped(ROBOT, ("modules", 5, 7), (K1, "10 N*mm/deg", "16 N*mm/deg"), points=9)
+    assert found.x_values.tolist() == [5.0, 6.0, 7.0]
+    (curve,) = found.curves
+    assert not curve.line
+    for (modules, k1), error in zip(curve.values, curve.error_bound, strict=True):
+        robot = ROBOT.with_value("body.modules", modules)
+        for path in ("body.length", "body.mass"):
+            robot = robot.with_value(path, ROBOT.get(path) * modules / 6.0)
+        (point,) = bifurcations(robot, K1, (stiffness(10.0), stiffness(16.0)), normal_form=False)
+        assert abs(point.point.value - k1) <= error[1] + point.point.error_bound
+
+
+def test_speed_keeps_stride_and_duty_factor():
+    plane = Plane.over(ROBOT, ("speed", "0.05 m/s", "0.3 m/s"), (K1, 0.5, 1.0))
+    fast = plane.at(0.2, 0.7)
+    assert fast.gait.speed == pytest.approx(0.2)
+    assert (fast.gait.stride, fast.gait.duty) == (ROBOT.gait.stride, pytest.approx(ROBOT.gait.duty))
+    assert fast.get(K1) == 0.7
+
+
+def test_robots_that_cannot_be_are_a_fate_of_their_own():
+    found = mapped(ROBOT, (K1, "-10 N*mm/deg", "8 N*mm/deg"), ("ground.friction", 200.0, 300.0), points=4)
+    invalid = FATES.index(Fate.INVALID)
+    assert ((found.x_values <= 0.0) == (found.fate == invalid)).all()
+    assert {FATES[index] for index in found.fate.ravel()} == {Fate.INVALID, Fate.BENDS}
+    assert np.isnan(found.growth[:, 0]).all()
+    (remark,) = found.remarks
+    assert "there is no robot: springs.stiffness[0]" in remark
+
+
+def test_a_map_that_was_cut_off_goes_on(tmp_path, monkeypatch):
+    axes, file = ((K1, 0.9, 2.0), (OFFSET[0], 0.02, 0.06)), tmp_path / "rates.nc"
+    counts, compute = [], map_grid.growth_rates
+
+    def counted(robots, count, progress):
+        counts.append(count)
+        if len(counts) == 2:
+            raise KeyboardInterrupt
+        return compute(robots, count, progress)
+
+    monkeypatch.setattr(map_grid, "growth_rates", counted)
+    monkeypatch.setattr(map_grid, "_AT_ONCE", 100)
+    with pytest.raises(KeyboardInterrupt):
+        mapped(ROBOT, *axes, points=13, kept=file)
+    whole = mapped(ROBOT, *axes, points=13, kept=file)
+    assert counts == [100, 69, 69]
+    assert (whole.computed.all(), whole.fate.any()) == (True, False)
+    mapped(ROBOT, *axes, points=13, kept=file)
+    assert len(counts) == 3
+    mapped(ROBOT.with_value("body.mass", 8.0), *axes, points=13, kept=file)
+    assert counts[3:] == [100, 69]
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "said"),
+    [
+        (
+            X,
+            (K1, "1 N*mm/deg", "2 N*mm/deg"),
+            "y springs.stiffness[0] = 'springs.stiffness[0]': must not change a number",
+        ),
+        (X, ("springs.stiffness", 1.0, 2.0), "must not change a number that x changes: springs.stiffness[0]"),
+        (("speed", 0.1, 0.2), ("gait.swing", 0.1, 0.2), "must not change a number that x changes: gait.swing"),
+        ((K1, "9 N*mm/deg", "2 N*mm/deg"), OFFSET, "must rise from a lower to a higher value"),
+        ((K1, "9 N*mm/deg", "9 N*mm/deg"), OFFSET, "must rise from a lower to a higher value"),
+        ((K1, 0.1, float("nan")), OFFSET, "must rise"),
+        ((K1, "9 mm", "20 mm"), OFFSET, "x springs.stiffness[0] = '9 mm': is a length"),
+        (("modules", 4, 7.5), OFFSET, "x modules = '4 7.5': must be whole numbers of modules"),
+        (("body.modules", "4.2", "7"), OFFSET, "must be whole numbers of modules"),
+        (("module", 4, 7), OFFSET, "did you mean 'modules'?"),
+        (("gait.strid", 0.1, 0.2), OFFSET, "did you mean 'gait.stride'?"),
+        (("springs.stiffness[5:]", 0.1, 0.2), OFFSET, "must be a group of springs"),
+        (("springs.rate", 0.1, 0.2), OFFSET, "must be a number that the planar model reads"),
+    ],
+)
+def test_bad_axes(x, y, said):
+    with pytest.raises(ChilopodError) as caught:
+        mapped(ROBOT, x, y, points=5)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_few_points_and_a_long_map_are_said(monkeypatch):
+    with pytest.raises(ChilopodError, match="points"):
+        mapped(ROBOT, X, OFFSET, points=1)
+    said = []
+    monkeypatch.setattr(sys.modules[mapped.__module__], "_LONG", 1e-3)
+    mapped(ROBOT, (K1, 1.9, 2.0), ("legs.half_width", 0.07, 0.08), points=2, remark=said.append)
+    assert "the map takes about" in said[0]

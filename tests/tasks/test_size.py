@@ -1,0 +1,144 @@
+"""Sizing: robots that do what is wished, in theory and in walks."""
+
+import json
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from chilopod.analysis import Onset, bifurcations, curved_walks
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.quantities import Measured, leading_mode
+from chilopod.errors import ChilopodError
+from chilopod.robot import Robot, load_robot
+from chilopod.tasks import size
+from chilopod.tasks.size import Outcome, Wish
+from chilopod.trials import NONE, Trial, run, summaries
+
+ROBOT = load_robot("aoi2022-planar")
+SPRING = (K1, "5 N*mm/deg", "60 N*mm/deg")
+
+
+def walked(robot, seconds=900.0):
+    """Radius and speed at the end of a walk that is begun otherwise than those of the task."""
+    (record,) = run([Trial(robot, seconds, joint_angles=(-0.1,), disturbance=NONE, rate=20.0)])
+    (end,) = summaries(robot, record)
+    step = float(record.time[1] - record.time[0])
+    way = record.position.isel(robot=0).transpose("time", "axis").values
+    cycle = round(robot.gait.period / step)
+    way = way[-1 - 40 * cycle :: cycle]
+    return end.axis_radius, np.linalg.norm(np.diff(way, axis=0), axis=1).mean() / (cycle * step)
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return size(ROBOT, {"radius": "0.88 m"}, [SPRING])
+
+
+def test_the_spring_of_the_papers_radius_is_that_of_the_branch(paper):
+    (spring,) = paper.numbers
+    assert paper.outcome is Outcome.MET
+    assert paper.bound < 1e-8 * spring
+    walks = curved_walks(ROBOT, K1, (spring, stiffness(15.0)))
+    assert float(walks.parameter_si[-1]) == spring
+    # The radius rises by some 2.5 m for a change of the spring by its own size; orbits are accurate to 1e-10.
+    assert float(walks.axis_radius[-1]) == pytest.approx(0.88, abs=1e-8)
+    assert walked(paper.robot)[0] == pytest.approx(0.88, rel=0.01)
+    assert paper.walks["planar"].axis_radius.item() == pytest.approx(0.88, rel=0.01)
+
+
+def test_its_robot_says_what_was_computed_and_what_was_copied(paper):
+    robot = Robot.from_toml(paper.robot.to_toml())
+    assert robot.get(K1) == paper.numbers[0]
+    assert robot.provenance_of(K1).startswith("computed: chilopod size, radius 0.88 m, springs.stiffness[0] within 5")
+    assert robot.provenance_of("body.mass") == "copied from aoi2022-planar: " + ROBOT.provenance_of("body.mass")
+    assert all(robot.get(path) == ROBOT.get(path) for path in ROBOT.parameters() if path != K1)
+    plain = json.loads(json.dumps(paper.as_json(), allow_nan=False))
+    assert (plain["outcome"], plain["numbers_si"][K1]) == ("met", paper.numbers[0])
+    assert paper.plot(Figure().add_subplot()).get_xlabel() == "place in the range"
+    assert "±" in paper.lines()[2]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_wishes_are_met_when_walked(seed):
+    radius, speed = np.random.default_rng(seed).uniform((0.5, 0.05), (1.3, 0.15))
+    found = size(ROBOT, {"radius": radius, "speed": speed}, [SPRING, ("speed", "0.03 m/s", "0.3 m/s")])
+    assert found.outcome is Outcome.MET
+    assert found.values == pytest.approx([radius, speed], rel=1e-5)
+    assert walked(found.robot) == (pytest.approx(radius, rel=0.02), pytest.approx(speed, rel=0.02))
+
+
+def test_an_onset_is_that_of_a_search(paper):
+    wished = stiffness(9.0)
+    found = size(ROBOT, {"onset": "9 N*mm/deg"}, [("springs.stiffness[1:]", "20 N*mm/deg", "60 N*mm/deg")])
+    near = 0.9 * wished, 1.1 * wished
+    assert bifurcations(found.robot, K1, near, normal_form=False)[-1].point.value == pytest.approx(wished, rel=1e-9)
+    assert found.walks["planar"].direction.item() == "straight"
+
+
+def test_a_wish_that_nobody_meets_says_what_stands_in_the_way():
+    short = size(ROBOT, {"growth": 1.0}, [SPRING])
+    assert short.outcome is Outcome.UNMET
+    assert "springs.stiffness[0] is at the lower end of its range, 5 N*mm/deg" in short.reasons
+    assert short.values[0] == pytest.approx(leading_mode(ROBOT.with_value(K1, stiffness(5.0))).growth, rel=1e-2)
+    both = size(ROBOT, {"growth": -0.1, "speed": 0.2}, [SPRING])
+    assert both.outcome is Outcome.UNMET
+    assert any("without the wish for speed the others are met" in each for each in both.reasons)
+    assert any("Pareto front" in line for line in both.lines())
+    assert both.front.shape[1] == 3
+    assert both.plot(Figure().add_subplot()).get_legend()
+
+
+def test_a_walk_that_settles_for_hours_is_said_to_be_settling():
+    """The settling time grows without bound towards the onset."""
+    found = size(ROBOT, {"radius": "5 m"}, [SPRING])
+    assert found.outcome is Outcome.SLOW
+    assert found.values == pytest.approx([5.0])
+
+
+def test_limits_and_budgets():
+    gentle = size(ROBOT, {"margin": ">0.5", "settling": "<6 s"}, [SPRING])
+    assert gentle.outcome is Outcome.MET
+    assert gentle.values[0] >= 0.5
+    assert gentle.values[1] <= 6.0
+    spent = size(ROBOT, {"growth": -0.1, "onset": stiffness(30.0)}, [SPRING], budget=3)
+    assert spent.outcome is Outcome.BUDGET
+    assert Wish("growth", 0.0).deviation(0.5) == 0.5
+    assert [Wish("radius", 1.0, -1).deviation(value) for value in (0.5, 2.0)] == [0.0, 1.0]
+
+
+def test_quantities_agree_with_other_computations():
+    spring = stiffness(9.0)
+    robot, measured = ROBOT.with_value(K1, spring), Measured(Onset())
+    walks = curved_walks(ROBOT, K1, (spring, stiffness(15.0)))
+    for _ in range(2):  # from the branch, and corrected
+        assert measured.radius(robot) == pytest.approx(float(walks.axis_radius[-1]), rel=1e-9)
+        assert measured.speed(robot) == pytest.approx(float(walks.speed[-1]), rel=1e-9)
+        slowest = -ROBOT.gait.period / np.log(float(walks.multiplier[-1]))
+        assert measured.settling(robot) == pytest.approx(slowest, rel=1e-6)
+        measured.radius(robot.with_value("body.mass", 8.6))
+    assert measured.branches == 1
+    onset = Onset().first(ROBOT).point.value
+    assert measured.margin(robot) == pytest.approx(spring / onset - 1.0, rel=1e-9)
+    angle = float(walks.mean_angle[-1, 0])
+    assert measured.work(robot) == pytest.approx(0.5 * angle**2 * (onset - spring), rel=1e-6)
+    # The derivative of the onset by the friction, 0.1815 % per %, is that of `sensitivity`.
+    assert measured.friction(robot) == pytest.approx(0.1815, rel=1e-3)
+
+
+def test_what_is_no_wish_or_no_range_is_refused():
+    for wishes, free, said in (
+        ({}, [SPRING], "wishes"),
+        ({"radios": 1.0}, [SPRING], "did you mean 'radius'"),
+        ({"radius": -1.0}, [SPRING], "positive"),
+        ({"radius": "1 kg"}, [SPRING], "is a mass"),
+        ({"radius": 1.0}, [], "free"),
+        ({"radius": 1.0}, [("modules", 5, 8)], "continuous"),
+        ({"radius": 1.0}, [SPRING, ("springs.stiffness", 0.3, 3.0)], "another range"),
+        ({"radius": 1.0}, [("body.mass", -1.0, 3.0)], r"body\.mass"),
+    ):
+        with pytest.raises(ChilopodError, match=said):
+            size(ROBOT, wishes, free)
+    for more in ({"twin": True}, {"budget": 0}):
+        with pytest.raises(ChilopodError, match=next(iter(more))):
+            size(ROBOT, {"radius": 1.0}, [SPRING], **more)

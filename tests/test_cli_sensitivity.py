@@ -1,0 +1,64 @@
+"""`chilopod sensitivity` as a user and as a hostile user meet it."""
+
+import json
+
+import pytest
+
+from helpers.command_line import remarks, run
+
+PRESET = "aoi2022-planar"
+
+
+def test_a_table_and_the_same_as_json(tmp_path):
+    code, out, err = run("sensitivity", PRESET, "--show", "onset")
+    assert (code, remarks(err)) == (0, [])
+    assert out.splitlines()[0] == "aoi2022-planar: onset 11.991 N*mm/deg"
+    assert out.splitlines()[2].split()[:3] == ["gait.module_phase", "120", "deg"]
+    code, out, err = run("sensitivity", PRESET, "--show", "onset", "--json", "--out", str(tmp_path / "new"))
+    assert code == 0
+    assert json.loads(out) == json.loads((tmp_path / "new" / "sensitivity.json").read_text())
+    assert (tmp_path / "new" / "sensitivity.png").stat().st_size > 10_000
+    code, _, err = run("sensitivity", PRESET, "--out", str(tmp_path / "new"))
+    assert code == 2
+    assert "--force" in err
+
+
+def test_tolerances_of_all_numbers_and_of_one():
+    arguments = ("--uncertain", "ground.friction=5%", "--uncertain", "body.mass=0.3 kg", "--samples", "16", "--json")
+    code, out, _ = run("sensitivity", PRESET, *arguments)
+    found = json.loads(out)
+    assert (code, found["evaluations"], found["failed"]) == (0, 64, 0)
+    assert found["numbers"]["body.mass"]["tolerance_si"] == 0.3
+    assert found["numbers"]["ground.friction"]["tolerance_si"] == pytest.approx(0.05 * 246.5)
+    assert 0.0 < found["deviation_sampled_si"] < 0.1 * found["onset_si"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--show", "onst"), "--show = 'onst': is not known; did you mean 'onset'?"),
+        (("--show", "radius"), "springs.stiffness[0] = '41 N*mm/deg': the straight walk is stable there"),
+        (("--at", "3 kg"), "--at = '3 kg': is a mass"),
+        (("--uncertain", "10"), "--uncertain = '10': must be a share, or a number with its tolerance"),
+        (("--uncertain", "x%"), "must be a share"),
+        (("--uncertain", "body.mas=10%"), "did you mean 'body.mass'?"),
+        (("--uncertain", "body.mass=1 cm"), "is a length"),
+        (("--uncertain", "inf%"), "--uncertain = 'inf%': must be positive and finite"),
+        (("--uncertain", "body.mass=20 kg"), "body.mass = -11.5"),
+        (("--uncertain", "springs.damping[0]=0.001"), "springs.damping[0] = -0.001"),
+        (("--uncertain", "springs.damping=10%"), "is 0, which has no share"),
+        (("--uncertain", "5%", "--show", "growth"), "goes without --uncertain only"),
+        (("--uncertain", "springs.stiffness[0]=10%"), "must not be the number whose critical value is searched"),
+        (("--uncertain", "10%", "--samples", "100"), "must be a power of two"),
+        (
+            ("--between", "20 N*mm/deg", "75 N*mm/deg"),
+            "'20 N*mm/deg to 75 N*mm/deg': no loss of stability in the interval",
+        ),
+        (("--parameter", "body.modules", "--between", "3", "8"), "must be a continuous parameter"),
+    ],
+)
+def test_mistakes_are_named_in_one_line(arguments, said):
+    code, out, err = run("sensitivity", PRESET, *arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(remarks(err)) <= 1
