@@ -1,7 +1,8 @@
-"""The pictures of docs/courses.md and of the README: ``python docs/law_pictures.py`` writes them to ``docs/images``.
+"""The pictures of docs/courses.md, docs/atlas.md and of the README: ``python docs/law_pictures.py`` writes them to
+``docs/images``.
 
 Each of ``law-*.webp`` shows one idea of the spring law: the path of one robot without the idea and with it, on the same
-targets. ``course.webp`` is a course.
+targets. ``course.webp`` is a course. ``scaling.webp`` and ``atlas.webp`` are figures of the report.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ from matplotlib.patches import Circle
 from PIL import Image
 
 from chilopod.output import write_atomic
+from chilopod.paper.atlas import maps, scaling
 from chilopod.paper.courses.steps import steps
+from chilopod.paper.section import Context
+from chilopod.progress import silent
 from chilopod.robot import load_robot
 from chilopod.show import style
 from chilopod.show.figures.course import draw
@@ -90,7 +94,18 @@ def _draw(axes: Axes, record: xr.Dataset) -> None:
     style.grid(axes)
 
 
+def atlas_pictures() -> dict[str, bytes]:
+    """Figures of the atlas by their names."""
+    context = Context()
+    curves = scaling.collapse(context)
+    panels = scaling.panel(curves), maps.panel(maps.atlas(context, silent, curves), curves)
+    with style.house_style():
+        return {panel.name: _webp(panel.draw(False)) for panel in panels}
+
+
 if __name__ == "__main__":
+    for name, drawn in atlas_pictures().items():
+        print(write_atomic(Path(__file__).parent / "images" / f"{name}.webp", drawn, replace=True))
     print(write_atomic(Path(__file__).parent / "images" / "course.webp", course_picture()))
     for name, (targets, step, *titles) in IDEAS.items():
         path = Path(__file__).parent / "images" / f"law-{name}.webp"

@@ -49,8 +49,11 @@ def test_what_is_left_out_unless_it_is_named():
     everything = set(names(chosen()))
     assert set(names(SECTIONS)) - everything == {"robot-structures"}
     assert names(chosen(size=Size.FULL)) == names(chosen())
-    headlines, others = {"identification", "robot-why", "courses"}, {"robot-spread", "robot-numerics", "courses-robust"}
-    others |= {"robot-courses", "courses-movie", "robot-strategies"}
+    headlines, others = (
+        {"identification", "robot-why", "courses", "scaling"},
+        {"robot-spread", "robot-numerics", "atlas"},
+    )
+    others |= {"robot-courses", "courses-movie", "robot-strategies", "courses-robust"}
     assert everything - set(names(chosen(size=Size.MAIN))) == others
     named = chosen(["robot-structures", "robot-spread"], Size.QUICK)
     assert names(named) == ["robot-spread", "robot-structures"]

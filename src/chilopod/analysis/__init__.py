@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from chilopod.analysis.cycle_multipliers import cycle_multipliers, walk_multipliers
     from chilopod.analysis.map import map
     from chilopod.analysis.map_result import StabilityMap
+    from chilopod.analysis.parameters import spring_scale
     from chilopod.analysis.quantities import Onset
     from chilopod.analysis.radius_law import RadiusLaws, radius_laws
     from chilopod.analysis.sensitivity import Sensitivity, sensitivity
@@ -35,6 +36,7 @@ else:
             "compare": ("RobotComparison", "compare"),
             "cycle_modes": ("CycleMultipliers",),
             "cycle_multipliers": ("cycle_multipliers", "walk_multipliers"),
+            "parameters": ("spring_scale",),
             "quantities": ("Onset",),
             "map": ("map",),
             "map_result": ("StabilityMap",),
@@ -77,6 +79,7 @@ __all__ = [
     "read_walks",
     "resumed",
     "sensitivity",
+    "spring_scale",
     "square_root_fit",
     "straight_walk",
     "uncertainty",

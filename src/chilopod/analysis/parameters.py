@@ -24,6 +24,27 @@ def stiffness(value: float) -> float:
     return units.parse(f"{float(value)!r} {PAPER_UNIT}", "N*m/rad")
 
 
+SEARCHED = (0.04, 1.6)
+"""Interval in which a critical spring is searched by default, in units of :func:`spring_scale`."""
+
+
+def spring_scale(robot: Robot) -> float:
+    """Scale of a robot's springs, friction x speed x duty factor x module length, N*m/rad.
+
+    Critical springs of robots of one shape are about the same in this unit, whatever their size, mass, speed and floor.
+    Exactly, they also depend on mass / (friction x period): they hardly do while the feet stop a module within a
+    step.
+    """
+    gait = robot.gait
+    return robot.ground.friction * gait.speed * gait.duty * robot.module_length
+
+
+def searched_springs(robot: Robot) -> tuple[float, float]:
+    """Interval of :data:`SEARCHED`, N*m/rad."""
+    low, high = (each * spring_scale(robot) for each in SEARCHED)
+    return low, high
+
+
 def numbers_read(robot: Robot) -> tuple[str, ...]:
     """Paths of all continuous numbers of a robot's file that the planar model reads, springs one by one."""
     derived = robot.body.yaw_inertia is None

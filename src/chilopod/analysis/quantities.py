@@ -11,7 +11,7 @@ from scipy.linalg import eig
 
 from chilopod import units
 from chilopod.analysis.branch import curved_walks
-from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.parameters import ALL, K1, searched_springs
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, first_loss, interval_text
 from chilopod.errors import AnalysisError, ParameterError, nearest_name
 from chilopod.frozen import Array, ComplexArray
@@ -78,20 +78,28 @@ def leading_mode(robot: Robot, symmetric: bool = True) -> Mode:
 
 @dataclass(frozen=True)
 class Onset:
-    """The number whose change bends the robot, the interval in which its critical value is searched, and the value at
-    which straight and curved walks are studied, by default that of each robot; SI.
+    """The number whose change bends the robot, the interval in which its critical value is searched, of springs by
+    default that of :func:`chilopod.analysis.parameters.searched_springs`, and the value at which straight and curved
+    walks are studied, by default that of each robot; SI.
 
     Most robots bend as a spring falls. Where the straight walk is unstable at the upper end of the interval and stable
     at the lower one, the robot bends as the number rises.
     """
 
     parameter: str = K1
-    between: tuple[float, float] = (stiffness(2.0), stiffness(75.0))
+    between: tuple[float, float] | None = None
     at: float | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.between).all() and self.between[0] < self.between[1]):
+        if self.between is None:
+            if not self.parameter.startswith(ALL):
+                raise ParameterError(f"must be given for {self.parameter}", field="between")
+        elif not (np.isfinite(self.between).all() and self.between[0] < self.between[1]):
             raise ParameterError("must rise and be finite", field="between", value=self.between)
+
+    def interval(self, robot: Robot) -> tuple[float, float]:
+        """Interval of the search for a robot, SI."""
+        return self.between or searched_springs(robot)
 
     def there(self, robot: Robot) -> Robot:
         """The robot at the value at which walks are studied."""
@@ -100,12 +108,13 @@ class Onset:
     def first(self, robot: Robot, normal_form: bool = False) -> WalkBifurcation:
         """Bifurcation at which the straight walk loses stability as the number changes; AnalysisError if there is none,
         or the walk is unstable at both ends of the interval."""
+        between = self.interval(robot)
         if not self.rises(robot):
-            return first_loss(robot, self.parameter, self.between, None, normal_form)
-        if leading_mode(robot.with_value(self.parameter, self.between[0])).growth > 0.0:
-            said = interval_text(robot, self.parameter, self.between)
+            return first_loss(robot, self.parameter, between, None, normal_form)
+        if leading_mode(robot.with_value(self.parameter, between[0])).growth > 0.0:
+            said = interval_text(robot, self.parameter, between)
             raise AnalysisError("the straight walk is unstable at both ends", field=self.parameter, value=said)
-        return bifurcations(robot, self.parameter, self.between, normal_form)[0]
+        return bifurcations(robot, self.parameter, between, normal_form)[0]
 
     def beside(self, robot: Robot, value: float) -> float:
         """Critical value in the interval near that of a similar robot, where the largest modulus of a multiplier is 1,
@@ -118,7 +127,8 @@ class Onset:
             if not abs(k - value) <= _APART * abs(value):
                 break
             if abs(step) <= _SETTLED * abs(k):
-                if self.between[0] <= k <= self.between[1]:
+                low, high = self.interval(robot)
+                if low <= k <= high:
                     return float(k)
                 break
             growth = leading_mode(robot.with_value(self.parameter, k)).growth
@@ -126,7 +136,7 @@ class Onset:
 
     def rises(self, robot: Robot) -> bool:
         """True if the straight walk is unstable at the upper end of the interval."""
-        return leading_mode(robot.with_value(self.parameter, self.between[1])).growth > 0.0
+        return leading_mode(robot.with_value(self.parameter, self.interval(robot)[1])).growth > 0.0
 
 
 class Measured:
@@ -243,7 +253,7 @@ class Measured:
     def _followed(self, robot: Robot, model: PlanarModel) -> Array:
         """State of the curved walk from its branch."""
         self.branches += 1
-        path, (low, high) = self.number.parameter, self.number.between
+        path, (low, high) = self.number.parameter, self.number.interval(robot)
         at = robot.get(path)
         walks = curved_walks(robot, path, (low, at) if self.number.rises(robot) else (at, high))
         if float(walks.parameter_si[-1]) != at:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import stability, units
-from chilopod.analysis.parameters import K1, check_parameter, stiffness
+from chilopod.analysis.parameters import K1, check_parameter, searched_springs
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ComplexArray, ReadOnlyArrays, read_only
 from chilopod.notebook import Summary, axes_for
@@ -271,16 +271,17 @@ def bifurcations(
 
 
 def first_loss(
-    robot: Robot, parameter: str, between: tuple[float, float], kind: Kind | None, normal_form: bool = True
+    robot: Robot, parameter: str, between: tuple[float, float] | None, kind: Kind | None, normal_form: bool = True
 ) -> WalkBifurcation:
-    """Bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down.
+    """Bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down; None is
+    the interval of :func:`chilopod.analysis.parameters.searched_springs`.
 
     Raises
     ------
     AnalysisError
         If there is no bifurcation, or it is of another kind; None is any kind.
     """
-    what = "loss of stability" if kind is None else kind.label
+    what, between = "loss of stability" if kind is None else kind.label, between or searched_springs(robot)
     spaced = np.geomspace if between[0] > 0.0 else np.linspace
     for low in spaced(between[1], between[0], 5)[1:]:
         # From the stiff end down, so that points far below, where the walk is unstable anyway, cost nothing.
@@ -303,8 +304,8 @@ def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) ->
 
 
 def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:
-    """Pitchfork in k1, searched in the range of the paper's springs."""
-    return first_loss(robot, K1, (stiffness(2.0), stiffness(75.0)), Kind.PITCHFORK, normal_form)
+    """Pitchfork in k1, searched at all springs that may be critical."""
+    return first_loss(robot, K1, None, Kind.PITCHFORK, normal_form)
 
 
 def joint_components(mode: ComplexArray, modules: int) -> ComplexArray:

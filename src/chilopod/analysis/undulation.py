@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import units
-from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
+from chilopod.analysis.parameters import ALL, PAPER_UNIT
 from chilopod.analysis.straight_walk import first_loss
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array, ComplexArray
@@ -67,7 +67,7 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     for distance in distances:
         if not 0.0 < distance < 1.0:
             raise ParameterError("must be more than 0 and less than 1", field="distances", value=distance)
-    loss = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER)
+    loss = first_loss(robot, ALL, None, Kind.NEIMARK_SACKER)
     point = loss.point
     if point.criticality is not Criticality.SUPERCRITICAL:
         raise AnalysisError("must be supercritical for an undulation to grow from it", field="Neimark-Sacker point")

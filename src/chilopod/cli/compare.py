@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from chilopod.cli.options import (
-    BetweenOption,
+    OnsetBetweenOption,
     OutOption,
     ParameterOption,
     RobotOptions,
@@ -28,7 +28,7 @@ def compare(
     options: RobotOptions,
     other: Annotated[str, typer.Argument(metavar="OTHER", help="Robot to compare with; --set changes both.")],
     parameter: ParameterOption = "springs.stiffness[0]",
-    between: BetweenOption = ("2 N*mm/deg", "75 N*mm/deg"),
+    between: OnsetBetweenOption = None,
     at: AtOption = None,
     show: Annotated[
         str,
@@ -49,7 +49,7 @@ def compare(
     Example: chilopod compare aoi2022-planar aoi2022
     """
     first, second = options.described, read_robot(other, options.overrides)
-    limits = interval(first, parameter, between)
+    limits = between and interval(first, parameter, between)
     with reading("at"):
         studied = None if at is None else first.override(parameter, at).get(parameter)
     free_result("comparison", out, options.force)

@@ -66,6 +66,14 @@ BetweenOption = Annotated[
         metavar="LOW HIGH", help='Interval of its values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'
     ),
 ]
+OnsetBetweenOption = Annotated[
+    tuple[str, str] | None,
+    typer.Option(
+        metavar="LOW HIGH",
+        help='Interval of its values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg"; by default, of springs, '
+        "0.04 to 1.6 times friction x speed x duty factor x module length.",
+    ),
+]
 OutOption = Annotated[
     Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for the results, besides the text.")
 ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import (
-    BetweenOption,
+    OnsetBetweenOption,
     OutOption,
     ParameterOption,
     RobotOptions,
@@ -39,7 +39,7 @@ AtOption = Annotated[
 def sensitivity(
     options: RobotOptions,
     parameter: ParameterOption = "springs.stiffness[0]",
-    between: BetweenOption = ("2 N*mm/deg", "75 N*mm/deg"),
+    between: OnsetBetweenOption = None,
     at: AtOption = None,
     show: Annotated[
         str | None,
@@ -70,7 +70,7 @@ def sensitivity(
     Example: chilopod sensitivity aoi2022-planar --uncertain 10%
     """
     described = options.described
-    limits = interval(described, parameter, between)
+    limits = between and interval(described, parameter, between)
     with reading("at"):
         studied = None if at is None else described.override(parameter, at).get(parameter)
     tolerances = _tolerances(described, parameter, uncertain or [])

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from chilopod.cli.options import (
-    BetweenOption,
+    OnsetBetweenOption,
     OutOption,
     ParameterOption,
     RobotOptions,
@@ -55,7 +55,7 @@ def size(
         ),
     ],
     parameter: ParameterOption = "springs.stiffness[0]",
-    between: BetweenOption = ("2 N*mm/deg", "75 N*mm/deg"),
+    between: OnsetBetweenOption = None,
     twin: Annotated[bool, typer.Option("--twin", help="Let the robot walk in three dimensions too.")] = False,
     budget: Annotated[int, typer.Option(metavar="N", min=1, help="Most robots that are evaluated.")] = 600,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the scattered starts.")] = 0,
@@ -72,7 +72,7 @@ def size(
     Example: chilopod size aoi2022-planar --radius "0.8 m" --free "springs.stiffness[0]=5..60 N*mm/deg" --out sized
     """
     robot = options.described
-    limits = interval(robot, parameter, between)
+    limits = between and interval(robot, parameter, between)
     wishes = {name: text for name in _WISHES if (text := getattr(options, name)) is not None}
     if not wishes:
         raise ParameterError("must be given", field=" or ".join(f"--{name}" for name in _WISHES))

@@ -38,6 +38,8 @@ SECONDS: Final = {
     "courses-robust": (90, 20),
     "robot-courses": (1200, 250),
     "courses-movie": (10, 10),
+    "scaling": (8, 4),
+    "atlas": (40, 25),
 }
 """Seconds of a full section and of a quick one, by its name; others take a moment."""
 

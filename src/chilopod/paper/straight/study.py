@@ -155,7 +155,7 @@ def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset
     the attributes.
     """
     robot = context.robot
-    point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER)
+    point = first_loss(robot, ALL, None, Kind.NEIMARK_SACKER)
     components = point.joint_components
     phase = np.unwrap(np.angle(components))
     columns = {"amplitude": ("joint", np.abs(components)), "phase": ("joint", phase - phase[0], {"units": "rad"})}

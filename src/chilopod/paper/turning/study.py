@@ -84,7 +84,7 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
     distances = FARTHER[:2] if quick else FARTHER
     farther = farther_targets(robot, laws, task.target.bearing, distances, folder=folder)
     progress(1.0, "turning tasks")
-    point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER, normal_form=False)
+    point = first_loss(robot, ALL, None, Kind.NEIMARK_SACKER, normal_form=False)
     return Turning(robot, laws, tasks, hopf, rough, point.value, without, settled, farther)
 
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
+from chilopod.analysis.parameters import ALL, PAPER_UNIT
 from chilopod.analysis.straight_walk import first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
@@ -214,8 +214,7 @@ def _predictions(robot: Robot, variants: Mapping[str, Sequence[str]]) -> dict[st
         with suppress(AnalysisError):
             found[name] = pitchfork(robot.set_from_text(setting), normal_form=False).value
     with suppress(AnalysisError):
-        interval = stiffness(2.0), stiffness(75.0)
-        found["uniform"] = first_loss(robot, ALL, interval, Kind.NEIMARK_SACKER, normal_form=False).value
+        found["uniform"] = first_loss(robot, ALL, None, Kind.NEIMARK_SACKER, normal_form=False).value
     with suppress(AnalysisError):
         point = pitchfork(robot)
         found["coefficient"] = np.nan if point.coefficient is None else point.coefficient

@@ -1,0 +1,1 @@
+"""Atlas of the planar robot: eight maps of its straight walk, and the scaling law of critical springs."""
