@@ -7,14 +7,14 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.optimize import root
 
-from chilopod.analysis import bifurcations, map_curves, map_grid, straight_walk
+from chilopod.analysis import bifurcations, curved_walks, map_curves, map_grid, straight_walk
 from chilopod.analysis.growth import FATES, Fate
 from chilopod.analysis.map import map as mapped
 from chilopod.analysis.map_axes import Plane
 from chilopod.analysis.map_curves import Search
 from chilopod.analysis.map_grid import Grid
 from chilopod.analysis.parameters import K1, stiffness
-from chilopod.errors import AnalysisError, ChilopodError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.progress import silent
 from chilopod.robot import load_robot
 from chilopod.stability import CodimensionTwo, Kind
@@ -109,13 +109,30 @@ def test_it_is_shown_and_stored(found):
     plain = found.as_json()
     assert sum(plain["shares"].values()) == pytest.approx(1.0)
     assert plain["special"][0]["values_si"] == found.special[0].values.tolist()
-    for show in ("kind", "growth", "frequency"):
+    for show in ("kind", "growth", "frequency", "criticality"):
         axes = found.plot(Figure().add_subplot(), show)
         assert axes.get_xlabel() == "springs.stiffness[0] (N·mm/deg)"
         named = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert {"straight", "bends", "undulates", "Neimark-Sacker", "codimension two"} <= set(named)
+        curves = "curves" if show == "criticality" else "Neimark-Sacker"
+        assert {"straight", "bends", "undulates", curves, "codimension two"} <= set(named)
     with pytest.raises(ChilopodError, match="did you mean 'growth'"):
         found.plot(Figure().add_subplot(), "grwth")
+
+
+def test_radii_are_those_of_branches():
+    """Of other continuations, each along its own row."""
+    found = mapped(ROBOT, (K1, "9 N*mm/deg", "13 N*mm/deg"), ("body.mass", "8 kg", "9 kg"), points=5, radius=True)
+    bends = found.fate == FATES.index(Fate.BENDS)
+    assert bends.any()
+    np.testing.assert_array_equal(np.isfinite(found.radius), bends)
+    for j in (0, 4):
+        robot = ROBOT.with_value("body.mass", found.y_values[j])
+        walks = curved_walks(robot, K1, (found.x_values[0], found.x_values[-1]))
+        assert found.radius[j, 0] == pytest.approx(float(walks.axis_radius[-1]), rel=1e-6)
+    assert found.plot(Figure().add_subplot(), "radius").get_title() == "Radius of the curved walk (m)"
+    assert found.to_dataset().radius.attrs["units"] == "m"
+    with pytest.raises(ParameterError, match=r"^radius: must be left out"):
+        mapped(ROBOT, ("modules", 4, 6), ("speed", 0.05, 0.1), points=5, radius=True)
 
 
 def test_folds_begin_where_the_pitchfork_turns(monkeypatch):

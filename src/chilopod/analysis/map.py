@@ -16,6 +16,7 @@ from chilopod.analysis.growth import FATES, Fate, growth_rates
 from chilopod.analysis.map_axes import Given, Plane
 from chilopod.analysis.map_curves import Search
 from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
+from chilopod.analysis.map_radii import check_radius, radii
 from chilopod.analysis.map_result import StabilityMap
 from chilopod.errors import ParameterError
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
@@ -41,6 +42,7 @@ def map(
     *,
     points: int = POINTS,
     folds: bool = False,
+    radius: bool = False,
     kept: str | Path | None = None,
     remark: Callable[[str], None] = lambda sentence: None,
     progress: Progress = silent,
@@ -63,6 +65,8 @@ def map(
         Least number of values along an axis; of modules there are all whole numbers.
     folds
         True to follow the folds of the curved walks too, which takes a minute.
+    radius
+        True to compute the radius of the curved walks on a lattice of 24 x 24 values, some 50 ms each.
     kept
         File that holds growth rates while they are computed; a map that was cut off goes on from it.
     remark
@@ -73,11 +77,14 @@ def map(
     Raises
     ------
     ParameterError
-        If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number.
+        If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if
+        radii are wanted and neither axis is a number of the robot.
     """
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:
         raise ParameterError("must be a number of values", field="points", value=points, allowed=f"2 to {_MOST_POINTS}")
+    if radius:
+        check_radius(plane)
     file = None if kept is None else Path(kept)
     grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
     if file is not None:
@@ -91,11 +98,12 @@ def map(
         wanted |= search.cells()
         grid.refine(wanted, part(progress, 0.5, 1.0))
         search.run()
-    remarks = [*dict.fromkeys(search.remarks), *_invalid(grid)]
+    bent, lost = radii(plane, grid, part(progress, 0.5, 1.0)) if radius else (np.full(grid.computed.shape, np.nan), [])
+    remarks = [*dict.fromkeys(search.remarks), *_invalid(grid), *lost]
     values = grid.values
     whole = values[UNSTABLE].astype(np.int16), values[FATE].astype(np.int8)
     columns = plane.x, plane.y, grid.x, grid.y, values[GROWTH], values[FREQUENCY], values[ERROR]
-    return StabilityMap(robot, *columns, *whole, grid.computed, tuple(search.curves), tuple(remarks))
+    return StabilityMap(robot, *columns, *whole, grid.computed, bent, tuple(search.curves), tuple(remarks))
 
 
 def _invalid(grid: Grid) -> list[str]:

@@ -22,6 +22,8 @@ SHOWN = {
     "kind": "What becomes of a disturbance",
     "growth": "Growth rate of the leading disturbance (1/s)",
     "frequency": "Frequency of the leading disturbance (rad/s)",
+    "radius": "Radius of the curved walk (m)",
+    "criticality": "Coefficient along the curves: gentle below 0",
 }
 """Titles of the pictures of a map."""
 
@@ -46,15 +48,17 @@ def draw(found: Any, axes: Axes | None, show: str) -> Axes:
         raise ParameterError("must be a picture", field="show", value=show, allowed=allowed, nearest=nearest)
     axes = axes_for(axes)
     x, y = found.x.shown(found.x_values), found.y.shown(found.y_values)
-    if show == "kind":
+    if show in ("kind", "criticality"):
         from matplotlib.colors import ListedColormap
 
         look: dict[str, Any] = {"cmap": ListedColormap([_COLORS[fate] for fate in FATES]), "vmin": -0.5}
         axes.pcolormesh(x, y, found.fate, shading="nearest", rasterized=True, vmax=len(FATES) - 0.5, **look)
     else:
         _field(axes, x, y, found, show)
-    for curve in found.curves:
+    for curve in found.curves if show != "criticality" else ():
         _curve(axes, found, curve)
+    if show == "criticality":
+        _coefficients(axes, found)
     for point in found.special:
         at = units.from_si(point.values[0], found.x.unit), units.from_si(point.values[1], found.y.unit)
         axes.plot(*at, "D", color=_MARK, markeredgecolor="white", markersize=7, zorder=6, label="codimension two")
@@ -74,11 +78,17 @@ def keys(found: Any, axes: Axes) -> list[Any]:
 
 
 def _field(axes: Axes, x: Array, y: Array, found: Any, show: str) -> None:
-    """Colours of growth rates, red where a disturbance grows, or of the frequencies of oscillations, grey elsewhere."""
-    from matplotlib.colors import TwoSlopeNorm
+    """Colours of growth rates, red where a disturbance grows, of the frequencies of oscillations or of radii; grey
+    elsewhere."""
+    from matplotlib.colors import LogNorm, TwoSlopeNorm
 
     axes.set_facecolor(_COLORS[Fate.INVALID])
-    values = found.growth if show == "growth" else np.where(found.frequency > 0.0, found.frequency, np.nan)
+    values = {"growth": found.growth, "radius": found.radius}.get(
+        show, np.where(found.frequency > 0.0, found.frequency, np.nan)
+    )
+    if show == "radius":
+        rows, columns = (np.flatnonzero(np.isfinite(values).any(axis=axis)) for axis in (1, 0))
+        x, y, values = x[columns], y[rows], values[np.ix_(rows, columns)]
     inside = values[np.isfinite(values)]
     if not inside.size:
         return
@@ -87,10 +97,31 @@ def _field(axes: Axes, x: Array, y: Array, found: Any, show: str) -> None:
         most = float(np.percentile(np.abs(inside), 98.0)) or 1.0
         look: dict[str, Any] = {"cmap": "RdBu_r", "norm": TwoSlopeNorm(0.0, -most, most)}
     else:
-        look = {"cmap": "viridis"}
+        look = {"cmap": "viridis", "norm": LogNorm() if show == "radius" else None}
     mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", rasterized=True, **look)
     assert axes.figure is not None
-    axes.figure.colorbar(mesh, ax=axes, extend="both" if show == "growth" else "neither")
+    bar = axes.figure.colorbar(mesh, ax=axes, extend="both" if show == "growth" else "neither")
+    if show == "radius":
+        for formatter in (bar.ax.yaxis.set_major_formatter, bar.ax.yaxis.set_minor_formatter):
+            formatter("{x:.2g}")
+
+
+def _coefficients(axes: Axes, found: Any) -> None:
+    """Points of the curves in colours of their coefficients, blue where supercritical and red where subcritical."""
+    from matplotlib.colors import SymLogNorm
+
+    chosen = [curve for curve in found.curves if np.isfinite(curve.coefficient).any()]
+    if not chosen:
+        return
+    values = np.concatenate([curve.values for curve in chosen])
+    coefficients = np.concatenate([curve.coefficient for curve in chosen])
+    sizes = np.abs(coefficients[np.isfinite(coefficients)])
+    norm = SymLogNorm(float(np.median(sizes)), vmin=-float(sizes.max()), vmax=float(sizes.max()))
+    x, y = (axis.shown(values[:, k]) for k, axis in enumerate((found.x, found.y)))
+    look: dict[str, Any] = {"c": coefficients, "cmap": "RdBu_r", "norm": norm, "edgecolors": "#767676", "zorder": 5}
+    drawn = axes.scatter(x, y, s=40, linewidths=0.5, label="curves", **look)
+    assert axes.figure is not None
+    axes.figure.colorbar(drawn, ax=axes)
 
 
 def _curve(axes: Axes, found: Any, curve: MapCurve) -> None:

@@ -41,6 +41,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         frequency are interpolated.
     computed
         True where they were computed, shape (rows, columns).
+    radius
+        Radius of the curved walks, m, shape (rows, columns), NaN where there is none or it was not computed.
     curves
         Curves of bifurcations.
     remarks
@@ -58,6 +60,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
     unstable: NDArray[np.int16]
     fate: NDArray[np.int8]
     computed: NDArray[np.bool_]
+    radius: Array
     curves: tuple[MapCurve, ...]
     remarks: tuple[str, ...]
 
@@ -107,7 +110,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         axes
             Axes to draw on.
         show
-            ``kind``: what becomes of a disturbance; ``growth``: growth rate; ``frequency``: frequency of undulations.
+            ``kind``: what becomes of a disturbance; ``growth``: growth rate; ``frequency``: frequency of undulations;
+            ``radius``: radius of the curved walks; ``criticality``: coefficient of the normal form along the curves.
         """
         from chilopod.analysis.map_picture import draw, keys
 
@@ -149,6 +153,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "unstable": (grid, self.unstable),
             "fate": (grid, self.fate, {"meaning": meanings}),
             "computed": (grid, self.computed),
+            "radius": (grid, self.radius, {"units": "m"}),
         }
         none = np.empty((0, 2))
         values = np.concatenate([none, *(curve.values for curve in self.curves)])

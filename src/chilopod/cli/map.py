@@ -29,7 +29,10 @@ def stability_map(
     ],
     y: Annotated[tuple[str, str, str], typer.Option(metavar=_RANGE, help="The same for the vertical axis.")],
     show: Annotated[
-        str, typer.Option(metavar="NAMES", help="Pictures, with commas between: kind, growth, frequency.")
+        str,
+        typer.Option(
+            metavar="NAMES", help="Pictures, with commas between: kind, growth, frequency, radius, criticality."
+        ),
     ] = "kind,growth",
     points: Annotated[int, typer.Option(metavar="N", min=2, max=4097, help="Least number of values on an axis.")] = 129,
     folds: Annotated[
@@ -66,7 +69,7 @@ def stability_map(
         free(files_of_map(out), options.force)
     with progress_bar("map") as tell:
         found = mapped(
-            robot, x, y, points=points, folds=folds, kept=out and out / "map-rates.nc",
+            robot, x, y, points=points, folds=folds, radius="radius" in shown, kept=out and out / "map-rates.nc",
             remark=lambda sentence: typer.echo(f"note: {sentence}", err=True), progress=partial(tell, "map"),
         )  # fmt: skip
 
