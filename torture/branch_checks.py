@@ -283,6 +283,24 @@ def at_once(mine: Crossing, rest: list[Crossing], bound: float) -> tuple[Crossin
     return (other[0] if other and mine.fold else mine), [each for each in rest if each not in twins]
 
 
+def _turn(segment: Segment, place: float) -> float:
+    """Place nearby where the curve turns, by the secant method: the value of a point tells its place badly there."""
+    n = segment.orbits.n
+    try:
+        at, slope = place, segment.at(place).tangent[n]
+        other = place - 0.01
+        for _ in range(10):
+            before = segment.at(other).tangent[n]
+            if slope == before or abs(at - other) < 1e-4:
+                break
+            at, slope, other = other, before, other - before * (at - other) / (slope - before)
+            if abs(other - place) > 0.2:
+                return place
+    except NoOrbit:
+        return place
+    return other
+
+
 def _touches(found: Verdict, segment: Segment, point: Any, place: float, test: int) -> bool:
     """Whether a test function touches zero there, by one of three causes: two multipliers cross at once; two meet at +1
     or -1 and stay on the circle; or one comes to +1 and goes back where the curve turns, on a branch that goes through
@@ -291,6 +309,7 @@ def _touches(found: Verdict, segment: Segment, point: Any, place: float, test: i
     if test and not double:
         return False
     values, n, target = [], segment.orbits.n, (1.0, -1.0, 0.0)[test]
+    place = place if double else _turn(segment, place)
     for width in (0.01, 0.03):
         sides = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]) * width
         try:
