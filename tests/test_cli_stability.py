@@ -71,6 +71,17 @@ def test_bifurcation_json_names_the_pitchfork():
     assert point["frequency_rad_s"] == 0
 
 
+def test_springs_are_searched_where_they_may_be_critical():
+    """Of a robot ten times as fast, with springs as much stiffer, too."""
+    fast = ["--set", "gait.stance=31 ms", "--set", "gait.swing=29 ms", "--set", "springs.stiffness[1:]=410 N*mm/deg"]
+    code, out, _ = run("bifurcation", PRESET, "--parameter", K1, *fast, "--json")
+    (point,) = json.loads(out)["points"]
+    assert (code, point["kind"]) == (0, "pitchfork")
+    assert 10.0 * 11.0 < point["value"] < 10.0 * 13.0
+    code, _, err = run("bifurcation", PRESET, "--parameter", "legs.half_width")
+    assert (code, err) == (2, "error: --between: must be given for legs.half_width\n")
+
+
 def test_uniform_springs_give_the_neimark_sacker_point():
     _, out, _ = bifurcation("--json", parameter="springs.stiffness", between=("6 N*mm/deg", "7 N*mm/deg"))
     (point,) = json.loads(out)["points"]

@@ -14,7 +14,7 @@ from chilopod.cli.options import (
     RobotOptions,
     deliver_result,
     free_result,
-    interval,
+    onset_of,
     read_robot,
     reading,
     with_options,
@@ -49,9 +49,7 @@ def compare(
     Example: chilopod compare aoi2022-planar aoi2022
     """
     first, second = options.described, read_robot(other, options.overrides)
-    limits = between and interval(first, parameter, between)
-    with reading("at"):
-        studied = None if at is None else first.override(parameter, at).get(parameter)
+    onset = onset_of(first, parameter, between, at)
     free_result("comparison", out, options.force)
     from chilopod import analysis
     from chilopod.analysis.quantities import QUANTITIES, known_names
@@ -59,6 +57,5 @@ def compare(
     with reading("show"):
         names = known_names(show.split(","), QUANTITIES, "show")
     with progress_bar("comparison") as bar:
-        onset, progress = analysis.Onset(parameter, limits, studied), partial(bar, "comparison")
-        found = analysis.compare(first, second, onset, names, seed, progress)
+        found = analysis.compare(first, second, onset, names, seed, partial(bar, "comparison"))
     deliver_result(found, "comparison", options, out)

@@ -19,6 +19,7 @@ from chilopod.errors import ChilopodError, ParameterError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod import tasks
+    from chilopod.analysis import Onset
     from chilopod.progress import Progress
     from chilopod.robot import Robot
     from chilopod.tasks.runs import Runs
@@ -374,6 +375,20 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
         own = f"{units.format(low, shown, digits=4)} to {units.format(high, shown, digits=4)}"
         typer.echo(f"note: a number without a unit is SI: --between is {taken}, that is {own}", err=True)
     return low, high
+
+
+def onset_of(robot: Robot, parameter: str, between: tuple[str, str] | None, at: str | None = None) -> Onset:
+    """Read the number that bends a robot, its interval, and the value at which walks are studied."""
+    from chilopod.analysis import Onset
+    from chilopod.analysis.parameters import check_parameter
+
+    with reading("parameter"):
+        check_parameter(robot, parameter)
+    limits = between and interval(robot, parameter, between)
+    with reading("at"):
+        studied = None if at is None else robot.override(parameter, at).get(parameter)
+    with reading("between"):
+        return Onset(parameter, limits, studied)
 
 
 def _bare(text: str) -> bool:

@@ -15,7 +15,7 @@ from chilopod.cli.options import (
     RobotOptions,
     deliver_result,
     free_result,
-    interval,
+    onset_of,
     reading,
     with_options,
 )
@@ -70,9 +70,7 @@ def sensitivity(
     Example: chilopod sensitivity aoi2022-planar --uncertain 10%
     """
     described = options.described
-    limits = between and interval(described, parameter, between)
-    with reading("at"):
-        studied = None if at is None else described.override(parameter, at).get(parameter)
+    onset = onset_of(described, parameter, between, at)
     tolerances = _tolerances(described, parameter, uncertain or [])
     for option, given in (("show", show), ("at", at)):
         if tolerances and given:
@@ -86,7 +84,6 @@ def sensitivity(
     with reading("show"):
         names = known_names(show.split(",") if show else DEFAULT, QUANTITIES, "show")
     found: Summary
-    onset = analysis.Onset(parameter, limits, studied)
     with progress_bar(name) as bar:
         progress = partial(bar, name)
         if tolerances:

@@ -15,7 +15,7 @@ from chilopod.cli.options import (
     RobotOptions,
     deliver_result,
     free_result,
-    interval,
+    onset_of,
     with_options,
 )
 from chilopod.cli.progress import progress_bar
@@ -72,18 +72,18 @@ def size(
     Example: chilopod size aoi2022-planar --radius "0.8 m" --free "springs.stiffness[0]=5..60 N*mm/deg" --out sized
     """
     robot = options.described
-    limits = between and interval(robot, parameter, between)
+    onset = onset_of(robot, parameter, between)
     wishes = {name: text for name in _WISHES if (text := getattr(options, name)) is not None}
     if not wishes:
         raise ParameterError("must be given", field=" or ".join(f"--{name}" for name in _WISHES))
     ranges = [_range(text) for text in free]
     free_result("size", out, options.force)
     file = options.free_in(out, "sized.toml")
-    from chilopod import analysis, tasks
+    from chilopod import tasks
     from chilopod.output import write_atomic
 
     with progress_bar("size") as bar:
-        progress, onset = partial(bar, "size"), analysis.Onset(parameter, limits)
+        progress = partial(bar, "size")
         found = tasks.size(robot, wishes, ranges, onset, twin=twin, budget=budget, seed=seed, progress=progress)
     deliver_result(found, "size", options, out)
     for each in file:

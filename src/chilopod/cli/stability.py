@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chilopod.cli.options import (
-    BetweenOption,
     EngineOption,
+    OnsetBetweenOption,
     OutOption,
     ParameterOption,
     RobotOptions,
     interval,
+    onset_of,
     reading,
     with_options,
 )
@@ -96,7 +97,7 @@ def _of_bends(
 def bifurcation(
     options: RobotOptions,
     parameter: ParameterOption,
-    between: BetweenOption,
+    between: OnsetBetweenOption = None,
     seconds: Annotated[
         float, typer.Option(metavar="S", min=0.0, help="Time limit of the search, s; it ends with what it has found.")
     ] = 60.0,
@@ -107,10 +108,10 @@ def bifurcation(
     Every bifurcation in the interval has its kind, its error bound, the mode that grows, and its direction: new walks
     set in gently (supercritical) or by a jump (subcritical).
 
-    Example: chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]" --between "2 N*mm/deg" "75 N*mm/deg"
+    Example: chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]"
     """
     described = options.described
-    limits = interval(described, parameter, between)
+    limits = onset_of(described, parameter, between).interval(described)
     files = options.free_in(out, "bifurcation.json")
     from chilopod import units
     from chilopod.analysis import bifurcations
