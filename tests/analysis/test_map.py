@@ -121,7 +121,7 @@ def test_it_is_shown_and_stored(found):
 
 def test_radii_are_those_of_branches():
     """Of other continuations, each along its own row."""
-    found = mapped(ROBOT, (K1, "9 N*mm/deg", "13 N*mm/deg"), ("body.mass", "8 kg", "9 kg"), points=5, radius=True)
+    found = mapped(ROBOT, (K1, "9 N*mm/deg", "13 N*mm/deg"), ("body.mass", "8 kg", "9 kg"), points=5, also=["radius"])
     bends = found.fate == FATES.index(Fate.BENDS)
     assert bends.any()
     np.testing.assert_array_equal(np.isfinite(found.radius), bends)
@@ -132,7 +132,9 @@ def test_radii_are_those_of_branches():
     assert found.plot(Figure().add_subplot(), "radius").get_title() == "Radius of the curved walk (m)"
     assert found.to_dataset().radius.attrs["units"] == "m"
     with pytest.raises(ParameterError, match=r"^radius: must be left out"):
-        mapped(ROBOT, ("modules", 4, 6), ("speed", 0.05, 0.1), points=5, radius=True)
+        mapped(ROBOT, ("modules", 4, 6), ("speed", 0.05, 0.1), points=5, also=["radius"])
+    with pytest.raises(ParameterError, match=r"^also = 'radii': must be a part of maps; did you mean 'radius'\?"):
+        mapped(ROBOT, X, Y, also=["radii"])
 
 
 def test_folds_begin_where_the_pitchfork_turns(monkeypatch):
@@ -145,7 +147,7 @@ def test_folds_begin_where_the_pitchfork_turns(monkeypatch):
     monkeypatch.setattr(map_curves, "switch2", without_fold)
     monkeypatch.setattr(map_curves, "_LONGEST", 0.2)
     ranges = (0.675, 0.686), (0.0474, 0.0482)
-    found = mapped(ROBOT, (K1, *ranges[0]), (OFFSET[0], *ranges[1]), points=3, folds=True)
+    found = mapped(ROBOT, (K1, *ranges[0]), (OFFSET[0], *ranges[1]), points=3, also=["folds"])
     (curve,), ((k1, kind, between),) = found.curves, given
     assert (kind, between) == (CodimensionTwo.DEGENERATE_PITCHFORK, ranges)
     assert curve.special[0].values[0] == k1

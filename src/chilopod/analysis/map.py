@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import io
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,12 @@ import xarray as xr
 
 from chilopod.analysis.growth import FATES, Fate, growth_rates
 from chilopod.analysis.map_axes import Given, Plane
-from chilopod.analysis.map_curves import Search
+from chilopod.analysis.map_curves import MapCurve, Search
 from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
 from chilopod.analysis.map_radii import check_radius, radii
 from chilopod.analysis.map_result import StabilityMap
-from chilopod.errors import ParameterError
+from chilopod.errors import ParameterError, nearest_name
+from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
 from chilopod.output import write_atomic
 from chilopod.progress import Progress, part, silent
@@ -30,6 +31,7 @@ VERSION = 1
 POINTS = 129
 """Default number of values along an axis."""
 
+_ALSO = ("folds", "radius")
 _MOST_POINTS = 4097
 _LONG = 600.0  # s: a map that takes longer is announced
 _CURVE_RATES = 5e3  # growth rates that take as long as a curve
@@ -41,8 +43,7 @@ def map(
     y: Given,
     *,
     points: int = POINTS,
-    folds: bool = False,
-    radius: bool = False,
+    also: Collection[str] = (),
     kept: str | Path | None = None,
     remark: Callable[[str], None] = lambda sentence: None,
     progress: Progress = silent,
@@ -63,10 +64,9 @@ def map(
         and mass each; then the lower and the upper end of the range, in SI units or as text with a unit.
     points
         Least number of values along an axis; of modules there are all whole numbers.
-    folds
-        True to follow the folds of the curved walks too, which takes a minute.
-    radius
-        True to compute the radius of the curved walks on a lattice of 24 x 24 values, some 50 ms each.
+    also
+        ``folds`` to follow the folds of the curved walks too, which takes a minute; ``radius`` to compute the radius of
+        the curved walks on a lattice of 24 x 24 values, some 50 ms each.
     kept
         File that holds growth rates while they are computed; a map that was cut off goes on from it.
     remark
@@ -83,7 +83,11 @@ def map(
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:
         raise ParameterError("must be a number of values", field="points", value=points, allowed=f"2 to {_MOST_POINTS}")
-    if radius:
+    for name in also:
+        if name not in _ALSO:
+            allowed, nearest = ", ".join(_ALSO), nearest_name(name, _ALSO)
+            raise ParameterError("must be a part of maps", field="also", value=name, allowed=allowed, nearest=nearest)
+    if "radius" in also:
         check_radius(plane)
     file = None if kept is None else Path(kept)
     grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
@@ -92,18 +96,24 @@ def map(
     _announce(grid, remark)
     wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
     grid.refine(wanted, part(progress, 0.0, 0.5))
-    search = Search(plane, grid, folds, part(progress, 0.5, 1.0))
+    search = Search(plane, grid, "folds" in also, part(progress, 0.5, 1.0))
     search.run()
     while (search.cells() & ~wanted).any():
         wanted |= search.cells()
         grid.refine(wanted, part(progress, 0.5, 1.0))
         search.run()
-    bent, lost = radii(plane, grid, part(progress, 0.5, 1.0)) if radius else (np.full(grid.computed.shape, np.nan), [])
-    remarks = [*dict.fromkeys(search.remarks), *_invalid(grid), *lost]
-    values = grid.values
+    bent: Array = np.full(grid.computed.shape, np.nan)
+    lost: list[str] = []
+    if "radius" in also:
+        bent, lost = radii(plane, grid, part(progress, 0.5, 1.0))
+    return _result(grid, search.curves, bent, [*dict.fromkeys(search.remarks), *_invalid(grid), *lost])
+
+
+def _result(grid: Grid, curves: Sequence[MapCurve], radius: Array, remarks: Sequence[str]) -> StabilityMap:
+    plane, values = grid.plane, grid.values
     whole = values[UNSTABLE].astype(np.int16), values[FATE].astype(np.int8)
     columns = plane.x, plane.y, grid.x, grid.y, values[GROWTH], values[FREQUENCY], values[ERROR]
-    return StabilityMap(robot, *columns, *whole, grid.computed, bent, tuple(search.curves), tuple(remarks))
+    return StabilityMap(plane.robot, *columns, *whole, grid.computed, radius, tuple(curves), tuple(remarks))
 
 
 def _invalid(grid: Grid) -> list[str]:

@@ -107,6 +107,8 @@ def axis(robot: Robot, given: Given, field: str) -> Axis:
     except ChilopodError as error:
         error.field = f"{field} {path}"
         raise
+    # Axes and files are in the unit in which the range was given.
+    unit = (units.unit_in(ends[1]) if isinstance(ends[1], str) else "") or unit
     found, shown = Axis(path, low, high, unit, si), " ".join(map(str, ends))
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise ParameterError("must rise from a lower to a higher value", field=f"{field} {path}", value=shown)

@@ -62,6 +62,7 @@ def stability_map(
         if name not in SHOWN:
             allowed, nearest = ", ".join(SHOWN), nearest_name(name, SHOWN)
             raise ParameterError("must name pictures", field="show", value=name, allowed=allowed, nearest=nearest)
+    also = [name for name, wanted in (("folds", folds), ("radius", "radius" in shown)) if wanted]
     result = options.free_in(out, "map.json")
     if out:
         from chilopod.show import files_of_map, write_map
@@ -69,7 +70,7 @@ def stability_map(
         free(files_of_map(out), options.force)
     with progress_bar("map") as tell:
         found = mapped(
-            robot, x, y, points=points, folds=folds, radius="radius" in shown, kept=out and out / "map-rates.nc",
+            robot, x, y, points=points, also=also, kept=out and out / "map-rates.nc",
             remark=lambda sentence: typer.echo(f"note: {sentence}", err=True), progress=partial(tell, "map"),
         )  # fmt: skip
 

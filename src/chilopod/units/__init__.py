@@ -7,7 +7,7 @@
 '41 N*mm/deg'
 """
 
-from chilopod.units.expressions import Unit, format, from_si, parse, unit
+from chilopod.units.expressions import Unit, format, from_si, parse, unit, unit_in
 from chilopod.units.quantity import Description, Flag, Quantity, quantities
 
-__all__ = ["Description", "Flag", "Quantity", "Unit", "format", "from_si", "parse", "quantities", "unit"]
+__all__ = ["Description", "Flag", "Quantity", "Unit", "format", "from_si", "parse", "quantities", "unit", "unit_in"]

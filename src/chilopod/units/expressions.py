@@ -199,6 +199,12 @@ def parse(value: object, si_unit: str) -> float:
     return number
 
 
+def unit_in(value: str) -> str:
+    """Text of the unit of a quantity that :func:`parse` reads; empty if it has none."""
+    match = _NUMBER.fullmatch(value)
+    return match[3].strip() if match else ""
+
+
 def from_si(value: float, unit_text: str) -> float:
     """Return `value`, in SI units, in the unit `unit_text` instead."""
     size = unit(unit_text).size

@@ -48,12 +48,22 @@ def law():
 
 def test_the_figure_says_what_the_docs_say(law):
     text = " ".join(DOCS.read_text(encoding="utf-8").split())
+    assert float(law.scale.max() / law.scale.min()) == pytest.approx(20.0)  # twentyfold
     spread = panel(law).text[0].rpartition("agree to ")[2].replace("\u00a0", " ").rstrip(".")
     assert f"their curves agree to {spread}" in text
     assert f"It is {number(from_si(spring_scale(ROBOT), PAPER_UNIT), 3)} N·mm/deg" in text
     assert f"bends at {number(critical(ROBOT), 3)} of it" in text
     assert f"as built has {number(inertia(ROBOT), 2)}" in text
     assert f"{number(float(law.law.sel(stride=1.0)[-1] / law.law.sel(stride=1.0)[0]), 2)} times as large at" in text
+
+
+def test_where_the_law_ends():
+    """As the docs say: a dip of 5 %, and a rise of 10 % at an inertia of some 1.6."""
+    light = critical(scaled(ROBOT, mass=0.01))
+    off = {at: critical(scaled(ROBOT, mass=at / inertia(ROBOT))) / light - 1.0 for at in (0.009, 0.08, 1.39, 1.73)}
+    assert off[0.009] == pytest.approx(-0.01, abs=2e-3)
+    assert off[0.08] == pytest.approx(-0.05, abs=3e-3)
+    assert off[1.39] < 0.1 < off[1.73]
 
 
 def test_a_robot_far_from_home_has_its_onset():
@@ -74,6 +84,13 @@ def onset(letter, value):
     *_, last = bifurcations(plane.y.change(robot, other), plane.x.path, (plane.x.low, plane.x.high), normal_form=False)
     assert last.point.kind is (Kind.NEIMARK_SACKER if letter == "F" else Kind.PITCHFORK)
     return from_si(last.point.value, plane.x.unit)
+
+
+def test_the_phase_hardly_moves_the_onset():
+    found = [onset("C", math.radians(phase)) for phase in range(60, 181, 5)]
+    said = CHARTS["C"].words.format(least="11.1", most="12.5")
+    assert said in " ".join(DOCS.read_text(encoding="utf-8").split())
+    assert (min(found), max(found)) == (pytest.approx(11.1, abs=0.1), pytest.approx(12.5, abs=0.1))
 
 
 @pytest.mark.parametrize("letter", "BDEFGH")

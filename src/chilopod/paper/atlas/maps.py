@@ -81,7 +81,7 @@ CHARTS = {
         ("ground.friction", "20 N*s/m", "500 N*s/m"),
         ("body.mass", "1 kg", "100 kg"),
         "With k1 = 12 N·mm/deg the robot bends on a floor of more friction than {low} N·s/m if it weighs 1 kg, and "
-        "than {high} if it weighs 100. So a hundred times the mass changes little.",
+        "than {high} if it weighs 100. So a hundred times the mass changes that by a third.",
         "12 N*mm/deg",
         scaled=True,
     ),

@@ -21,7 +21,7 @@ from chilopod.analysis.parameters import ALL, PAPER_UNIT, spring_scale, stiffnes
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.paper.section import Context
-from chilopod.paper.shapes import finish, legend_below
+from chilopod.paper.shapes import DASHED, DOTTED, finish, legend_below
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.show import style
@@ -133,9 +133,7 @@ def collapse(context: Context, progress: Progress = silent) -> xr.Dataset:
 def panel(data: xr.Dataset) -> Panel:
     """Figure of the law."""
     apart = 100.0 * float(abs(data.curve / data.curve.sel(robot=BUILT) - 1.0).max())
-    scale, light = data.scale.values, data.law.isel(mass=0)
-    off = abs(data.law / light - 1.0).max("stride")
-    holds = float(data.inertia[off <= 0.1].max())
+    scale, own = data.scale.values, float(data.inertia.interp(mass=1.0))
     spread = f"{number(apart, 2)}\u00a0%"
     return Panel(
         name="scaling",
@@ -147,9 +145,8 @@ def panel(data: xr.Dataset) -> Panel:
             "A shows the front spring at which the straight walk is lost, over the springs behind it, for robots that "
             f"differ in mass, size, speed and floor. B shows the same curves in units of {_SCALE}. They agree to "
             f"{spread}.",
-            "C shows where the law ends. A module that its feet cannot stop within a step bends with a stiffer spring. "
-            f"The critical spring is within 10\u00a0% of that of a light robot up to an inertia of {number(holds, 2)}; "
-            f"the robot as built has {number(float(data.inertia.interp(mass=1.0)), 2)}.",
+            "C shows where the law ends, at the springs behind as built. A module that its feet cannot stop within a "
+            f"step bends with a stiffer spring. The robot as built has an inertia of {number(own, 2)}.",
         ),
         data=data,
     )
@@ -167,10 +164,10 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         axes["B"].plot(each.rest, each.curve, **look)
     finish(axes["A"], xlabel=f"springs behind it ({SPRING_UNIT})", ylabel=f"critical k₁ ({SPRING_UNIT})", title="A")
     finish(axes["B"], xlabel="springs behind it / scale", ylabel="critical k₁ / scale", title="B", ylim=(0.0, None))
-    for stride, color in zip(data.stride.values, (style.SKY, style.BLACK, style.ORANGE), strict=True):
+    for stride, line in zip(data.stride.values, (DOTTED, "-", DASHED), strict=True):
         label = "stride as built" if stride == 1.0 else f"{stride:g} times the stride"
-        axes["C"].semilogx(data.inertia, data.law.sel(stride=stride), "o-", color=color, markersize=4.0, label=label)
-    axes["C"].axvline(float(data.inertia.interp(mass=1.0)), color=style.GREY, lw=1.0, ls=":", label="inertia as built")
+        axes["C"].semilogx(data.inertia, data.law.sel(stride=stride), color=style.BLACK, linestyle=line, label=label)
+    axes["C"].axvline(float(data.inertia.interp(mass=1.0)), color=style.GREY, lw=1.0, label="inertia as built")
     words = "inertia: mass of a module / (2 × duty factor × friction × period)"
     finish(axes["C"], xlabel=words, ylabel="critical k₁ / scale", title="C", ylim=(0.0, None), legend="upper left")
     legend_below(figure, axes["A"], 1 if narrow else 3)
