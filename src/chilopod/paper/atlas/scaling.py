@@ -146,7 +146,8 @@ def panel(data: xr.Dataset) -> Panel:
             f"differ in mass, size, speed and floor. B shows the same curves in units of {_SCALE}. They agree to "
             f"{spread}.",
             "C shows where the law ends, at the springs behind as built. A module that its feet cannot stop within a "
-            f"step bends with a stiffer spring. The robot as built has an inertia of {number(own, 2)}.",
+            f"step bends with a stiffer spring. The robot as built has an inertia of {number(own, 2)}: mass of a "
+            "module / (2 × duty factor × friction × period).",
         ),
         data=data,
     )
@@ -168,7 +169,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         label = "stride as built" if stride == 1.0 else f"{stride:g} times the stride"
         axes["C"].semilogx(data.inertia, data.law.sel(stride=stride), color=style.BLACK, linestyle=line, label=label)
     axes["C"].axvline(float(data.inertia.interp(mass=1.0)), color=style.GREY, lw=1.0, label="inertia as built")
-    words = "inertia: mass of a module / (2 × duty factor × friction × period)"
-    finish(axes["C"], xlabel=words, ylabel="critical k₁ / scale", title="C", ylim=(0.0, None), legend="upper left")
+    look: dict[str, Any] = {"xlabel": "inertia, m / (2βcT)", "ylabel": "critical k₁ / scale"}
+    finish(axes["C"], title="C", ylim=(0.0, None), legend="upper left", **look)
     legend_below(figure, axes["A"], 1 if narrow else 3)
     return figure
