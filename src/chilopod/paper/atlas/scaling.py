@@ -169,7 +169,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         label = "stride as built" if stride == 1.0 else f"{stride:g} times the stride"
         axes["C"].semilogx(data.inertia, data.law.sel(stride=stride), color=style.BLACK, linestyle=line, label=label)
     axes["C"].axvline(float(data.inertia.interp(mass=1.0)), color=style.GREY, lw=1.0, label="inertia as built")
-    look: dict[str, Any] = {"xlabel": "inertia, m / (2βcT)", "ylabel": "critical k₁ / scale"}
-    finish(axes["C"], title="C", ylim=(0.0, None), legend="upper left", **look)
+    labels: dict[str, Any] = {"xlabel": "inertia, m / (2βcT)", "ylabel": "critical k₁ / scale"}
+    finish(axes["C"], title="C", ylim=(0.0, None), legend="upper left", **labels)
     legend_below(figure, axes["A"], 1 if narrow else 3)
     return figure
