@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from scipy.special import jn_zeros, jv
 
-from chilopod.stability.unit_circle.zeros import find_zeros
+from chilopod.stability.unit_circle.zeros import DENSE, FEW_PLACES, MORE_PLACES, PLACES, find_zeros, interpolated
 
 
 def signed_log(function):
@@ -154,3 +154,17 @@ def test_a_jump_is_no_smooth_function():
     assert a <= 0.3 <= b
     assert b - a < 1e-6
     assert found.changes == ()
+
+
+@pytest.mark.parametrize(("places", "degree"), [(FEW_PLACES, 4), (PLACES, 8), (MORE_PLACES, 16)])
+def test_polynomials_through_places_show_what_they_do_not_fit(places, degree):
+    def polynomial(count):
+        return lambda x: np.cos(count * np.arccos(np.clip(x, -1.0, 1.0)))
+
+    lower = polynomial(degree - 2)
+    _, wrong, dense = interpolated(lower(places), places)
+    assert wrong < 1e-13
+    assert np.abs(dense - lower(DENSE)).max() < 1e-13
+    for count in (degree - 1, degree + 1, degree + 2, degree + 3):  # the error is seen, though it is no bound
+        _, wrong, dense = interpolated(polynomial(count)(places), places)
+        assert 4.0 * wrong > np.abs(dense - polynomial(count)(DENSE)).max()

@@ -33,16 +33,17 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
         best = 0.0
         while True:
             z = best if best > 0.0 else h
-            power = z**first
-            biggest = 0.0
+            power = 1.0 if first == 0 else z if first == 1 else z * z
+            biggest = abs(coefficients[first]) * power
             at = first
-            for k in range(first, q // 2 + 1):
+            for k in range(first + 1, q // 2 + 1):
+                power *= z
                 size = abs(coefficients[k]) * power
                 if size > biggest:
                     biggest = size
                     at = k
-                power *= z
-            if best == 0.0 and last * z**q <= 2.0 * epsilon * biggest:
+            last_power = power * power * (z if q % 2 == 1 else 1.0)  # z**q, without a call
+            if best == 0.0 and last * last_power <= 2.0 * epsilon * biggest:
                 best = h
                 break
             better = (epsilon * abs(coefficients[at]) / last) ** (1.0 / (q - at))

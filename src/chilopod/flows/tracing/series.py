@@ -130,28 +130,19 @@ def values_at(
                 values[i, k + 1] = values[slopes[i], k] * (unit / (k + 1))
 
 
-@fused_njit(error_model="numpy")
-def _convolve(tangents: Any, values: Any, i: int, w: int, a: int, first: int, k: int, factor: float) -> None:
-    """Add factor sum of w[j] da[k - j], j from ``first``, to the tangents of order k of node i."""
+@fused_njit(error_model="numpy", inline="always")
+def _add(tangents: Any, i: int, k: int, a: int, factor: float) -> None:
+    """Add factor da[k] to the tangents of order k of node i."""
     for lane in range(tangents.shape[2]):
-        s = values[w, first] * tangents[a, k - first, lane]
-        for j in range(first + 1, k + 1):
-            s += values[w, j] * tangents[a, k - j, lane]
-        tangents[i, k, lane] += factor * s
-
-
-@fused_njit(error_model="numpy")
-def _add(tangents: Any, i: int, k: int, a: int, at: int, factor: float) -> None:
-    """Add factor da[at] to the tangents of order k of node i."""
-    for lane in range(tangents.shape[2]):
-        tangents[i, k, lane] += factor * tangents[a, at, lane]
+        tangents[i, k, lane] += factor * tangents[a, k, lane]
 
 
 @fused_njit(error_model="numpy")
 def tangents_at(
     program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, tangents: Any
 ) -> None:
-    """The same for the tangents that are needed, from values computed before."""
+    """The same for the tangents that are needed, from values computed before. Each is a sum of one or two products of
+    series, w da; a single loop computes them all, because calls with arrays, and copies of the loop, take long."""
     nodes, orders, lanes = tangents.shape
     tangents = as_lanes(tangents.reshape(nodes, orders, lanes // HALF, HALF), HALF)
     for k in range(order + 1):
@@ -164,28 +155,37 @@ def tangents_at(
             if code == ops.LINEAR:
                 for j in range(a, b):
                     if program[4, terms[1, j]] != 0:
-                        _add(tangents, i, k, terms[1, j], k, values[terms[0, j], 0])
-            elif code == ops.PRODUCT:
-                if program[4, a] != 0:
-                    _convolve(tangents, values, i, b, a, 0, k, 1.0)
-                if program[4, b] != 0:
-                    _convolve(tangents, values, i, a, b, 0, k, 1.0)
-            elif code == ops.SQUARE:
-                _convolve(tangents, values, i, a, a, 0, k, 2.0)
-            elif code == ops.QUOTIENT:
-                if math.isinf(values[b, 0]):
+                        _add(tangents, i, k, terms[1, j], values[terms[0, j], 0])
+                continue
+            if code == ops.SELECT:
+                _add(tangents, i, k, b if values[a, 0] > 0.0 else program[3, i], 1.0)
+                continue
+            if math.isinf(values[b if code == ops.QUOTIENT else a, 0]) and code not in (ops.PRODUCT, ops.SQUARE):
+                continue
+            if code == ops.QUOTIENT and program[4, a] != 0:
+                _add(tangents, i, k, a, 1.0 / values[b, 0])
+            for second in range(2):
+                w, u, first, factor = -1, a, 0, 1.0
+                if code == ops.PRODUCT:
+                    w, u = (a, b) if second else (b, a)
+                elif code == ops.QUOTIENT:
+                    w, u, first = (b, i, 1) if second else (i, b, 0)
+                    factor = -1.0 / values[b, 0]
+                elif second == 0:
+                    w = a if code == ops.SQUARE else program[3, i]
+                    factor = 2.0 if code == ops.SQUARE else -1.0 if code == ops.COS else 1.0
+                if w < 0 or first > k or program[4, u] == 0:
                     continue
-                f = 1.0 / values[b, 0]
-                if program[4, a] != 0:
-                    _add(tangents, i, k, a, k, f)
-                if program[4, b] != 0:
-                    _convolve(tangents, values, i, i, b, 0, k, -f)
-                if k > 0:
-                    _convolve(tangents, values, i, b, i, 1, k, -f)
-            elif code == ops.SELECT:
-                _add(tangents, i, k, b if values[a, 0] > 0.0 else program[3, i], k, 1.0)
-            elif not math.isinf(values[a, 0]):
-                _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == ops.COS else 1.0)
+                half = (k - first) // 2
+                for lane in range(tangents.shape[2]):
+                    s = values[w, first] * tangents[u, k - first, lane]
+                    odd = 0.0 * s  # two independent sums run in parallel
+                    for j in range(first + 1, first + 1 + half):
+                        s += values[w, j] * tangents[u, k - j, lane]
+                        odd += values[w, half + j] * tangents[u, k - half - j, lane]
+                    for j in range(first + 1 + 2 * half, k + 1):
+                        s += values[w, j] * tangents[u, k - j, lane]
+                    tangents[i, k, lane] += factor * (s + odd)
         if k < order:
             for i in range(slopes.size):
                 for lane in range(tangents.shape[2]):

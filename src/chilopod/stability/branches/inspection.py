@@ -1,10 +1,11 @@
 """Events within a step along a curve of periodic orbits.
 
-The return map is computed at the ends of a step and at nine places in between. If polynomials of degree eight through
-the test functions fit and stay clear of zero, the step has no event; else it is searched, on corrected orbits, for all
-crossings of the unit circle (:mod:`~chilopod.stability.unit_circle.crossings`).
+The return map is computed at the ends of a step and at five places in between. If polynomials of degree four through
+the test functions fit and stay clear of zero, the step has no event; else four places more and polynomials of degree
+eight decide. If these do not, the step is searched, on corrected orbits, for all crossings of the unit circle
+(:mod:`~chilopod.stability.unit_circle.crossings`).
 The guarantee is that of an interpolation: crossings that the places resolve are found however close they lie; an event
-confined between two places, which are at most a sixth of a step apart, is missed.
+confined between two places, which are at most a fifth of a step apart, is missed.
 
 A determinant that changes its sign without a branch point shows that a step landed on another curve. So do one that
 was to change it and does not, a multiplier that only touches +1, and orbits that are missing within a step, unless
@@ -34,7 +35,7 @@ from chilopod.stability.tracing.equations import Step, predicted
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, factors
-from chilopod.stability.unit_circle.zeros import DEGREE, PLACES, interpolated
+from chilopod.stability.unit_circle.zeros import FEW_PLACES, PLACES, interpolated
 
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
 _BUDGET = 400  # corrected orbits within one step
@@ -222,18 +223,22 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
 
 
 def _crossed_within(within: Within) -> bool:
-    """True unless polynomials through the test functions at the places stay clear of zero."""
+    """True unless polynomials through the test functions at the places, few or all, stay clear of zero."""
     low, size = within.low, within.step.size
-    places = low + 0.5 * (1.0 + PLACES) * (size - low)
-    places[DEGREE] = size
-    nu = np.linalg.eigvals(np.array([within.near_jacobian(each) for each in places.tolist()])).astype(np.complex128)
-    with np.errstate(all="ignore"):  # test functions, which change sign at the events
-        tests = np.stack([factors(nu, event).prod(axis=1).real for event in _EVENTS], axis=1)
-    outside = (np.abs(nu) > 1.0).sum(axis=1)
-    if not np.isfinite(tests).all() or (outside != outside[0]).any():
-        return True
-    _, uncertain, fine = interpolated(tests)
-    return bool((np.abs(fine) <= _CLEAR * uncertain).any() or (fine[1:] * fine[:-1] <= 0.0).any())
+    known: dict[float, Array] = {}
+    for parts in (FEW_PLACES, PLACES):
+        places = np.where(parts == 1.0, size, low + 0.5 * (1.0 + parts) * (size - low)).tolist()
+        known |= {place: within.near_jacobian(place) for place in places if place not in known}
+        nu = np.linalg.eigvals(np.array([known[place] for place in places])).astype(np.complex128)
+        with np.errstate(all="ignore"):  # test functions, which change sign at the events
+            tests = np.stack([factors(nu, event).prod(axis=1).real for event in _EVENTS], axis=1)
+        outside = (np.abs(nu) > 1.0).sum(axis=1)
+        if not np.isfinite(tests).all() or (outside != outside[0]).any():
+            return True
+        _, uncertain, fine = interpolated(tests, parts)
+        if (np.abs(fine) > _CLEAR * uncertain).all() and (fine[1:] * fine[:-1] > 0.0).all():
+            return False
+    return True
 
 
 def _crossed_between_ends(within: Within, turned: bool) -> bool:

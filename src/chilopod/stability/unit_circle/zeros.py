@@ -23,32 +23,39 @@ from numpy.polynomial import chebyshev
 from chilopod.frozen import Array
 
 DEGREE = 8
-PLACES: Array = np.append(np.cos(np.pi * np.arange(DEGREE, -1, -1) / DEGREE), [-0.618, 0.137])
+_NODES = np.cos(np.pi * np.arange(DEGREE, -1, -1) / DEGREE)
+
+PLACES: Array = np.append(_NODES, [-0.618, 0.137])
 """Nodes of the polynomial, and the two places of the comparison."""
 
+FEW_PLACES: Array = _NODES[[0, 2, 4, 6, 8, 3, 5]]
+"""The nodes of half the degree, and two others of these nodes for the comparison."""
+
 MORE_PLACES: Array = np.append(PLACES, np.cos(np.pi * (np.arange(DEGREE) + 0.5) / DEGREE))
-"""The same, and the nodes in between, for twice the degree."""
+"""``PLACES`` and the nodes in between, for twice the degree."""
 
 DENSE = np.linspace(-1.0, 1.0, 65)
 """Places where the polynomial is evaluated."""
 
-_CHECKS = [DEGREE + 1, DEGREE + 2]
 
-
-def interpolated(values: Array) -> tuple[Array, Array, Array]:
-    """Chebyshev coefficients of polynomials through values at ``PLACES`` or more, errors, and values at ``DENSE``."""
-    fit, at_checks, at_dense = _matrices(len(values))
-    coefficients: Array = fit @ np.delete(values, _CHECKS, axis=0)
-    off = np.abs(at_checks @ coefficients - values[_CHECKS]).max(axis=0)
+def interpolated(values: Array, places: Array) -> tuple[Array, Array, Array]:
+    """Chebyshev coefficients of polynomials through values at one of the sets of places above, errors, and values at
+    ``DENSE``."""
+    fit, at_checks, at_dense, checks = _matrices(places.size)
+    coefficients: Array = fit @ np.delete(values, checks, axis=0)
+    off = np.abs(at_checks @ coefficients - values[checks]).max(axis=0)
     return coefficients, np.maximum(off, np.abs(coefficients[-2:]).max(axis=0)), at_dense @ coefficients
 
 
 @cache
-def _matrices(count: int) -> tuple[Array, Array, Array]:
-    """Coefficients from values at the nodes among places, and from these values at checks and ``DENSE``."""
-    nodes = np.delete(MORE_PLACES[:count], _CHECKS)
-    fit, checks, dense = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, MORE_PLACES[_CHECKS], DENSE))
-    return np.asarray(np.linalg.inv(fit)), np.asarray(checks), np.asarray(dense)
+def _matrices(count: int) -> tuple[Array, Array, Array, list[int]]:
+    """Coefficients from values at the nodes among some places, from these values at checks and ``DENSE``, and indices
+    of the checks."""
+    places, first = (FEW_PLACES, 5) if count == FEW_PLACES.size else (MORE_PLACES[:count], DEGREE + 1)
+    checks = [first, first + 1]
+    nodes = np.delete(places, checks)
+    fit, others, dense = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, places[checks], DENSE))
+    return np.asarray(np.linalg.inv(fit)), np.asarray(others), np.asarray(dense), checks
 
 
 Interval = tuple[float, float]
@@ -212,7 +219,7 @@ class _Search:
         reference = float(logs.max())
         if reference == -np.inf:
             return [_Part(a, b, _Kind.ZERO)]
-        coefficients, off, dense = interpolated(signs * np.exp(logs - reference))
+        coefficients, off, dense = interpolated(signs * np.exp(logs - reference), MORE_PLACES[: logs.size])
         wrong = max(float(off), _ROUNDING)
         if max(dense.min(), -dense.max()) > _CLEAR * wrong + float(np.abs(coefficients) @ _BULGE[: coefficients.size]):
             return [_Part(a, b, _Kind.SIGN, float(np.sign(dense[0])))]
