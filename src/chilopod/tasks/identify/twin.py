@@ -287,6 +287,7 @@ def identify_twin(
     """Identify the constants: a :func:`search` from the known sets, then the best of the good fits that reach the curve
     from a straight start, like the robot.
 
+    The known sets serve if the free constants have theirs among them; other constants then begin as in the robot.
     ``evaluations`` and ``samples`` are the numbers of evaluations that train the surrogate and of samples of the
     valley; for the other arguments see :func:`search`.
     """
@@ -294,7 +295,10 @@ def identify_twin(
     free = data.free
     free.check(robot)
     data.start(robot, data.springs)  # refuses the shape of another robot
-    places = [free.parts_of(FITTED.values_at(fit.parts)) for fit in known()] if free.paths == FITTED.paths else []
+    fitted = known() if set(FITTED.paths) <= set(free.paths) else []
+    if len(free.paths) > len(FITTED.paths):  # the weights hold without the others
+        fitted = [fit for fit in fitted if fit.largest <= GOOD]
+    places = [free.parts_of(free.of(FITTED.robot_with(robot, FITTED.values_at(fit.parts)))) for fit in fitted]
     starts = [parts for parts in places if ((parts >= 0.0) & (parts <= 1.0)).all()]
     kept = None if folder is None else check_folder(folder)
     counts = evaluations, samples
