@@ -1,5 +1,6 @@
 """What each number of a robot does to its onset of bending, and how sure that is."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -95,6 +96,18 @@ def test_the_coefficient_of_the_normal_form_has_derivatives_within_their_errors(
     # Differences of located points by a script of 2026-11-26, steps of 0.1 to 0.8 %, extrapolated: 0.0745878.
     assert 100.0 * found.percent("coefficient")["legs.half_width"] == pytest.approx(0.0745878, abs=2e-7)
     assert found.errors[0, 0] * ROBOT.get("legs.half_width") < 1e-6
+
+
+def test_a_number_without_which_there_is_no_coefficient_costs_no_other_derivative():
+    # Legs that are not half a period apart leave no symmetry, and so no pitchfork with a cubic coefficient.
+    found = sensitivity(ROBOT, quantities=("coefficient", "onset"), paths=["legs.half_width", "gait.side_phase"])
+    assert np.isnan(found.of("coefficient")["gait.side_phase"])
+    assert found.of("onset")["gait.side_phase"] == pytest.approx(0.0, abs=1e-9)
+    assert np.isfinite(found.of("coefficient")["legs.half_width"])
+    assert "  no derivative: coefficient by gait.side_phase" in found.lines()
+    plain = json.loads(json.dumps(found.as_json(), allow_nan=False))
+    assert plain["coefficient"]["derivatives_si"]["gait.side_phase"] is None
+    assert plain["coefficient"]["value_si"] < 0.0
 
 
 def test_an_onset_of_springs_alike_does_not_depend_on_each():

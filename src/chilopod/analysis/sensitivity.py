@@ -30,7 +30,7 @@ from chilopod.analysis.quantities import (
     straight_return,
     unit_of,
 )
-from chilopod.errors import ParameterError, nearest_name
+from chilopod.errors import AnalysisError, ParameterError, nearest_name
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, tornado
 from chilopod.progress import Progress, silent
@@ -59,7 +59,8 @@ class Sensitivity(Summary, ReadOnlyArrays):
         Names of the quantities, of :data:`chilopod.analysis.quantities.QUANTITIES`, and their values, SI, shape
         (quantities,).
     derivatives, errors
-        Derivatives and estimates of their errors, SI, shape (quantities, numbers).
+        Derivatives and estimates of their errors, SI, shape (quantities, numbers); NaN where neighbouring robots lack
+        the quantity.
     """
 
     robot: Robot
@@ -100,12 +101,13 @@ class Sensitivity(Summary, ReadOnlyArrays):
         found["at_si"] = own if self.onset.at is None else self.onset.at
         found["numbers_si"] = dict(zip(self.paths, self.numbers.tolist(), strict=True))
         for row, name in enumerate(self.quantities):
-            found[name] = {
-                "value_si": float(self.values[row]),
-                "derivatives_si": self.of(name),
-                "errors_si": dict(zip(self.paths, self.errors[row].tolist(), strict=True)),
-                "percent_per_percent" if name in _RELATIVE else "change_per_percent": self.percent(name),
+            errors = dict(zip(self.paths, self.errors[row].tolist(), strict=True))
+            tables = {"derivatives_si": self.of(name), "errors_si": errors}
+            tables["percent_per_percent" if name in _RELATIVE else "change_per_percent"] = self.percent(name)
+            known = {
+                key: {path: None if np.isnan(x) else x for path, x in table.items()} for key, table in tables.items()
             }
+            found[name] = {"value_si": float(self.values[row]), **known}
         return found
 
     @property
@@ -122,13 +124,17 @@ class Sensitivity(Summary, ReadOnlyArrays):
         heads = [f"{name} ({'%' if name in _RELATIVE else QUANTITIES[name]} per %)" for name in names]
         columns = [self.percent(name) for name in names]
         cells: list[Sequence[str]] = [("number", "value", *heads)]
-        below, without = [], []
-        largest = -np.abs(self.derivatives[rows[0]] * self.numbers) if rows else np.zeros(len(self.paths))
+        below, without, lacks = [], [], []
+        largest = (
+            -np.abs(np.nan_to_num(self.derivatives[rows[0]]) * self.numbers) if rows else np.zeros(len(self.paths))
+        )
         for at in np.argsort(largest, kind="stable").tolist():
             path = self.paths[at]
             unit = self.robot.unit_of(path)
+            missing = np.isnan(self.derivatives[:, at])
+            lacks += [f"{name} by {path}" for name, no in zip(self.quantities, missing, strict=True) if no]
             if not known[:, at].any():
-                without.append(path)
+                without += [path] * (not missing.any())
             elif self.numbers[at] == 0.0:
                 for name, row in zip(names, rows, strict=True):
                     slope = units.from_si(self.derivatives[row, at], self._unit(name)) / units.from_si(1.0, unit)
@@ -136,9 +142,11 @@ class Sensitivity(Summary, ReadOnlyArrays):
                     below += [f"{path} is 0: {name} {said}"] * bool(known[row, at])
             else:
                 value = units.format(self.robot.get(path), unit, digits=5)
-                changes = [f"{c[path]:+.4g}" if known[row, at] else "0" for row, c in zip(rows, columns, strict=True)]
+                shown = [f"{c[path]:+.4g}" if known[row, at] else "0" for row, c in zip(rows, columns, strict=True)]
+                changes = ["" if missing[row] else each for row, each in zip(rows, shown, strict=True)]
                 cells.append((path, value, *changes))
         below += [f"no effect to first order: {', '.join(without)}"] * bool(without)
+        below += [f"no derivative: {', '.join(lacks)}"] * bool(lacks)
         return [], cells, below
 
     def plot(self, axes: Axes | None = None) -> Axes:
@@ -174,7 +182,7 @@ def sensitivity(
     Raises
     ------
     AnalysisError
-        If a quantity does not exist, as the radius of a robot that walks straight, or has no derivative.
+        If a quantity does not exist, as the radius of a robot that walks straight.
     ParameterError
         If a quantity or a number is not known.
     """
@@ -275,7 +283,10 @@ def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str],
         def at(value: float, path: str = path) -> Array:
             return np.array(function(robot.with_value(path, value)))
 
-        found.append(derivative(at, robot.get(path), size_of(robot, path)))
+        try:
+            found.append(derivative(at, robot.get(path), size_of(robot, path)))
+        except AnalysisError:  # neighbours lack the quantity, as the coefficient without the symmetry of half a period
+            found.append((np.array(np.nan), np.array(np.nan)))
     return {name: (value, [float(slope) for slope, _ in found], [float(error) for _, error in found])}
 
 

@@ -32,8 +32,14 @@ _HERE: Final = files("chilopod.tasks.identify")
 TEMPLATES: Final = {name: _HERE.joinpath(f"{name}.toml").read_text(encoding="utf-8") for name in ("planar", "twin")}
 """Templates of the files that :func:`load_data` reads, by the command that fits their data."""
 
-FITTED: Final = FreeConstants.read(tomllib.loads(TEMPLATES["twin"])["free"])
+_RANGES: Final = tomllib.loads(TEMPLATES["twin"])["free"]
+FITTED: Final = FreeConstants.read(_RANGES)
 """The constants that are fitted unless the data name others, and their ranges."""
+
+_FRICTION: Final = ["0 N*m", "0.1 N*m"]
+_MORE: Final = {"twin.yaw_friction": _FRICTION, "twin.leg_friction": _FRICTION}
+WITH_FRICTION: Final = FreeConstants.read({**_RANGES, "springs.damping": ["0.005 N*m*s/rad", "0.5 N*m*s/rad"], **_MORE})
+"""The same with a wider range of the damping, and with dry friction of the yaw joints and of the legs' joints."""
 
 
 class CriticalMode(Description):

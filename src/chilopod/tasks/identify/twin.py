@@ -35,6 +35,7 @@ from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import FITTED, BaseSeries
 from chilopod.tasks.identify.estimates import CONFIDENCE, Estimates, Identified
+from chilopod.tasks.identify.free import FreeConstants
 from chilopod.tasks.identify.twin_series import DURATION, LOST, Series, base_series, residuals
 from chilopod.tasks.identify.valley import LEAST, Samples, Surrogate
 from chilopod.tasks.radius_law import DURATION as LONG
@@ -196,12 +197,13 @@ def evaluate(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None =
     return Fit(parts, residuals(given, found, data))
 
 
-def known() -> list[Fit]:
-    """Sets of constants included in chilopod, first those of the preset, with the residuals of the paper's series and
-    their weights."""
-    shipped = json.loads(files("chilopod.tasks.identify").joinpath("twin_fits.json").read_text(encoding="utf-8"))
+def known(free: FreeConstants = FITTED) -> list[Fit]:
+    """Sets of constants included in chilopod, with the residuals of the paper's series and their weights; those of
+    ``FITTED`` begin with the preset's. The others are of ``WITH_FRICTION``."""
+    name = "twin" if free is FITTED else "friction"
+    shipped = json.loads(files("chilopod.tasks.identify").joinpath(f"{name}_fits.json").read_text(encoding="utf-8"))
     return [
-        Fit(FITTED.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in shipped["fits"]
+        Fit(free.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in shipped["fits"]
     ]
 
 
