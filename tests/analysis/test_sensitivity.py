@@ -110,6 +110,15 @@ def test_a_number_without_which_there_is_no_coefficient_costs_no_other_derivativ
     assert plain["coefficient"]["value_si"] < 0.0
 
 
+def test_what_does_not_enter_has_no_effect():
+    # The onset is a value of this spring, whatever the robot's is: what is found is rounding, within its error.
+    found = sensitivity(ROBOT, quantities=("friction",), paths=[K1, "ground.friction"])
+    assert abs(found.of("friction")[K1]) <= found.errors[0, 0]
+    lines = found.lines()
+    assert f"  no effect to first order: {K1}" in lines
+    assert "friction (per %)" in lines[1]
+
+
 def test_an_onset_of_springs_alike_does_not_depend_on_each():
     found = sensitivity(ROBOT, Onset(ALL), ("onset",), ["springs.stiffness[2]", "body.mass"])
     assert found.of("onset")["springs.stiffness[2]"] == 0.0

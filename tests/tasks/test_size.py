@@ -86,6 +86,8 @@ def test_a_wish_that_nobody_meets_says_what_stands_in_the_way():
     assert any("without the wish for speed the others are met" in each for each in both.reasons)
     assert any("Pareto front" in line for line in both.lines())
     assert both.front.shape[1] == 3
+    steps = np.abs(np.diff(both.front[:, 0])) / np.ptp(both.front[:, 0])
+    assert (steps > 1e-4).all()  # no place twice
     assert both.plot(Figure().add_subplot()).get_legend()
 
 

@@ -19,14 +19,18 @@ LEVELS = 4
 
 _STEP = 1e-3  # largest step, relative to the size of the argument
 _SAFETY = 4.0  # factor on the last change of the extrapolation: switches within the steps slow its convergence
-_ROUND_OFF = 8.0 * 2.0**-52  # error of a value, relative to the values
+ROUND_OFF = 8.0 * 2.0**-52
+"""Error of a value, relative to the values."""
 
 
-def derivative(function: Callable[[float], Array], at: float, size: float) -> tuple[Array, Array]:
+def derivative(
+    function: Callable[[float], Array], at: float, size: float, round_off: float = ROUND_OFF
+) -> tuple[Array, Array]:
     """Derivative of a function of one number at a place, and its error; both have the shape of the function's values.
 
-    The ``size`` of the number sets the steps. Where the function raises a ParameterError on one side, as at the end of
-    a range, the derivative is that towards the other side. AnalysisError if it cannot be evaluated on both sides.
+    The ``size`` of the number sets the steps; ``round_off`` is the error of a value, relative to the values. Where the
+    function raises a ParameterError on one side, as at the end of a range, the derivative is that towards the other
+    side. AnalysisError if it cannot be evaluated on both sides.
     """
     steps = _STEP * size * 0.5 ** np.arange(LEVELS)
     here = np.asarray(function(at), dtype=np.float64)
@@ -42,7 +46,7 @@ def derivative(function: Callable[[float], Array], at: float, size: float) -> tu
     if not (above.size or below.size):
         raise AnalysisError(f"has no derivative at {at:.6g}: neighbouring values are out of range", field="robot")
     widths = steps.reshape(-1, *[1] * here.ndim)
-    noise = _ROUND_OFF * np.maximum(np.abs(here), max(float(np.abs(each).max()) for each in found if each.size))
+    noise = round_off * np.maximum(np.abs(here), max(float(np.abs(each).max()) for each in found if each.size))
     noise = noise * 2.0**LEVELS / steps[-1]
     if above.size and below.size:
         slopes = (above - below) / (2.0 * widths)

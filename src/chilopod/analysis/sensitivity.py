@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chilopod import units
-from chilopod.analysis.derivatives import derivative
+from chilopod.analysis.derivatives import ROUND_OFF, derivative
 from chilopod.analysis.parameters import numbers_read
 from chilopod.analysis.quantities import (
     QUANTITIES,
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 DEFAULT = ("onset", "growth", "frequency")
 """Quantities that take little time."""
 
+_ROUND_OFF = {"friction": 100.0 * ROUND_OFF}  # that is a difference of onsets, over 2 %
 _RELATIVE = "onset", "radius"  # shown in % per %; the others may be near zero
 
 
@@ -121,7 +122,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
         known = np.abs(self.derivatives) > self.errors
         names = [name for name, row in zip(self.quantities, known, strict=True) if row.any()]  # no frequency of a bend
         rows = [self._row(name) for name in names]
-        heads = [f"{name} ({'%' if name in _RELATIVE else QUANTITIES[name]} per %)" for name in names]
+        heads = [f"{name} ({f'{_changed(name)} per %'.strip()})" for name in names]
         columns = [self.percent(name) for name in names]
         cells: list[Sequence[str]] = [("number", "value", *heads)]
         below, without, lacks = [], [], []
@@ -138,7 +139,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
             elif self.numbers[at] == 0.0:
                 for name, row in zip(names, rows, strict=True):
                     slope = units.from_si(self.derivatives[row, at], self._unit(name)) / units.from_si(1.0, unit)
-                    said = f"changes by {slope:+.4g} {self._unit(name)} for 1 {unit}"
+                    said = f"changes by {f'{slope:+.4g} {self._unit(name)}'.strip()} for 1 {unit}"
                     below += [f"{path} is 0: {name} {said}"] * bool(known[row, at])
             else:
                 value = units.format(self.robot.get(path), unit, digits=5)
@@ -154,8 +155,13 @@ class Sensitivity(Summary, ReadOnlyArrays):
         name = self.quantities[0]
         known = np.abs(self.derivatives[0] * self.numbers) > self.errors[0] * np.abs(self.numbers)
         changes = {path: each for (path, each), sure in zip(self.percent(name).items(), known, strict=True) if sure}
-        unit = "%" if name in _RELATIVE else QUANTITIES[name]
-        return tornado(axes, changes, f"change of the {name} by 1 % of a number ({unit})", self.robot.name)
+        said = f"change of the {name} by 1 % of a number" + f" ({_changed(name)})" * bool(_changed(name))
+        return tornado(axes, changes, said, self.robot.name)
+
+
+def _changed(name: str) -> str:
+    """Unit in which the change of a quantity by one per cent of a number is shown."""
+    return "%" if name in _RELATIVE else QUANTITIES[name]
 
 
 def sensitivity(
@@ -284,7 +290,7 @@ def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str],
             return np.array(function(robot.with_value(path, value)))
 
         try:
-            found.append(derivative(at, robot.get(path), size_of(robot, path)))
+            found.append(derivative(at, robot.get(path), size_of(robot, path), _ROUND_OFF.get(name, ROUND_OFF)))
         except AnalysisError:  # neighbours lack the quantity, as the coefficient without the symmetry of half a period
             found.append((np.array(np.nan), np.array(np.nan)))
     return {name: (value, [float(slope) for slope, _ in found], [float(error) for _, error in found])}

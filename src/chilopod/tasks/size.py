@@ -526,4 +526,6 @@ class _Search:
             for (place, _), own in zip(found, missed, strict=True)
             if (own < _FAR).all() and not any((other[pair] < own[pair] - _MET).all() for other in missed)
         ]
-        return sorted(kept, key=lambda place: tuple(place.tolist()))
+        ordered = sorted(kept, key=lambda place: tuple(place.tolist()))
+        pairs = zip([None, *ordered], ordered, strict=False)
+        return [place for last, place in pairs if last is None or np.abs(place - last).max() > _AT_END]
