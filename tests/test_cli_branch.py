@@ -87,3 +87,14 @@ def test_no_branch_to_resume(saved):
         code, out, err = run(*ROBOT, "--resume", folder)
         assert (code, out, len(err.splitlines())) == (2, "", 1)
         assert f"{missing}: does not exist{more}" in err
+
+
+def test_the_interval_is_round_the_pitchfork_of_any_robot():
+    code, out, _ = run(*ROBOT, "--points", "1", "--json", "--set", "ground.friction=24.65 N*s/m")
+    assert code == 0
+    first = json.loads(out)["points"][0]
+    assert first["special"] == "pitchfork"
+    assert first["value"] == pytest.approx(3.04, rel=1e-3)  # located on its own; far below the paper's springs
+    code, _, err = run(*ROBOT, "--parameter", "legs.forward_offset")
+    assert code == 2
+    assert err.strip() == "error: --between: must be given for legs.forward_offset"

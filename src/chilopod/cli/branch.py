@@ -15,13 +15,16 @@ from chilopod.cli.progress import progress_bar
 if TYPE_CHECKING:
     import xarray as xr
 
-_BETWEEN = ("7.5 N*mm/deg", "20 N*mm/deg")
+    from chilopod.robot import Robot
+
+_AROUND = 5.0 / 8.0, 5.0 / 3.0  # ends of the default interval, relative to the pitchfork
 
 BetweenOption = Annotated[
     tuple[str, str] | None,
     typer.Option(
         metavar="LOW HIGH",
-        help='Interval; by default "7.5 N*mm/deg" "20 N*mm/deg", or that of the branch that is resumed.',
+        help="Interval; by default that of the branch that is resumed, or, of springs, about 5/8 to 5/3 of the one at "
+        "which the straight walk gives way.",
     ),
 ]
 PointsOption = Annotated[
@@ -68,8 +71,7 @@ def branch(
     Example: chilopod branch aoi2022-planar --between "7.5 N*mm/deg" "20 N*mm/deg" --out curved
     """
     described = options.described
-    chosen = between or (None if resume else _BETWEEN)
-    limits = shared.interval(described, parameter, chosen) if chosen else None
+    limits = shared.interval(described, parameter, between) if between else None
     from chilopod.analysis.branch import as_json as plain
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
 
@@ -84,7 +86,7 @@ def branch(
     with progress_bar("branch") as show:
         how: dict[str, Any] = {"points": points, "longest": longest, "progress": partial(show, "branch")}
         if saved is None:
-            assert limits is not None
+            limits = limits or _around(described, parameter)
             data = curved_walks(described, parameter, limits, side=-1 if left else 1, **how)
         else:
             data = resumed(saved, described, parameter, limits, side=-1 if left else None, **how)
@@ -95,6 +97,15 @@ def branch(
         return write_branch(data, folder, replace=replace) if folder else []
 
     shared.deliver(write, lambda: print_json(plain(data)) if options.as_json else typer.echo("\n".join(_lines(data))))
+
+
+def _around(robot: Robot, parameter: str) -> tuple[float, float]:
+    """Interval of a spring around the pitchfork, SI, with ends of two digits."""
+    from chilopod import units
+
+    value, unit = shared.onset_of(robot, parameter, None).first(robot).point.value, robot.unit_of(parameter)
+    low, high = (f"{units.from_si(part * value, unit):.2g} {unit}" for part in _AROUND)
+    return shared.interval(robot, parameter, (low, high))
 
 
 def _lines(data: xr.Dataset) -> list[str]:
