@@ -185,7 +185,7 @@ def _nearest(found: xr.Dataset) -> str:
 
 
 def _refitted(found: xr.Dataset) -> str:
-    """Sets that one more datum leaves, in words: they are weighted by their distance from it, over its standard error."""
+    """Sets that one more datum leaves, in words, by weights from their distance to it."""
     name = next(iter(printed.VARIANTS))
     paper = printed.VARIANTS[name].onset.value
     off = found.onset.sel(variant=name).values / paper - 1.0
