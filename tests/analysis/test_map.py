@@ -1,6 +1,7 @@
 """Maps of the straight walk over two numbers of a robot."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from chilopod.analysis import bifurcations, curved_walks, map_curves, map_grid, 
 from chilopod.analysis.growth import FATES, Fate
 from chilopod.analysis.map import map as mapped
 from chilopod.analysis.map_axes import Plane
-from chilopod.analysis.map_curves import Search
+from chilopod.analysis.map_curves import MapCurve, Search
 from chilopod.analysis.map_grid import Grid
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
@@ -152,6 +153,28 @@ def test_folds_begin_where_the_pitchfork_turns(monkeypatch):
     assert (kind, between) == (CodimensionTwo.DEGENERATE_PITCHFORK, ranges)
     assert curve.special[0].values[0] == k1
     assert found.remarks == ("a curve that begins at a pitchfork is not followed to its end: no fold is near",)
+
+
+def test_between_a_fold_and_a_subcritical_pitchfork_curved_walks_exist_too():
+    # Two lines that meet at k1 = 10, an offset of 50 mm; the pitchfork is subcritical below.
+    found = mapped(ROBOT, (K1, "9.04 N*mm/deg", "11 N*mm/deg"), (OFFSET[0], "31 mm", "72 mm"), points=9)
+    offsets = np.linspace(0.025, 0.075, 11)
+    lines = [
+        np.column_stack([stiffness(1.0) * (10.0 + 20.0 * slope * (offsets - 0.05)), offsets]) for slope in (1.0, -1.0)
+    ]
+    about = {"error_bound": np.zeros((11, 2)), "special": (), "line": True}
+    pitchfork = MapCurve(kind=Kind.PITCHFORK, values=lines[0], coefficient=0.05 - offsets, **about)
+    about["error_bound"] = np.zeros((6, 2))
+    fold = MapCurve(kind=Kind.FOLD, values=lines[1][:6], coefficient=np.full(6, np.nan), **about)
+    x, y = np.meshgrid(found.x_values / stiffness(1.0), found.y_values)
+    straight = x > 10.0 + 20.0 * (y - 0.05)
+    both = replace(found, fate=(~straight).astype(np.int8), curves=(pitchfork, fold))
+    np.testing.assert_array_equal(both.folded, straight & (y < 0.05) & (x < 10.0 - 20.0 * (y - 0.05)))
+    assert both.folded.any()
+    assert both.as_json()["folded_share"] == both.to_dataset().folded.values.mean() > 0.0
+    assert any("beside curved walks" in line for line in both.lines())
+    assert "curved walks too" in [text.get_text() for text in both.plot(Figure().add_subplot()).get_legend().texts]
+    assert not replace(both, curves=(pitchfork,)).folded.any()
 
 
 def test_pitchfork_turns_along_its_curve():

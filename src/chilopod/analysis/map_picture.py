@@ -53,6 +53,8 @@ def draw(found: Any, axes: Axes | None, show: str) -> Axes:
 
         look: dict[str, Any] = {"cmap": ListedColormap([_COLORS[fate] for fate in FATES]), "vmin": -0.5}
         axes.pcolormesh(x, y, found.fate, shading="nearest", rasterized=True, vmax=len(FATES) - 0.5, **look)
+        if found.folded.any():
+            axes.contourf(x, y, found.folded, levels=[0.5, 1.5], colors="none", hatches=["////"])
     else:
         _field(axes, x, y, found, show)
     for curve in found.curves if show != "criticality" else ():
@@ -73,6 +75,8 @@ def keys(found: Any, axes: Axes) -> list[Any]:
     from matplotlib.patches import Patch
 
     patches = [Patch(facecolor=_COLORS[fate], edgecolor="#767676", label=fate.label) for fate in found.shares]
+    if found.folded.any():
+        patches.append(Patch(facecolor="none", edgecolor="#767676", hatch="////", label="curved walks too"))
     handles, labels = axes.get_legend_handles_labels()
     return [*patches, *dict(zip(labels, handles, strict=True)).values()]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from chilopod import units
 from chilopod.analysis.growth import FATES, Fate
 from chilopod.analysis.map_axes import Axis
 from chilopod.analysis.map_curves import MapCurve, MapPoint
-from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.notebook import Summary
 from chilopod.robot import Robot
+from chilopod.stability import Kind
 from chilopod.stability.shown import bounded
 
 if TYPE_CHECKING:
@@ -77,6 +79,22 @@ class StabilityMap(Summary, ReadOnlyArrays):
                 found.append(point)
         return tuple(found)
 
+    @cached_property
+    def folded(self) -> NDArray[np.bool_]:
+        """True where curved walks exist beside a stable straight one, shape (rows, columns): along a row or a column,
+        between a fold and the nearest subcritical pitchfork. All False if folds were not followed."""
+        straight = self.fate == FATES.index(Fate.STRAIGHT)
+        found = np.zeros_like(straight)
+        axes = self.x_values, self.y_values
+        for axis, view, free in ((0, found, straight), (1, found.T, straight.T)):
+            for row, value in enumerate(axes[1 - axis].tolist()):
+                folds, hard = (_crossed(self.curves, kind, axis, value) for kind in (Kind.FOLD, Kind.PITCHFORK))
+                for fold in folds if hard.size else ():
+                    ends = np.sort([fold, hard[np.abs(hard - fold).argmin()]])
+                    within = (axes[axis] >= ends[0]) & (axes[axis] <= ends[1])
+                    view[row] |= within & free[row]
+        return read_only(found)
+
     @property
     def shares(self) -> dict[Fate, float]:
         """Share of the nodes with each fate that occurs."""
@@ -92,6 +110,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         shares = ", ".join(f"{fate.label} {100.0 * share:.3g} %" for fate, share in self.shares.items())
         rows, columns = self.fate.shape
         above = [f"{shares} of {columns} x {rows} values, {self.computed.sum()} of which were computed"]
+        if self.folded.any():
+            above.append(f"beside curved walks, straight ones hold at {100.0 * self.folded.mean():.3g} % of the values")
         kinds = [curve.kind.label for curve in self.curves]
         counts = [f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)]
         above.append(f"curves: {', '.join(counts) or 'none'}")
@@ -136,6 +156,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "values": [self.x_values.size, self.y_values.size],
             "computed": int(self.computed.sum()),
             "shares": {fate.label: share for fate, share in self.shares.items()},
+            "folded_share": float(self.folded.mean()),
             "curves": [{**plain(curve), **coefficients(curve), "line": curve.line} for curve in self.curves],
             "special": [plain(point) for point in self.special],
             "remarks": list(self.remarks),
@@ -153,6 +174,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "unstable": (grid, self.unstable),
             "fate": (grid, self.fate, {"meaning": meanings}),
             "computed": (grid, self.computed),
+            "folded": (grid, self.folded, {"meaning": "curved walks exist beside a stable straight one"}),
             "radius": (grid, self.radius, {"units": "m"}),
         }
         none = np.empty((0, 2))
@@ -178,6 +200,20 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "robot_toml": self.robot.to_toml(),
         }
         return xr.Dataset(found, coords=coords, attrs=attrs)
+
+
+def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) -> Array:
+    """Places along an axis where folds, or subcritical pitchforks, have a value of the other number, in SI units."""
+    places = [np.empty(0)]
+    for curve in curves:
+        if curve.kind is kind and curve.line:
+            along, across = curve.values[:, axis], curve.values[:, 1 - axis]
+            meets = np.diff(np.sign(across - value)) != 0.0
+            if kind is not Kind.FOLD:
+                meets &= np.nan_to_num(curve.coefficient[:-1]) > 0.0
+            part = (value - across[:-1][meets]) / np.diff(across)[meets]
+            places.append(along[:-1][meets] + part * np.diff(along)[meets])
+    return np.concatenate(places)
 
 
 def _size(axis: Axis, error: float) -> float:
