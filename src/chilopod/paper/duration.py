@@ -30,7 +30,7 @@ SECONDS: Final = {
     "robot-turning": (36, 11),
     "identification": (40, 14),
     "robot-strategies": (100, 10),
-    "robot-spread": (180, 60),
+    "robot-spread": (340, 90),
     "robot-numerics": (25, 10),
     "robot-structures": (900, 300),
     "robot-why": (900, 90),

@@ -1,7 +1,8 @@
 """Predictions of the twin over the valley of constants that its data leave open.
 
-``twin_fits.json`` holds weighted samples of the valley, results of ``chilopod identify twin``. Sets of constants that
-are drawn by these weights predict the printed results of other experiments, each with few undisturbed walks.
+Weighted samples of two valleys, results of ``chilopod identify twin``, are included: with joints without dry friction,
+and with any. Sets of constants that are drawn by these weights predict the printed results of other experiments, each
+with few undisturbed walks.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from chilopod.paper.turning.trials import to_target
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
-from chilopod.tasks.identify.data import FITTED
+from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
 from chilopod.tasks.identify.twin import known, samples_of
 from chilopod.trials import NONE
 
@@ -34,7 +35,10 @@ SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
 TASK_SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0)
 UNIFORM_SPRINGS = (30.0, 23.0, 18.0, 14.0)
 COUNT = 12
-"""Number of sets of constants that predict, with the preset's."""
+"""Number of sets of constants of a valley that predict, with the preset's."""
+
+VALLEYS = {"without friction": FITTED, "with friction": WITH_FRICTION}
+"""Constants of the valleys: dry friction of the joints is zero, or free."""
 
 LOWER = ", lower steps"
 """Suffix of a variant's name with steps lowered in proportion to their length."""
@@ -44,34 +48,36 @@ _BENT = 0.8  # rad in all, that walks begin with
 
 
 def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
-    """Predictions by the preset and by sets of constants drawn from the valley; if not full, by one, or none.
+    """Predictions by the preset and by sets of constants drawn from both valleys; if not full, by one of each.
 
     Returns
     -------
-    Dataset over set (0 the preset's): the constants (SI; ``unit`` is the unit of the robot file) by path over
-    ``constant``, and predictions: over variant ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` as
-    printed) and ``radius`` (over that as built, at an equal distance from each one's own onset), ``uniform``
-    (N*mm/deg), and over task ``best``, the spring that comes nearest to the target (N*mm/deg), and ``arrives``, True if
-    its walk arrives. The walks are undisturbed, so sets differ by their constants alone.
+    Dataset over set (0 the preset's), with the ``valley`` of each and by valley its number of ``effective`` samples:
+    the constants (SI; ``unit`` is the unit of the robot file) by path over ``constant``, and predictions: over variant
+    ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` as printed) and ``radius`` (over that as built, at an
+    equal distance from each one's own onset), ``uniform`` (N*mm/deg), and over task ``best``, the spring that comes
+    nearest to the target (N*mm/deg), and ``arrives``, True if its walk arrives. The walks are undisturbed, so sets
+    differ by their constants alone.
     """
     robot, folder, size = context.whole, context.folder, context.size
-    preset, valley = known()[0], samples_of(known())
-    places = [preset.parts, *valley.drawn(size.of(COUNT, 2, 1) - 1)]
-    constants = np.array([FITTED.values_at(parts) for parts in places])
+    count = size.of(COUNT, 2, 2) - 1
+    samples = {valley: samples_of(known(free)) for valley, free in VALLEYS.items()}
+    sets = [("preset", FITTED.robot_with(robot, FITTED.values_at(known()[0].parts)))]
+    for valley, free in VALLEYS.items():
+        sets += [(valley, free.robot_with(robot, free.values_at(each))) for each in samples[valley].drawn(count)]
     rows: list[dict[str, Any]] = []
-    for index, values in enumerate(constants):
-        progress(index / len(places), f"set {index + 1} of {len(places)}")
-        other = FITTED.robot_with(robot, values)
+    for index, (_, other) in enumerate(sets):
+        progress(index / len(sets), f"set {index + 1} of {len(sets)}")
         rows.append({**predictions(other, folder, size=size), **nearest_springs(other, folder, size)})
     series = base_series_data()
-    names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), FITTED.paths
+    names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), WITH_FRICTION.paths
 
     def table(name: str, over: str, keys: list[str]) -> tuple[tuple[str, str], np.ndarray]:
         return ("set", over), np.array([[row[name][key] for key in keys] for row in rows])
 
     return xr.Dataset(
         {
-            "constants": (("set", "constant"), constants),
+            "constants": (("set", "constant"), np.array([WITH_FRICTION.of(other) for _, other in sets])),
             "unit": ("constant", [robot.unit_of(path) for path in paths]),
             "uniform": ("set", np.array([row["uniform"] for row in rows]), {"units": PAPER_UNIT}),
             "onset": table("onset", "variant", names),
@@ -79,11 +85,12 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
             "best": table("best", "task", tasks),
             "paper": ("variant", [printed_number(name).value for name in names], {"units": PAPER_UNIT}),
             "arrives": table("arrives", "task", tasks),
+            "valley": ("set", [valley for valley, _ in sets]),
+            "effective": ("from", [each.effective for each in samples.values()]),
         },
-        coords={"set": np.arange(len(places)), "constant": paths, "variant": names, "task": tasks},
+        coords={"set": np.arange(len(sets)), "constant": paths, "variant": names, "task": tasks, "from": list(samples)},
         attrs={
             "robot": robot.name,
-            "effective": valley.effective,
             "numbers": len(series.radii) + len(series.speeds) + 1,
             "answers": len(series.curved) + len(series.straight),
         },

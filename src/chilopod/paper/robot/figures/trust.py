@@ -14,7 +14,8 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from chilopod import units
 from chilopod.paper import printed
-from chilopod.paper.robot.spread import printed_number
+from chilopod.paper.fit_data import TOLERANCE as ERROR
+from chilopod.paper.robot.spread import VALLEYS, printed_number
 from chilopod.paper.robot.structures import TOLERANCE
 from chilopod.paper.robot.walks import SPRINGS
 from chilopod.paper.robot.why import ORDERS, SEARCHED, cause
@@ -22,7 +23,7 @@ from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
-from chilopod.tasks.identify.data import FITTED
+from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
 from chilopod.tasks.identify.estimates import CONFIDENCE
 from chilopod.tasks.identify.valley import LEAST, Samples
 
@@ -33,7 +34,8 @@ _MET = 1.0  # misfit at which the base series is met
 _FARTHEST = 60.0  # per cent, where predictions are cut off
 _MOST = 100.0  # chi squared, where bars are cut off
 _MARKERS = "osD^v"
-_SETS = (style.BLUE, *style.CURVES[1:])
+_FREED = "with friction"
+_TOLD = 2.0  # effective sets below which their mean says nothing
 
 
 def why(data: xr.Dataset) -> Panel:
@@ -116,56 +118,101 @@ def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], h
 
 
 def spread(data: xr.Dataset) -> Panel:
-    """Predictions over the valley."""
-    ranges = []
-    for path, unit in zip(data.constant.values, data.unit.values, strict=True):
-        ends = _over_valley(data.constants.sel(constant=path))
-        low, high = (units.format(each, str(unit), digits=2) for each in ends)
-        ranges.append(f"{path} {low} to {high}".replace("*", "·"))
-    points = {str(name): data.onset.sel(variant=name) for name in data.variant.values}
-    predicted = []
-    for name, values in (points | {"all springs alike": data.uniform}).items():
-        if count := int(np.isfinite(values[1:]).sum()):
-            mean, low, high = (number(float(each), 3) for each in (values[1:].mean(), *_over_valley(values)))
-            predicted.append(f"{name} {mean} ({low} to {high}, {count} of {values.size - 1} sets have one)")
-    tasks = listing(
-        f"task {task} with {listing(sorted({f'{float(each):g}' for each in data.best.sel(task=task)}))}"
-        for task in data.task.values
+    """Predictions over the valleys."""
+    sets = {valley: data.isel(set=np.flatnonzero(data.valley.values == valley)) for valley in VALLEYS}
+    text = [
+        f"{data.attrs['numbers']} printed numbers and {data.attrs['answers']} yes-or-no answers do not determine "
+        f"{len(FITTED.paths)} constants: they leave a valley, and a wider one if the joints may have dry friction. "
+        "Shown are the preset (filled) and sets drawn from weighted samples of both."
+    ]
+    for valley, found in sets.items():
+        opened = [path for path in data.constant.values if valley == _FREED or path in FITTED.paths]
+        effective = float(data.effective.sel({"from": valley}))
+        few = ", too few for reliable intervals" if effective < LEAST else ""
+        within = listing(_range(data, path, found.constants.sel(constant=path)) for path in opened)
+        text.append(
+            f"{valley.capitalize()} the samples count as {number(effective, 2)} of equal weight{few}. "
+            f"{100.0 * CONFIDENCE:g} % of the sets have (A) {within}. Onsets that they predict (B), mean and "
+            f"{100.0 * CONFIDENCE:g} % interval, in {SPRING_UNIT}: {_predicted(found)}. They come nearest to the "
+            f"target in {_nearest(found)}\u00a0{SPRING_UNIT}."
+        )
+    text.append(
+        "These walks are undisturbed: the intervals are those of the valleys alone. The standard errors in the table "
+        f"of the robot are those of its trials alone, all with the preset. {_refitted(sets[_FREED])}"
     )
     return Panel(
         name="robot-spread",
-        title="How far to trust the predictions: the valley of constants that the data leave open",
+        title="How far to trust the predictions: the valleys of constants that the data leave open",
         draw=lambda narrow: _draw_spread(data, narrow),
         alt="A: the constants of several sets, in parts of their ranges. B: what each predicts, beside the robot.",
-        text=(
-            f"{data.attrs['numbers']} printed numbers and {data.attrs['answers']} yes-or-no answers do not determine "
-            f"{data.sizes['constant']} constants: they leave a valley. Weighted samples of it are known, as many as "
-            f"{number(data.attrs['effective'], 2)} of equal weight"
-            + (", too few for reliable intervals" if data.attrs["effective"] < LEAST else "")
-            + ". Shown are the preset (filled) and sets drawn by these weights. "
-            f"{100.0 * CONFIDENCE:g} % of the sets have (A) {listing(ranges)}.",
-            f"Onsets that they predict (B), mean and {100.0 * CONFIDENCE:g} % interval, in {SPRING_UNIT}: "
-            f"{listing(predicted) or 'no point'}. They come nearest to the target in {tasks}\u00a0{SPRING_UNIT}. These "
-            "walks are undisturbed: the intervals are those of the valley alone. The standard errors in the table of "
-            "the robot are those of its trials alone, all with the preset.",
-        ),
+        text=tuple(text),
         data=data,
     )
 
 
-def _over_valley(values: xr.DataArray) -> tuple[float, float]:
-    """Ends of the interval of a prediction over the sets that have one, without the preset unless it is alone."""
-    found = values.values[min(1, values.size - 1) :]
-    found = found[np.isfinite(found)]
-    return Samples(found[:, None], np.full(found.size, 1.0 / found.size)).interval(found)
+def _range(data: xr.Dataset, path: str, values: xr.DataArray) -> str:
+    unit = str(data.unit.sel(constant=path).values)
+    low, high = (units.format(each, unit, digits=2) for each in _interval(values))
+    return f"{path} {low} to {high}".replace("*", "·")
+
+
+def _interval(values: xr.DataArray) -> tuple[float, float]:
+    """Ends of the interval of a number over the sets that have one."""
+    found = values.values[np.isfinite(values.values)]
+    return Samples(found[:, None], np.full(found.size, 1.0 / max(found.size, 1))).interval(found)
+
+
+def _points(found: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Onsets that sets predict, by name."""
+    variants = {str(name): found.onset.sel(variant=name) for name in found.variant.values}
+    return variants | {"all springs alike": found.uniform}
+
+
+def _predicted(found: xr.Dataset) -> str:
+    said = []
+    for name, values in _points(found).items():
+        if count := int(np.isfinite(values).sum()):
+            mean, low, high = (number(float(each), 3) for each in (values.mean(), *_interval(values)))
+            said.append(f"{name} {mean} ({low} to {high}, {count} of {values.size} sets have one)")
+    return listing(said) or "no point"
+
+
+def _nearest(found: xr.Dataset) -> str:
+    return listing(
+        f"task {task} with {listing(sorted({f'{float(each):g}' for each in found.best.sel(task=task)}))}"
+        for task in found.task.values
+    )
+
+
+def _refitted(found: xr.Dataset) -> str:
+    """Sets that one more datum leaves, in words, by weights from their distance to it."""
+    name = next(iter(printed.VARIANTS))
+    paper = printed.VARIANTS[name].onset.value
+    off = found.onset.sel(variant=name).values / paper - 1.0
+    weights = np.where(np.isfinite(off), np.exp(-0.5 * (np.nan_to_num(off) / ERROR) ** 2), 0.0)
+    effective = float(weights.sum() ** 2 / max(np.sum(weights**2), 1e-300))
+    said = f"With the onset for {name}, {number(paper, 2)} to {100.0 * ERROR:g} %, as one more datum"
+    if effective < _TOLD:
+        return f"{said} fewer than two of these sets would be left."
+    parts = weights / weights.sum()
+    yaw = float(found.constants.sel(constant="twin.yaw_friction").values @ parts)
+    means = []
+    for each, values in _points(found).items():
+        known = np.isfinite(values.values)
+        means.append(f"{each} {number(float(np.average(values.values[known], weights=weights[known])), 3)}")
+    return (
+        f"{said}, a fit and no prediction, {found.sizes['set']} sets count as {number(effective, 2)}: yaw friction "
+        f"{number(1e3 * yaw, 2)}\u00a0mN·m, {listing(means)} on average."
+    )
 
 
 def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_SPREAD, narrow)
+    paths = WITH_FRICTION.paths
     for index in data.set.values[::-1]:
-        parts = FITTED.parts_of(data.constants.values[index])
-        axes["A"].plot(parts, np.arange(len(parts)), "o", **_marked(int(index)))
-    axes["A"].set_yticks(range(len(FITTED.paths)), [path.partition(".")[2].replace("_", " ") for path in FITTED.paths])
+        parts = WITH_FRICTION.parts_of(data.constants.values[index])
+        axes["A"].plot(parts, np.arange(len(parts)), "o", **_marked(data, int(index)))
+    axes["A"].set_yticks(range(len(paths)), [path.partition(".")[2].replace("_", " ") for path in paths])
     axes["A"].invert_yaxis()
     finish(axes["A"], xlim=(-0.03, 1.03), xlabel="part of the range searched", title="A  Constants")
 
@@ -175,20 +222,22 @@ def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
     for task in map(str, data.task.values):
         rows.append((f"best spring, task {task}", printed.TASKS[task].k_hat.value, printed.TASKS[task].minima))
     draw_bands(axes["B"], rows)
+    firsts = set(np.unique(data.valley.values, return_index=True)[1].tolist())
     for row, values in enumerate([*data.onset.values.T, data.uniform.values, *data.best.values.T]):
         for index, value in enumerate(values):
-            place, label = row + 0.12 * (index - 0.5 * (len(values) - 1)), "preset" if row == index == 0 else None
-            axes["B"].plot(value, place, "o", **_marked(index), label=label)
+            place = row + 0.6 * (index / max(len(values) - 1, 1) - 0.5)
+            label = str(data.valley.values[index]) if row == 0 and index in firsts else None
+            axes["B"].plot(value, place, "o", **_marked(data, index), label=label)
     axes["B"].set(xlim=(10.0, max(45.0, *SPRINGS[:-1])), xlabel=SPRING_UNIT, title="B  Predictions")
     axes["B"].legend(loc="upper left")
     return figure
 
 
-def _marked(index: int) -> dict[str, Any]:
+def _marked(data: xr.Dataset, index: int) -> dict[str, Any]:
     """Look of one set of constants: that of the preset is filled."""
-    fill, size = ("none", 6.0) if index else (_SETS[0], 8.0)
-    color = _SETS[index % len(_SETS)]
-    return {"color": color, "markerfacecolor": fill, "markersize": size, "markeredgewidth": 1.6}
+    color = {"preset": style.BLUE, _FREED: style.PURPLE}.get(str(data.valley.values[index]), style.GREEN)
+    fill, size = ("none", 5.0) if index else (color, 8.0)
+    return {"color": color, "markerfacecolor": fill, "markersize": size, "markeredgewidth": 1.4}
 
 
 def structures(data: xr.Dataset) -> Panel:
