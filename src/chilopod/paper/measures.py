@@ -176,8 +176,3 @@ def spring_for(data: xr.Dataset, radius: float) -> Estimate:
         return 1.0 / float(np.interp(wanted, squared[order], inverse[order], left=np.nan, right=np.nan))
 
     return propagated(found, curvature, reciprocal=True)[0] if curved.any() else Estimate()
-
-
-def cycle_means(angles: Array, samples: int) -> Array:
-    """Means of joint angles over gait cycles of ``samples`` samples, shape (cycles, joints)."""
-    return angles[: len(angles) // samples * samples].reshape(-1, samples, angles.shape[1]).mean(axis=1)
