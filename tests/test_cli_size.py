@@ -42,3 +42,11 @@ def test_mistakes_are_named_in_one_line(arguments, said):
     assert (code, out) == (2, "")
     assert said in err
     assert len([line for line in remarks(err) if line.startswith("error:")]) == 1
+
+
+def test_an_option_that_is_given_twice_is_refused():
+    code, out, err = run(
+        "size", "aoi2022-planar", "--speed", "<0.1 m/s", "--speed=>0.2 m/s", "--free", "speed=0.05..0.3 m/s"
+    )
+    assert (code, out) == (2, "")
+    assert err.strip() == "error: --speed: must be given once"

@@ -177,6 +177,14 @@ def test_between_a_fold_and_a_subcritical_pitchfork_curved_walks_exist_too():
     assert not replace(both, curves=(pitchfork,)).folded.any()
 
 
+def test_coefficients_of_a_map_are_those_of_its_robots():
+    found = mapped(ROBOT, (K1, "11 N*mm/deg", "13 N*mm/deg"), ("body.mass", "8.5 kg", "9 kg"), points=5)
+    (curve,) = found.curves
+    end = int(np.argmin(curve.values[:, 1]))
+    (there,) = bifurcations(ROBOT, K1, (stiffness(11.0), stiffness(13.0)))
+    assert curve.coefficient[end] == pytest.approx(there.coefficient, rel=1e-6)
+
+
 def test_pitchfork_turns_along_its_curve():
     """Where the coefficients of points located one by one pass through zero."""
     offset = "legs.forward_offset"

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import types
 from math import cos, fabs, floor
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from chilopod.flows.tracing.trace import evaluate, evaluate_jacobian, trace
 from chilopod.flows.tracing.traced import Untraceable
+from chilopod.stability import from_rhs
 
 STIFFNESS = 1.7
 MATRIX = np.array([[0.0, 1.0, 0.5], [-1.0, 0.0, 0.2], [0.3, 0.1, -0.4]])
@@ -254,3 +256,44 @@ def test_functions_without_a_module():
     exec("def double(x):\n    return 2.0 * x\n\ndef rhs(t, x):\n    return [double(x[0])]\n", names)
     traced = trace(names["rhs"], 1)
     assert evaluate(traced.tape, traced.tape.slopes, np.zeros(1), np.full((1, 1), 3.0), traced.params).max() == 6.0
+
+
+class _Holder:
+    rate = 1.0
+
+
+_MODULE = types.ModuleType("a_module_of_a_user")
+_TABLE = {"rate": 1.0}
+_GET = _TABLE.get
+_UFUNC = np.frompyfunc(lambda x: -_TABLE["rate"] * x, 1, 1)
+_VECTORISED = np.vectorize(lambda x: -_TABLE["rate"] * x, otypes=[object])
+
+
+def _set_rate(value):
+    _Holder.rate = _MODULE.rate = _TABLE["rate"] = value
+
+
+@pytest.mark.parametrize(
+    "rhs",
+    [
+        lambda t, x: [-_Holder.rate * x[0]],
+        lambda t, x: [-_MODULE.rate * x[0]],
+        lambda t, x: [-_GET("rate") * x[0]],
+        lambda t, x: [_UFUNC(x[0])],
+        lambda t, x: [_VECTORISED(x[0])],
+    ],
+    ids=["class", "module", "bound method", "ufunc", "vectorised"],
+)
+def test_what_a_function_reads_through_an_object_is_read_anew(rhs):
+    for rate in (1.0, 2.0):
+        _set_rate(rate)
+        assert from_rhs(rhs, 1, 1.0).flow(np.ones(1), 0.0, 1.0)[1].item() == pytest.approx(np.exp(-rate), rel=1e-13)
+
+
+@pytest.mark.parametrize("polynomial", [lambda k: np.poly1d([-k, 0.0]), lambda k: np.polynomial.Polynomial([0.0, -k])])
+def test_an_object_at_the_place_of_an_earlier_one_is_another(polynomial):
+    for rate in (1.0, 2.0):
+        found = polynomial(rate)
+        flow = from_rhs(lambda t, x, f=found: [f(x[0])], 1, 1.0).flow
+        del found
+        assert flow(np.ones(1), 0.0, 1.0)[1].item() == pytest.approx(np.exp(-rate), rel=1e-13)

@@ -199,3 +199,14 @@ def test_a_fold_of_an_orbit_with_twist(state):
     assert found.complete
     assert point.kind is Kind.FOLD
     assert abs(point.value - 0.5) <= point.error_bound < 1e-10
+
+
+@pytest.mark.parametrize("method", ["implicit", "automatic"])
+@pytest.mark.parametrize("guess", [(0.3, 0.1), (0.003, 0.05)])
+def test_a_multiplier_that_is_zero_lies_within_its_bound(method, guess):
+    # The Oregonator: rounding of a state turns its velocity by far more, and with it the projection onto the section.
+    def rhs(t, x):
+        return [(x[0] * (1.0 - x[0]) + x[1] * (2e-4 - x[0]) / (2e-4 + x[0])) / 1e-2, x[0] - x[1]]
+
+    found = multipliers(from_rhs(rhs, 2, None, guess_period=7.0, method=method), guess)
+    assert abs(found.values[-1]) <= found.error_bounds[-1] < 1e-7  # exp(-68193.9), by the integral of the divergence

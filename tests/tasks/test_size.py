@@ -144,3 +144,15 @@ def test_what_is_no_wish_or_no_range_is_refused():
     for more in ({"twin": True}, {"budget": 0}):
         with pytest.raises(ChilopodError, match=next(iter(more))):
             size(ROBOT, {"radius": 1.0}, [SPRING], **more)
+
+
+def test_a_limit_has_no_error_bound():
+    found = size(ROBOT, {"speed": "<0.2 m/s"}, [SPRING])
+    assert found.outcome is Outcome.MET
+    assert np.isnan(found.bound)
+
+
+def test_a_wish_that_no_free_number_changes_is_named():
+    found = size(ROBOT, {"onset": "12.5 N*mm/deg"}, [SPRING])
+    assert found.outcome is Outcome.UNMET
+    assert "no free number changes the onset" in found.reasons

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chilopod import stability
 from chilopod.analysis.map_axes import Plane
 from chilopod.analysis.map_grid import Grid
+from chilopod.analysis.straight_walk import coefficient_of
 from chilopod.errors import ChilopodError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.planar import PlanarModel
@@ -49,7 +50,8 @@ class MapCurve(ReadOnlyArrays):
     values, error_bound
         Values of both numbers in SI units, and bounds on their errors, shape (points, 2).
     coefficient
-        Coefficient of the normal form, negative where it is supercritical, NaN where it is not known, shape (points,).
+        Cubic coefficient of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
+        supercritical, NaN where it is not known, shape (points,).
     special
         Points of codimension two on it.
     line
@@ -123,7 +125,7 @@ class Search:
             if edge.across is self.plane.y.whole:  # along the other axis the number of modules changes
                 for point in self._located(edge):
                     place, error = self._place(point, edge), np.array([point.error_bound, 0.0])
-                    coefficient = np.nan if point.coefficient is None else point.coefficient
+                    coefficient = self._coefficient(point, place)
                     by_kind.setdefault(point.kind, []).append(
                         (place, error if edge.across else error[::-1], coefficient)
                     )
@@ -206,11 +208,16 @@ class Search:
         """Keep a curve in the order of the map's axes, and say where it ends before it should."""
         order = [1, 0] if turned else [0, 1]
         special = tuple(MapPoint(each.kind, each.values[order], each.error_bound[order]) for each in curve.special)
-        coefficients = [np.nan if each.coefficient is None else each.coefficient for each in curve.points]
+        coefficients = [self._coefficient(each, each.values[order]) for each in curve.points]
         errors = np.array([each.error_bound for each in curve.points])[:, order]
         self.curves.append(MapCurve(curve.kind, curve.values[:, order], errors, np.array(coefficients), special))
         for ending in set(curve.endings) & set(_ENDS):
             self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {ending.sentence}")
+
+    def _coefficient(self, point: BifurcationPoint | Point2, place: Array) -> float:
+        """Coefficient for an amplitude of joint angles, as of one robot; NaN if there is none."""
+        found = coefficient_of(point, self.plane.at(*place.tolist()).body.modules)
+        return np.nan if found is None else found
 
     def _told(self, count: int, point: Point2) -> None:
         self.progress(0.5, f"curve {len(self.curves) + 1}, {count} points")

@@ -187,7 +187,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
         sizes = [len(curve.values) for curve in self.curves]
         kinds = np.array([curve.kind.label for curve in self.curves], dtype=object)
         coefficients = np.concatenate([none[:, 0], *(curve.coefficient for curve in self.curves)])
-        found["curve_coefficient"] = (("point",), coefficients)
+        found["curve_coefficient"] = (("point",), coefficients, {"units": "1/rad^2"})
         found["curve"] = (("point",), np.repeat(np.arange(len(sizes)), sizes))
         found["curve_kind"] = (("point",), np.repeat(kinds, sizes))
         coords = {

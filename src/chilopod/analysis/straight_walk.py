@@ -17,7 +17,7 @@ from chilopod.frozen import ComplexArray, ReadOnlyArrays, read_only
 from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
-from chilopod.stability import Kind
+from chilopod.stability import BifurcationPoint, Kind, Point2
 from chilopod.stability.spectrum.eigenvalues import VERDICTS
 
 if TYPE_CHECKING:
@@ -263,11 +263,16 @@ def bifurcations(
             remark(sentence)
     for point in located:
         components = joint_components(point.mode, robot.body.modules)
-        # The share of the unit mode that is joint angle turns an amplitude of the one into that of the other.
-        share = float(np.linalg.norm(point.mode[_joints(robot.body.modules)]))
-        coefficient = None if point.coefficient is None else point.coefficient / share**2
+        coefficient = coefficient_of(point, robot.body.modules)
         found.append(WalkBifurcation(point, parameter, unit, components, coefficient))
     return found
+
+
+def coefficient_of(point: BifurcationPoint | Point2, modules: int) -> float | None:
+    """Cubic coefficient of a bifurcation of the straight walk for an amplitude of joint angles, 1/rad^2."""
+    # The share of the unit mode that is joint angle turns an amplitude of the one into that of the other.
+    share = float(np.linalg.norm(point.mode[_joints(modules)]))
+    return None if point.coefficient is None else point.coefficient / share**2
 
 
 def first_loss(

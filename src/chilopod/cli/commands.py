@@ -50,6 +50,11 @@ class _Command(TyperCommand):
         super().format_help(ctx, formatter)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        for option in self.params:
+            single = isinstance(option, TyperOption) and not (option.is_flag or option.multiple)
+            names = option.opts if single else []
+            if sum(each.partition("=")[0] in names for each in args) > 1:  # all but the last would be lost
+                raise ParameterError("must be given once", field=max(names, key=len))
         try:
             return super().parse_args(ctx, args)
         except Exception as error:

@@ -46,6 +46,7 @@ _STARTS = 8  # a power of two
 _SETTLED = 15.0  # settling times of a walk
 _LONGEST = 900.0  # s, of a walk
 _BRANCH = 30  # evaluations that take as long as a branch of curved walks
+_UNCHANGED = 1e-9  # range of deviations that are the same
 _AT_END = 1e-3  # distance from the end of a range, relative to it
 _FAILED = 10.0  # deviation of a robot without the quantity
 _SHARES = 0.1, 0.3, 0.5, 0.7, 0.9  # of the second of two conflicting wishes in the sum of squares
@@ -273,7 +274,8 @@ def size(
     found = search.at(search.best)
     again = Measured(onset)
     values = np.array([search.quantity(again, wish, found) for wish in given])
-    bound = search.bound(again) if outcome is Outcome.MET and len(axes) == len(given) == 1 else np.nan
+    single = len(axes) == len(given) == 1 and not given[0].sense
+    bound = search.bound(again) if outcome is Outcome.MET and single else np.nan
     search.progress(1.0, "walks")
     engines = ("planar", "twin")[: 1 + twin]
     records = {name: run([bent(found, name, _duration(found, again))])[0] for name in engines}
@@ -378,6 +380,7 @@ class _Search:
         self._starts = [np.clip(own, 0.01, 0.99), *scattered]
         self.best: Array = self._starts[0]
         self._least = np.full(len(wishes), np.inf)
+        self._seen: list[Array] = []
 
     @property
     def evaluations(self) -> int:
@@ -422,6 +425,7 @@ class _Search:
             found = np.array([wish.searched(self._measured, robot) for wish in self.wishes])
         except ChilopodError:
             found = np.full(len(self.wishes), _FAILED)
+        self._seen.append(found)
         # Far from all wishes, a robot that has every quantity is nearer than one that has not.
         sizes = [(norm(self._missed(each)), norm(each)) for each in (found, self._least)]
         if sizes[0] < sizes[1]:
@@ -492,6 +496,10 @@ class _Search:
             if min(part, 1.0 - part) < _AT_END:
                 end = "lower" if part < 0.5 else "upper"
                 said.append(f"{each.path} is at the {end} end of its range, {units.format(value, each.unit, digits=6)}")
+        seen = np.array([found for found in self._seen if _FAILED not in found]).reshape(-1, len(self.wishes))
+        for wish, values in zip(self.wishes, seen.T, strict=True):
+            if values.size and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
+                said.append(f"no free number changes the {wish.quantity}")
         front: list[Array] = []
         try:
             if len(self.wishes) > 1:

@@ -130,3 +130,15 @@ def test_the_command_writes_walks_and_a_robot_with_its_intervals(capsys, tmp_pat
     interval = found["constants"]["ground.friction"]["interval_text"]
     assert best.provenance["ground.friction"] == f"identified from mine.toml; 90 %: {interval}"
     assert (tmp_path / "out" / "identification.nc").exists()
+
+
+def test_a_straight_walk_leaves_all_constants_open(tmp_path):
+    # Its joint angles are zero whatever the constants are: those that the file holds are no better than others.
+    record = simulate(ROBOT, 6.0, rate=20.0)
+    assert not record.joint_angle.values.any()
+    (tmp_path / "walk.nc").write_bytes(netcdf(record))
+    free = {path: FREE[path] for path in ("ground.friction", "legs.half_width")}
+    given = RecordedWalks(free=free, trajectory=[{"file": "walk.nc"}])
+    found = identify_recorded(ROBOT, given, tmp_path)
+    for path, each in found.as_json()["constants"].items():
+        assert each["interval_si"] == pytest.approx(FREE[path])

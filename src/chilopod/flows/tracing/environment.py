@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import functools
+import sys
 import types
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -19,7 +20,7 @@ from chilopod.flows.tracing.traced import as_traced
 
 _PLAIN = (int, bool, str, bytes, complex, type(None), np.integer, np.bool_)
 _FLOAT, _ROW = (float, np.floating), (tuple, list)  # np.float64 is a float
-_SHARED = (types.ModuleType, types.BuiltinFunctionType, type, np.ufunc)
+_FUNCTIONS = types.FunctionType, type(np.dot)
 _OUTSIDE = ("numpy", "scipy", "math", "builtins", "numba")
 
 
@@ -33,8 +34,25 @@ def python_function(value: Any) -> Any:
     return inner if isinstance(inner, types.FunctionType) else value
 
 
+def _outside(name: str | None) -> bool:
+    return (name or "").partition(".")[0] in _OUTSIDE
+
+
 def _own(value: Any) -> bool:
-    return isinstance(value, types.FunctionType) and (value.__module__ or "").partition(".")[0] not in _OUTSIDE
+    return isinstance(value, types.FunctionType) and not _outside(value.__module__)
+
+
+def _constant(value: Any) -> bool:
+    """True for modules, types and functions of the libraries, which never change. The attributes of a user's modules
+    and classes may; so may an object that is called like a function, or that a bound method belongs to."""
+    if isinstance(value, types.ModuleType):
+        return _outside(value.__name__)
+    if isinstance(value, types.BuiltinFunctionType):
+        return value.__self__ is None or isinstance(value.__self__, types.ModuleType)
+    if isinstance(value, np.ufunc):  # others may be made of a user's function
+        homes = (np, sys.modules.get("scipy.special"))
+        return any(getattr(home, value.__name__, None) is value for home in homes)
+    return isinstance(value, (type, *_FUNCTIONS)) and _outside(value.__module__)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -62,9 +80,9 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
         return "f"
     if isinstance(value, _PLAIN):
         return type(value).__name__, value
-    if isinstance(value, _SHARED):
-        return "id", id(value)
     value = python_function(value)
+    if _constant(value):
+        return "id", id(value)
     if isinstance(value, np.ndarray):
         if value.dtype.kind == "f":
             floats += value.ravel().tolist()
@@ -83,9 +101,6 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
         return "function", value.__code__, *(describe(part, floats, seen) for part in _parts(value))
     if isinstance(value, functools.partial):
         return "partial", *(describe(part, floats, seen) for part in (value.func, value.args, value.keywords))
-    outside = callable(value) and (getattr(value, "__module__", None) or "").partition(".")[0] in _OUTSIDE
-    if outside and not isinstance(value, types.MethodType):
-        return "id", id(value)
     raise Opaque
 
 

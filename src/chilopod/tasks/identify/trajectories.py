@@ -35,6 +35,8 @@ _STEP, _TOLERANCE = 1e-5, 1e-8  # of differences, in units of ranges, cycles and
 _EARLIER, _FAR = 0.25, np.pi  # cycles from the start of a walk to its first sample, and angles after it has failed, rad
 _PHASES, _CYCLES = 6, 10  # number of phases to start from, each tried on so many cycles
 _ROUGH, _FINE = (1e-3, 12), (1e-9, 40)  # change of the sum of squares, relative, that ends a fit, and most steps
+_RESOLVED = 1e-7  # rad, least error of angles, of a recording or computed
+_OPEN = 3.0  # standard deviation of a constant without data, in ranges
 _PRIOR = 1e-3  # weight of constants as given, in rad for a range
 _ALIKE = 2.0  # factor of variances that is said
 
@@ -95,9 +97,10 @@ def identify_recorded(
     off = np.concatenate([(one - other)[np.isfinite(other)] for one, other in zip(fitted, measured, strict=True)])
     factor = max(_alike(one - other) for one, other in zip(fitted, measured, strict=True))
     scatter = float(np.linalg.norm(off) / np.sqrt(off.size - unknown.size))
+    error = max(scatter, _RESOLVED)
     wide = float(stdtrit(max(off.size / factor - unknown.size, 1.0), 0.5 + 0.5 * CONFIDENCE))
     values, slopes = data.free.values_at(unknown[:count]), data.free.slopes(unknown[:count])
-    spread = wide**2 * factor * scatter**2 * slopes @ walks.covariance(unknown) @ slopes.T
+    spread = wide**2 * factor * error**2 * slopes @ walks.covariance(unknown, error) @ slopes.T
     half = np.sqrt(np.diag(spread))
     ends = np.clip(np.array([values - half, values + half]), *data.free.limits(values).T[:, None]).T
     times = np.concatenate([each.times for each in walks.recordings])
@@ -140,11 +143,13 @@ class _Walks:
         off = self.residuals(free + np.vstack([np.zeros(free.size), np.diag(steps)]))
         return (off[:, 1:] - off[:, :1]) / steps
 
-    def covariance(self, free: Array) -> Array:
-        """Covariance of the scaled constants for residuals of unit variance."""
+    def covariance(self, free: Array, error: float) -> Array:
+        """Covariance of the scaled constants, over that of the angles, with an ``error``, rad. Without any data each
+        has a standard deviation of some ranges."""
         slopes = self.jacobian(free)
+        slopes[-self.given.size :] *= error / (_OPEN * _PRIOR)
         sizes = np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
-        spread = np.linalg.pinv(slopes / sizes, 1e-9) / sizes[:, None]
+        spread = np.linalg.pinv(slopes / sizes, 1e-12) / sizes[:, None]
         return (spread @ spread.T)[: self.given.size, : self.given.size]
 
     def fit(self, free: Array, change: float, most: int) -> tuple[float, Array]:
