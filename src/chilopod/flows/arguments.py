@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words
+from chilopod.flows import deadline
 from chilopod.frozen import Array
 
 LARGEST = 1_000_000
@@ -172,6 +173,7 @@ def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slo
     def slopes(times: Array, states: Array) -> Array:
         columns = []
         for t, x in zip(times.tolist(), states.T, strict=True):
+            deadline.check()  # a slow function is called thousands of times
             try:
                 with np.errstate(all="ignore"), UserCode("rhs"):
                     column = numbers(rhs(t, x.copy(), *args), (n,), "rhs")

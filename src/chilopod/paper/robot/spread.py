@@ -14,6 +14,7 @@ import xarray as xr
 
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.errors import ParameterError
 from chilopod.paper import printed
 from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
@@ -107,7 +108,7 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
     that of an undulation with all springs alike, by multipliers.
 
     By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
-    NaN where walks determine none; and ``uniform``.
+    and ``uniform`` (N*mm/deg); NaN where walks determine none.
     """
     shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
@@ -124,11 +125,15 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
         walks = spring_walks(variant, springs, duration, folder=folder, engine=engine, **undisturbed)
         series[name] = walk_ends(walks, variant, springs)
     base = next(iter(series.values()))
-    uniform = uniform_modes(robot, uniform_springs, folder=folder, engine=engine)
+    try:
+        modes = uniform_modes(robot, uniform_springs, folder=folder, engine=engine)
+        uniform = float(modes.end.sel(mode=UNDULATION))
+    except ParameterError:  # servos that are too stiff for the steps of a derivative
+        uniform = np.nan
     return {
         "onset": {name: onset_point(each).value for name, each in series.items()},
         "radius": {name: radius_ratio(base, each).distance.value for name, each in series.items()},
-        "uniform": float(uniform.end.sel(mode=UNDULATION)),
+        "uniform": uniform,
     }
 
 
