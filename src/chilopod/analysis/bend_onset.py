@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from chilopod import units
 from chilopod.analysis.cycle_modes import CycleMultipliers
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.robot import Robot
@@ -18,16 +19,21 @@ def bend_onset(
     """Value of a parameter at which the multiplier of a bend of finite size passes 1, in SI units, by regula falsi
     until 1 lies in the multiplier's interval; that interval over the slope is the interval of the value."""
 
+    def shown(value: float) -> str:
+        return units.format(value, robot.unit_of(parameter), digits=6)
+
     def excess(value: float) -> tuple[float, float]:
         bends = [mode for mode in multipliers(robot.with_value(parameter, value)).finite if mode.shape == "bend"]
         if not bends:
-            raise AnalysisError(f"has no bend among its leading modes at {value:.6g}", field=parameter)
+            raise AnalysisError("has no bend among its leading modes", field=parameter, value=shown(value))
         return bends[0].multiplier.real - 1.0, bends[0].error
 
     (a, b), (at_a, at_b) = between, [excess(end)[0] for end in between]
     if at_a * at_b > 0.0:
         said = f"must hold an onset; the multiplier is {1.0 + at_a:.4f} and {1.0 + at_b:.4f} at its ends"
-        raise ParameterError(said, field="onset", value=f"{a:.6g} to {b:.6g}", allowed="values on both sides of 1")
+        raise ParameterError(
+            said, field="onset", value=f"{shown(a)} to {shown(b)}", allowed="values on both sides of 1"
+        )
     return crossing(excess, (a, at_a), (b, at_b))
 
 

@@ -182,6 +182,11 @@ def load_data(path: str | Path, *kinds: type[Description]) -> Any:
     table, source = parsed(read_text(path, "file of data", RobotFileError), str(path)), str(path)
     known: list[type[Description]] = [*kinds, CriticalMode, RecordedWalks, BaseSeries]  # of kinds alike, the first
     kind = max(known, key=lambda kind: len({*kind.model_fields} & {*table}))
+    for other in known[: len(kinds)]:
+        of_both = ({*other.model_fields} & {*table}) - {*kind.model_fields}
+        if kind in kinds and of_both:
+            said = f"belongs to other data than {', '.join(sorted({*kind.model_fields} & {*table}))}: give one kind"
+            raise RobotFileError(said, source=source, field=sorted(of_both)[0])
     if kind not in kinds:
         command = "twin" if kind is BaseSeries else "planar"
         raise RobotFileError(f"has the data of `chilopod identify {command}`, which is another command", source=source)
