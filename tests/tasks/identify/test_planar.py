@@ -95,7 +95,7 @@ def test_the_template_is_read_as_the_papers_data(tmp_path):
     with pytest.raises(RobotFileError, match="unknown key; did you mean 'component_tolerance'"):
         load_data(file, CriticalMode, RecordedWalks)
     file.write_text(TEMPLATES["planar"] + '[free]\n"ground.friction" = ["100 N*s/m", "500 N*s/m"]\n')
-    with pytest.raises(RobotFileError, match="free: belongs to other data than between, .*: give one kind"):
+    with pytest.raises(RobotFileError, match=r"free: belongs to other data than between, .*: give one kind"):
         load_data(file, CriticalMode, RecordedWalks)
 
 
