@@ -35,6 +35,7 @@ _FARTHEST = 60.0  # per cent, where predictions are cut off
 _MOST = 100.0  # chi squared, where bars are cut off
 _MARKERS = "osD^v"
 _FREED = "with friction"
+_FEWEST = 3  # sets that an interval needs
 _TOLD = 2.0  # effective sets below which their mean says nothing
 
 
@@ -173,7 +174,8 @@ def _predicted(found: xr.Dataset) -> str:
     for name, values in _points(found).items():
         if count := int(np.isfinite(values).sum()):
             mean, low, high = (number(float(each), 3) for each in (values.mean(), *_interval(values)))
-            said.append(f"{name} {mean} ({low} to {high}, {count} of {values.size} sets have one)")
+            spread = f"{low} to {high}, " if count >= _FEWEST else ""
+            said.append(f"{name} {mean} ({spread}{count} of {values.size} sets have one)")
     return listing(said) or "no point"
 
 
@@ -190,8 +192,9 @@ def _refitted(found: xr.Dataset) -> str:
     paper = printed.VARIANTS[name].onset.value
     off = found.onset.sel(variant=name).values / paper - 1.0
     weights = np.where(np.isfinite(off), np.exp(-0.5 * (np.nan_to_num(off) / ERROR) ** 2), 0.0)
-    effective = float(weights.sum() ** 2 / max(np.sum(weights**2), 1e-300))
-    said = f"With the onset for {name}, {number(paper, 2)} to {100.0 * ERROR:g} %, as one more datum"
+    same = np.unique(found.constants.values, axis=0, return_inverse=True)[1].ravel()  # a set may be drawn twice
+    effective = float(weights.sum() ** 2 / max(np.sum(np.bincount(same, weights) ** 2), 1e-300))
+    said = f"With the onset for {name}, {number(paper, 2)} ± {100.0 * ERROR:g} %, as one more datum"
     if effective < _TOLD:
         return f"{said} fewer than two of these sets would be left."
     parts = weights / weights.sum()
@@ -229,7 +232,8 @@ def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
             label = str(data.valley.values[index]) if row == 0 and index in firsts else None
             axes["B"].plot(value, place, "o", **_marked(data, index), label=label)
     axes["B"].set(xlim=(10.0, max(45.0, *SPRINGS[:-1])), xlabel=SPRING_UNIT, title="B  Predictions")
-    axes["B"].legend(loc="upper left")
+    # Inside it would hide points.
+    figure.legend(*axes["B"].get_legend_handles_labels(), loc="outside lower center", ncols=2 if narrow else 4)
     return figure
 
 
