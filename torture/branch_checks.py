@@ -284,21 +284,23 @@ def at_once(mine: Crossing, rest: list[Crossing], bound: float) -> tuple[Crossin
 
 
 def _turn(segment: Segment, place: float) -> float:
-    """Place nearby where the curve turns, by the secant method: the value of a point tells its place badly there."""
-    n = segment.orbits.n
+    """Place nearby where the curve turns: the value of a point tells its place badly there. Orbits on both sides of a
+    guess give the next one, never the guess itself, where another curve may pass in another direction."""
+    n, at, side = segment.orbits.n, place, 0.01
     try:
-        at, slope = place, segment.at(place).tangent[n]
-        other = place - 0.01
         for _ in range(10):
-            before = segment.at(other).tangent[n]
-            if slope == before or abs(at - other) < 1e-4:
-                break
-            at, slope, other = other, before, other - before * (at - other) / (slope - before)
-            if abs(other - place) > 0.2:
+            before, after = (segment.at(at + each).tangent[n] for each in (-side, side))
+            if before == after:
                 return place
+            moved = side * (before + after) / (before - after)
+            at += moved
+            if abs(at - place) > 0.2:
+                return place
+            if abs(moved) < 1e-4:
+                break
     except NoOrbit:
         return place
-    return other
+    return at
 
 
 def _touches(found: Verdict, segment: Segment, point: Any, place: float, test: int) -> bool:
