@@ -47,7 +47,7 @@ def test_sections_come_in_their_own_order_and_misspelt_ones_are_refused():
 
 def test_what_is_left_out_unless_it_is_named():
     everything = set(names(chosen()))
-    assert set(names(SECTIONS)) - everything == {"robot-structures"}
+    assert set(names(SECTIONS)) - everything == {"robot-structures", "robot-why-sets"}
     assert names(chosen(size=Size.FULL)) == names(chosen())
     headlines, others = (
         {"identification", "robot-why", "courses", "scaling"},

@@ -34,6 +34,7 @@ SECONDS: Final = {
     "robot-numerics": (25, 10),
     "robot-structures": (900, 300),
     "robot-why": (900, 90),
+    "robot-why-sets": (560, 450),
     "courses": (200, 28),
     "courses-robust": (90, 20),
     "robot-courses": (1200, 250),

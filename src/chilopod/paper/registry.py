@@ -31,6 +31,7 @@ REGISTRY: dict[str, str] = {
     "robot-numerics": "robot.sections.NUMERICS",
     "robot-structures": "robot.sections.STRUCTURES",
     "robot-why": "robot.sections.WHY",
+    "robot-why-sets": "robot.sections.WHY_SETS",
     "courses": "courses.sections.COURSES",
     "courses-robust": "courses.sections.ROBUST",
     "robot-courses": "courses.sections.ROBOT_COURSES",

@@ -56,6 +56,7 @@ def test_every_section_is_computed_and_on_the_page(tiny):
     assert without == {
         "exponents", "branch", "undulation", "movies", "robot-movies", "robot-spread", "robot-strategies",
         "robot-structures",
+        "robot-why-sets",
         "courses-movie", "scaling", "atlas",
     }  # fmt: skip
 

@@ -13,6 +13,7 @@ from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.paper import measures
 from chilopod.paper.robot import why
+from chilopod.paper.robot.figures import trust
 from chilopod.paper.robot.why import FACTORS, PLANAR, limit_end, planar_limit, shapley, with_factors, with_grip
 from chilopod.paper.section import Context, Size
 from chilopod.twin import foot_creep
@@ -98,6 +99,20 @@ def test_subsets_are_kept_as_they_end(growing_below, monkeypatch, tmp_path):
     monkeypatch.setattr(measures, "digest", lambda without: "of edited sources")
     with pytest.raises(pytest.fail.Exception, match="walks again"):
         why.contributions(context)
+
+
+def test_other_sets_of_the_valley_have_parts_of_their_own(growing_below, tmp_path):
+    growing_below(27.0)
+    context = Context(size=Size.TINY, folder=tmp_path / "trials")
+    found = why.over_sets(context)
+    assert found.sizes == {"set": 2, "subset": 2, "factor": len(FACTORS)}
+    assert found.on.dims == ("subset", "factor")
+    # Ends of the preset and of the other set are searched apart.
+    assert len(list((tmp_path / "multipliers").iterdir())) == 4
+    panel = trust.why_sets(found)
+    assert "No assumption raises" in panel.text[1]
+    raised = why.over_sets(context).assign(share=found.share + 0.5)
+    assert "standing feet stick" in trust.why_sets(raised).text[1]
 
 
 def test_the_cause_is_one_sentence_the_same_everywhere():

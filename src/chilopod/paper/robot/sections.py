@@ -72,3 +72,12 @@ WHY: Section[xr.Dataset] = Section(
     beyond=True,
     headline=True,
 )
+WHY_SETS: Section[xr.Dataset] = Section(
+    "robot-why-sets",
+    CHAPTER,
+    "why the robot bends earlier: other constants that fit as well",
+    why.over_sets,
+    panels=trust.why_sets,
+    beyond=True,
+    on_request=True,
+)

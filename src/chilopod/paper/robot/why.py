@@ -34,10 +34,12 @@ from chilopod.paper.measures import Folder, kept
 from chilopod.paper.section import Context, Size
 from chilopod.paper.statements import PLANAR_LIMIT
 from chilopod.paper.table import OfPlanar, OfTwin, Result, of_twin
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot, Twin
 from chilopod.show.words import SPRING_UNIT, listing
 from chilopod.statistics import Interval
+from chilopod.tasks.identify.data import FITTED
+from chilopod.tasks.identify.twin import known, samples_of
 from chilopod.twin.creep import foot_creep
 from chilopod.twin.cycle_map import walk_cycle
 from chilopod.twin.legs import twin_of
@@ -50,6 +52,9 @@ SEARCHED = (5.0, 80.0)
 
 ORDERS = 0.9
 """Part of the orders of removal in the interval of a factor's part."""
+
+SETS = 4
+"""Number of other sets of constants with which the parts are estimated."""
 
 PLANAR = {
     "twin.sliding_friction": 1000.0,
@@ -241,23 +246,45 @@ def contributions(context: Context, progress: Progress = silent) -> xr.Dataset:
     coefficients of the twin and of the planar model (N*s/m).
     """
     robot, planar, folder, size = context.whole, context.robot, context.folder, context.size
-    on, cycles = subsets(size), size.of(_CYCLES, _FEWER, _FEWER)
-    how = _FIRST, size.cut(_FACTOR, _ONCE), cycles
-    names, ends = np.array([factor.name for factor in FACTORS]), []
-    for index, row in enumerate(on):
-        progress(index / len(on), ", ".join(names[row]) or "planar limit")
-        ends.append(_kept_end(with_factors(robot, planar, names[row].tolist()), folder, *how))
+    data = _shares_of(robot, context, subsets(size), progress)
     progress(1.0, "finer planar limit")
-    data = shares(on, np.array([[end.value, end.low, end.high] for end in ends]))
-    data = data.assign_coords(factor=names).assign(about=("factor", [factor.clause for factor in FACTORS]))
     data.attrs = {
         "robot": robot.name,
-        "vouched": limit_end(robot, planar, size.of(FINER, PLANAR, PLANAR), folder, cycles),
+        "vouched": limit_end(robot, planar, size.of(FINER, PLANAR, PLANAR), folder, _cycles(size)),
         "exact": pitchfork(planar, normal_form=False).value,
         "grip": foot_creep(robot).across,
         "viscous": planar.ground.friction,
     }
     return data
+
+
+def over_sets(context: Context, progress: Progress = silent) -> xr.Dataset:
+    """Parts of the factors by the preset and by sets of constants drawn from the valley that the data leave, over set:
+    those of :func:`contributions`, estimated from the subsets in which one factor comes first or last."""
+    robot, on = context.whole, subsets(Size.QUICK if context.size is not Size.TINY else Size.TINY)
+    drawn = samples_of(known()).drawn(context.size.of(SETS, SETS, 1))
+    sets = [robot, *(FITTED.robot_with(robot, FITTED.values_at(parts)) for parts in drawn)]
+    found = [
+        _shares_of(each, context, on, part(progress, index / len(sets), (index + 1) / len(sets)))
+        for index, each in enumerate(sets)
+    ]
+    same = found[0][["on", "about"]]
+    return xr.concat([each.drop_vars(["on", "about"]) for each in found], "set").assign(same)
+
+
+def _shares_of(robot: Robot, context: Context, on: NDArray[np.bool_], progress: Progress) -> xr.Dataset:
+    size = context.size
+    how = _FIRST, size.cut(_FACTOR, _ONCE), _cycles(size)
+    names, ends = np.array([factor.name for factor in FACTORS]), []
+    for index, row in enumerate(on):
+        progress(index / len(on), ", ".join(names[row]) or "planar limit")
+        ends.append(_kept_end(with_factors(robot, context.robot, names[row].tolist()), context.folder, *how))
+    data = shares(on, np.array([[end.value, end.low, end.high] for end in ends]))
+    return data.assign_coords(factor=names).assign(about=("factor", [factor.clause for factor in FACTORS]))
+
+
+def _cycles(size: Size) -> int:
+    return size.of(_CYCLES, _FEWER, _FEWER)
 
 
 def shares(on: NDArray[np.bool_], ends: Array) -> xr.Dataset:

@@ -85,11 +85,7 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
     rows = np.arange(data.sizes["factor"])
     span = np.abs(np.array([data.share_low, data.share_high]) - data.share.values)
     axes["A"].errorbar(data.share, rows, xerr=np.nan_to_num(span), fmt="o", color=style.BLUE, capsize=3.0)
-    axes["A"].axvline(1.0, color=style.GREY, lw=1.2, linestyle=DASHED)
-    axes["A"].set(xscale="log", title="A  Part of each")
-    axes["A"].xaxis.set_major_locator(FixedLocator([0.5, 1.0, 2.0, 4.0]))
-    axes["A"].xaxis.set_major_formatter("×{x:g}")
-    axes["A"].xaxis.set_minor_locator(NullLocator())
+    _times_axis(axes["A"], "A  Part of each")
     _bars(axes["B"], rows - 0.19, data.alone.values, [style.SKY] * len(rows), 0.34)
     _bars(axes["B"], rows + 0.19, data.without.values, [style.ORANGE] * len(rows), 0.34)
     axes["B"].set_title("B  Each by itself")
@@ -99,12 +95,62 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
     for letter in "AB":
         axes[letter].set_yticks(rows, [str(name) for name in data.factor.values] if letter == "A" or narrow else [])
         axes[letter].invert_yaxis()
-    finish(axes["A"], "x", xlabel="part in the spring where the walk ends")
     finish(axes["B"], "x", xlim=(0.0, SEARCHED[1]), xlabel=f"end of the straight walk ({SPRING_UNIT})")
     handles, labels = axes["B"].get_legend_handles_labels()
     handles += [Patch(color=style.SKY), Patch(color=style.ORANGE)]
     labels += ["planar limit and this alone", "twin without this"]
     figure.legend(handles, labels, loc="outside lower center", ncols=1 if narrow else 4)
+    return figure
+
+
+def _times_axis(axes: Axes, title: str) -> None:
+    """Axis of the parts of the assumptions, which are factors."""
+    axes.axvline(1.0, color=style.GREY, lw=1.2, linestyle=DASHED)
+    axes.set(xscale="log", title=title)
+    axes.xaxis.set_major_locator(FixedLocator([0.5, 1.0, 2.0, 4.0]))
+    axes.xaxis.set_major_formatter("×{x:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
+    finish(axes, "x", xlabel="part in the spring where the walk ends")
+
+
+def why_sets(data: xr.Dataset) -> Panel:
+    """Parts of the assumptions of the planar model, by the preset and other sets of constants."""
+    others = data.share.isel(set=slice(1, None))
+    parts = [
+        f"{about} {_times(own)} ({', '.join(_times(each) for each in rest)})"
+        for about, own, rest in zip(data.about.values, data.share.values[0], others.values.T, strict=True)
+    ]
+    always = [str(about) for about, least in zip(data.about.values, data.share.min("set"), strict=True) if least > 1.0]
+    ends = [_spring(float(end[-1])) for end in data.end.values]
+    return Panel(
+        name="robot-why-sets",
+        title="The reasons, by other constants that fit as well",
+        draw=lambda narrow: _draw_why_sets(data, narrow),
+        alt="By how much each assumption multiplies the spring at which the walk ends, for several sets of constants.",
+        text=(
+            f"The preset (filled), and {others.sizes['set']} sets drawn from the valley of constants that the data "
+            f"leave. Straight walks end at {ends[0]}, and at {listing(ends[1:])}. Parts are estimated from the subsets "
+            f"in which an assumption is removed first or last: {listing(parts)}.",
+            f"In all of these sets {listing(always)}, and this raises the spring."
+            if always
+            else "No assumption raises the spring in all of these sets.",
+        ),
+        data=data,
+    )
+
+
+def _draw_why_sets(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(style.Layout("A", 4.2), style.Layout("A", 4.6), narrow)
+    count = data.sizes["set"]
+    for index, parts in enumerate(data.share.values):
+        rows = np.arange(parts.size) + 0.5 * (index / max(count - 1, 1) - 0.5)
+        label = {0: "preset", 1: "other sets"}.get(index)
+        color, fill = (style.GREEN, "none") if index else (style.BLUE, style.BLUE)
+        axes["A"].plot(parts, rows, "o", color=color, markerfacecolor=fill, markersize=6, label=label)
+    axes["A"].set_yticks(range(data.sizes["factor"]), [str(name) for name in data.factor.values])
+    axes["A"].invert_yaxis()
+    _times_axis(axes["A"], "Part of each")
+    figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
