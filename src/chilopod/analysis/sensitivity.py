@@ -232,12 +232,12 @@ class _Leading:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.mode = cache(partial(leading_mode, robot))
+        self.slope = cache(self._slope)
 
-    def slope(self, path: str, like: str | None = None) -> tuple[complex, float]:
-        """Derivative of the exponent of the leading mode by a number, and its error, by the return map that serves for
-        a change of another number."""
-        # A gait with another phase between the sides has no symmetry of half a period.
-        mode: Mode = self.mode((like or path) != "gait.side_phase")
+    def _slope(self, path: str, symmetric: bool) -> tuple[complex, float]:
+        """Derivative of the exponent of the leading mode by a number, and its error, by the return map of half a period
+        or of a whole one."""
+        mode: Mode = self.mode(symmetric)
 
         def projected(value: float) -> Array:
             image = straight_return(self._robot.with_value(path, value), mode.returns == 2)
@@ -250,6 +250,11 @@ class _Leading:
         return slope, float(np.hypot(errors[0], errors[1]) + abs(exponent) * errors[2]) / mode.duration
 
 
+def _keeps_symmetry(path: str) -> bool:
+    """True if a gait with another value keeps the symmetry of half a period."""
+    return path != "gait.side_phase"
+
+
 def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
     value = onset.first(robot).point.value
     of = _Leading(robot.with_value(onset.parameter, value))
@@ -258,7 +263,8 @@ def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> 
         show(done / len(paths), f"onset by {path}")
         slope, error = 0.0, 0.0
         if onset.parameter not in (path, path.partition("[")[0]):  # else it is replaced
-            (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, path), of.slope(path)
+            symmetric = _keeps_symmetry(path)
+            (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, symmetric), of.slope(path, symmetric)
             slope = -by_path.real / by_onset.real
             error = (off + abs(slope) * uncertain) / abs(by_onset.real)
         slopes.append(slope)
@@ -272,7 +278,7 @@ def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) ->
     found = []
     for done, path in enumerate(paths):
         show(done / len(paths), f"growth by {path}")
-        found.append(of.slope(path))
+        found.append(of.slope(path, _keeps_symmetry(path)))
     errors, turns = [error for _, error in found], mode.frequency > 0.0
     return {
         "growth": (mode.growth, [slope.real for slope, _ in found], errors),

@@ -146,8 +146,8 @@ def solve(matrix: Any, right: Any) -> Array:
     LAPACK's solver would share a few columns between threads, which takes milliseconds where other work keeps a core.
     """
     inverse = np.linalg.inv(matrix.astype(np.float64))
-    solution = np.zeros_like(right)
-    for _ in range(3):
+    solution = (inverse @ right.astype(np.float64)).astype(right.dtype)
+    for _ in range(2):
         solution += inverse @ (right - matrix @ solution).astype(np.float64)
     rounded: Array = solution.astype(np.float64)
     return rounded
