@@ -111,10 +111,11 @@ def test_the_last_point_is_on_the_end_of_the_interval():
     assert -0.3 <= min(asked) <= max(asked) <= 0.7
 
 
-def test_a_branch_that_starts_outward_ends_at_once():
-    branch = follow(linear, begin(linear, 0.7, [1.4]), (0.0, 0.7))
+@pytest.mark.parametrize(("start", "end", "rising"), [(0.7, 0.0, True), (0.0, 0.7, False)])
+def test_a_branch_from_an_end_of_its_interval_goes_inward(start, end, rising):
+    branch = follow(linear, begin(linear, start, [2.0 * start], rising), (0.0, 0.7))
     assert branch.ending is Ending.LEFT_INTERVAL
-    assert len(branch.points) == 1
+    assert branch.points[-1].value == end
 
 
 def test_a_budget_ends_a_branch_and_keeps_what_was_found():

@@ -194,11 +194,12 @@ def halfway(value):
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        ("no", "an array of numbers, not 'no'"),
-        (None, "an array of numbers, not None"),
-        ([1.0, [2.0]], r"an array of numbers, not \[1.0, \[2.0\]\]"),
-        ({"x": 1.0}, "an array of numbers, not {'x': 1.0}"),
+        ("no", "an array of real numbers, not 'no'"),
+        (None, "an array of real numbers, not None"),
+        ([1.0, [2.0]], r"an array of real numbers, not \[1.0, \[2.0\]\]"),
+        ({"x": 1.0}, "an array of real numbers, not {'x': 1.0}"),
         ([1.0], r"returns an array of shape \(1,\); allowed: an array of shape \(2,\)"),
+        ([1.0, 2.0j], "an array of real numbers, not complex ones"),
         (3.0, r"returns an array of shape \(\); allowed: an array of shape \(2,\)"),
     ],
 )

@@ -31,8 +31,8 @@ def branching(t, x):
     [
         (lambda t, x: [x[0]], r"an array of shape \(1,\); allowed: an array of shape \(2,\)"),
         (lambda t, x: [x[0], x[1], x[1]], r"an array of shape \(3,\); allowed: an array of shape \(2,\)"),
-        (lambda t, x: "up", r"an array of numbers, not 'up'; allowed: an array of shape \(2,\)"),
-        (lambda t, x: None, r"an array of numbers, not None; allowed: an array of shape \(2,\)"),
+        (lambda t, x: "up", r"an array of real numbers, not 'up'; allowed: an array of shape \(2,\)"),
+        (lambda t, x: None, r"an array of real numbers, not None; allowed: an array of shape \(2,\)"),
     ],
 )
 def test_resets(reset, said):
@@ -43,8 +43,8 @@ def test_resets(reset, said):
 @pytest.mark.parametrize(
     ("guard", "said"),
     [
-        (lambda t, x: "low", "must return a number, not 'low'; allowed: one number"),
-        (lambda t, x: None, "must return a number, not None; allowed: one number"),
+        (lambda t, x: "low", "must return a real number, not 'low'; allowed: one number"),
+        (lambda t, x: None, "must return a real number, not None; allowed: one number"),
         (lambda t, x: x, r"returns an array of shape \(2,\); allowed: one number"),
         (lambda t, x: x[0] < 0.0, "must return a number, not true"),
         (lambda t, x: math.nan, "is not finite on the orbit"),

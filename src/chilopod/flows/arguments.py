@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -88,17 +89,29 @@ def shape_of(value: Any) -> tuple[int, ...] | str:
         return "ragged"
 
 
+def as_real(result: Any) -> Array:
+    """Values of a user's function as floating-point numbers; TypeError for complex ones off the real axis."""
+    array = np.asarray(result)
+    if array.dtype.kind == "c":
+        if array.imag.any():
+            raise TypeError("complex numbers")
+        array = array.real
+    return np.asarray(array, dtype=np.float64)
+
+
 def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
     """Values of a user's function as an array of the required shape."""
-    try:
+    array, kind = None, ""
+    with suppress(TypeError, ValueError):
+        kind = np.asarray(result).dtype.kind
         # None would become NaN.
-        array = None if result is None else np.asarray(result, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = None
+        array = None if result is None else as_real(result)
     wanted = f"an array of shape {shape}" if shape else "one number"
     if array is None:
-        what, text = "an array of numbers" if shape else "a number", repr(result)
+        what, text = "an array of real numbers" if shape else "a real number", repr(result)
         given = text if len(text) <= _LONGEST_SHOWN else f"a {type(result).__name__}"
+        if kind == "c":
+            given = "complex ones"
         raise ParameterError(f"must return {what}, not {given}", field=field, allowed=wanted)
     if array.shape != shape:
         raise ParameterError(f"returns an array of shape {array.shape}", field=field, allowed=wanted)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.arguments import as_real
 from chilopod.flows.tracing.environment import Opaque, describe, python_function, rebuild
 from chilopod.flows.tracing.graph import Graph
 from chilopod.flows.tracing.ordering import ordered
@@ -129,7 +130,7 @@ def _verify(
         x = around + spread * np.where(around == 0.0, size, np.abs(around)) * np.cos(3.0 * np.arange(n) + turn)
         try:
             with np.errstate(all="ignore"):
-                real = np.asarray(rhs(t, x.copy(), *args), dtype=np.float64)
+                real = as_real(rhs(t, x.copy(), *args))
         except Exception:  # not defined at this state
             continue
         own = evaluate(tape, tape.slopes, t, x, params)

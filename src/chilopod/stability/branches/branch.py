@@ -238,7 +238,8 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
     curve.periods = start.periods
     curve.sizes = branch_sizes(curve, start)
     if isinstance(start, Start):
-        anchor = anchored(curve, start, step)
+        inward = dict(zip(curve.between, (True, False), strict=True))
+        anchor = anchored(curve, replace(start, rising=inward.get(start.value, start.rising)), step)
     else:
         units = curve.units(start.orbit.size)
         tangent = start.tangent * start.units / units

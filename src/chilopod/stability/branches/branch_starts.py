@@ -104,7 +104,7 @@ def begin(
     orbit
         State on the orbit or near it, shape (n,), or an AnalysisError; by default the system's known orbit.
     rising
-        True to start towards rising parameters.
+        True to start towards rising parameters. At an end of its interval :func:`follow` starts inwards.
     periods, symmetric
         Number of the systems' periods in one period of the orbit, and True for one with the systems' symmetry in time.
     seconds
