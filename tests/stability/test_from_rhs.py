@@ -372,6 +372,7 @@ def test_a_search_warns_once():
     with pytest.warns(NotAnalytic) as said:
         locate(family, (0.5, 0.6), orbit=[0.0])
     assert len(said) == 1
+    assert said[0].filename == __file__
 
 
 def test_symmetries_are_checked_at_every_value_of_a_family():

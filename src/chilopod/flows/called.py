@@ -122,8 +122,7 @@ class CalledFlow:
                 return 0.0
         if off[1] < 0.5 * off[0]:
             return 0.0  # an error that falls with the difference is curvature
-        if deadline.first_time(_DISAGREEMENT):
-            warnings.warn(_DISAGREEMENT, UndeclaredSwitch, stacklevel=4)
+        deadline.warn(_DISAGREEMENT, UndeclaredSwitch)
         return 2.0 * max(off) / float(np.abs(direction).min())
 
     def _slope(self, t: float, x: Array) -> Array:
@@ -138,8 +137,7 @@ class CalledFlow:
             f"the right-hand side cannot be traced ({self.reason}) nor differentiated by a complex step: its "
             "derivative is taken by differences, with about nine digits"
         )
-        if deadline.first_time(said):
-            warnings.warn(said, NotAnalytic, stacklevel=4)
+        deadline.warn(said, NotAnalytic)
         return lambda t, x: self._by_differences(t, x, sizes), _DIFFERENCE_FLOOR
 
     def _by_complex_steps(self, t: float, x: Array, sizes: Array) -> Array:

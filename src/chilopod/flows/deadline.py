@@ -7,6 +7,7 @@ import math
 import sys
 import threading
 import time
+import warnings
 from contextvars import ContextVar
 from numbers import Real
 from typing import Self
@@ -18,6 +19,7 @@ from chilopod.frozen import Array
 
 _STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
 _SAID: ContextVar[set[str] | None] = ContextVar("said", default=None)
+_PACKAGE = __name__.partition(".")[0]
 
 
 class SpentError(ChilopodError, RuntimeError):
@@ -88,13 +90,18 @@ def check() -> None:
         raise over()
 
 
-def first_time(message: str) -> bool:
-    """True for a message that was not said before within the outermost limit."""
+def warn(message: str, category: type[Warning]) -> None:
+    """Show a warning at the user's line that led to it, once within the outermost limit."""
     said = _SAID.get()
-    known = said is not None and message in said
     if said is not None:
+        if message in said:
+            return
         said.add(message)
-    return not known
+    level = 2
+    with contextlib.suppress(ValueError):  # beyond the first frame
+        while sys._getframe(level - 1).f_globals.get("__name__", "").startswith(f"{_PACKAGE}."):
+            level += 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 def over() -> SpentError:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import itertools
-import warnings
 from collections.abc import Callable
 
 import numpy as np
 
+from chilopod.flows import deadline
 from chilopod.flows.arguments import Slopes
 from chilopod.frozen import Array
 
@@ -76,7 +76,7 @@ def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> 
     if found:
         listed = ", ".join(f"{t:.9g}" for t in sorted(found)[:6]) + (" ..." if len(found) > 6 else "")
         said = f"the right-hand side jumps at t = {listed}, not among switch_times: that costs digits and time"
-        warnings.warn(said, UndeclaredSwitch, stacklevel=4)
+        deadline.warn(said, UndeclaredSwitch)
 
 
 def _fourth_differences(samples: Array) -> Array:
