@@ -110,7 +110,7 @@ def _times_axis(axes: Axes, title: str) -> None:
     axes.xaxis.set_major_locator(FixedLocator([0.5, 1.0, 2.0, 4.0]))
     axes.xaxis.set_major_formatter("×{x:g}")
     axes.xaxis.set_minor_locator(NullLocator())
-    finish(axes, "x", xlabel="part in the spring where the walk ends")
+    finish(axes, "x", xlabel="factor on the spring")
 
 
 def why_sets(data: xr.Dataset) -> Panel:
@@ -131,9 +131,7 @@ def why_sets(data: xr.Dataset) -> Panel:
             f"The preset (filled), and {others.sizes['set']} sets drawn from the valley of constants that the data "
             f"leave. Straight walks end at {ends[0]}, and at {listing(ends[1:])}. Parts are estimated from the subsets "
             f"in which an assumption is removed first or last: {listing(parts)}.",
-            f"In all of these sets {listing(always)}, and this raises the spring."
-            if always
-            else "No assumption raises the spring in all of these sets.",
+            f"What raises the spring in all of these sets: {listing(always) or 'nothing'}.",
         ),
         data=data,
     )
