@@ -68,6 +68,29 @@ def test_data_that_contradict_each_other_allow_nothing():
     assert np.isnan(ranges).all()
 
 
+def test_a_profile_ends_where_no_pitchfork_is_left(monkeypatch):
+    """Beyond, each search would begin with nothing, among constants that are slow to compute."""
+    tried = []
+
+    def fitted(robot, data, start):
+        tried.append(start[2])
+        return start
+
+    def off(robot, data):
+        gone = robot.get("legs.forward_offset") > BEST[2] + 0.002
+        return np.full(6, planar_fit.NO_PITCHFORK if gone else 0.5)
+
+    monkeypatch.setattr(planar, "least_largest", fitted)
+    monkeypatch.setattr(planar, "residuals", off)
+    monkeypatch.setattr(planar, "_predictions", lambda robot, variants: planar._no_predictions(variants))
+    span = BEST[2] + np.array([-0.01, 0.01])
+    profile = planar._profile(ROBOT, DATA, BEST, span, 11, {}, lambda part, said: None)
+    gone = profile.forward_offset.values > BEST[2] + 0.002
+    assert len(tried) == 11 - gone.sum() + 1
+    np.testing.assert_array_equal(profile.largest_residual, np.where(gone, planar_fit.NO_PITCHFORK, 0.5))
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(profile.friction)), np.flatnonzero(gone)[1:])
+
+
 @pytest.mark.parametrize(
     ("field", "value"),
     [

@@ -10,7 +10,7 @@ other two make the largest residual as small as it can be.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -31,6 +31,7 @@ from chilopod.tasks.identify.data import CriticalMode
 from chilopod.tasks.identify.estimates import Estimates, Identified
 from chilopod.tasks.identify.planar_fit import (
     FREE,
+    NO_PITCHFORK,
     allowed_ranges,
     best_of,
     confidence_intervals,
@@ -178,7 +179,8 @@ def _profile(
     variants: Mapping[str, Sequence[str]],
     progress: Progress,
 ) -> xr.Dataset:
-    """Fits at fixed forward offsets, outward from the best so that each starts next to its neighbour."""
+    """Fits at fixed forward offsets, outward from the best so that each starts next to its neighbour; NaN beyond one
+    without a pitchfork, where the next would start from nothing."""
     low, high = span if np.isfinite(span).all() else best[2] + 0.1 * robot.module_length * np.array([-1.0, 1.0])
     beside = _BESIDE * (high - low)
     offsets = np.linspace(low - beside, high + beside, count)
@@ -186,16 +188,16 @@ def _profile(
     middle = int(np.abs(offsets - best[2]).argmin())
     done = 0
     for direction in (range(middle, count), range(middle - 1, -1, -1)):
-        last = best
+        last, largest = best, 0.0
         for index in direction:
-            constants = least_largest(robot, data, np.append(last[:2], offsets[index]))
-            last, off = constants, residuals(with_constants(robot, constants), data)
-            rows[index] = {
-                "friction": constants[0],
-                "half_width": constants[1],
-                "largest_residual": float(np.abs(off).max()),
-                **_predictions(with_constants(robot, constants), variants),
-            }
+            found, constants = _no_predictions(variants), np.full(len(FREE), np.nan)
+            if largest < NO_PITCHFORK:
+                last = constants = least_largest(robot, data, np.append(last[:2], offsets[index]))
+                largest = float(np.abs(residuals(with_constants(robot, constants), data)).max())
+            if largest < NO_PITCHFORK:
+                found = _predictions(with_constants(robot, constants), variants)
+            fitted = {"friction": constants[0], "half_width": constants[1], "largest_residual": largest}
+            rows[index] = fitted | found
             done += 1
             progress(0.4 + 0.6 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
     columns = {name: np.array([rows[i][name] for i in range(count)]) for name in rows[0]}
@@ -206,10 +208,13 @@ def _profile(
     )
 
 
+def _no_predictions(variants: Iterable[str]) -> dict[str, float | str]:
+    return dict.fromkeys(["critical_k1", *variants, "uniform", "coefficient"], np.nan) | {"verdict": ""}
+
+
 def _predictions(robot: Robot, variants: Mapping[str, Sequence[str]]) -> dict[str, float | str]:
     """Predictions of a set of constants for numbers that were not fitted."""
-    found: dict[str, float | str] = dict.fromkeys(["critical_k1", *variants], np.nan)
-    found |= {"uniform": np.nan, "coefficient": np.nan, "verdict": ""}
+    found = _no_predictions(variants)
     for name, setting in {"critical_k1": (), **variants}.items():
         with suppress(AnalysisError):
             found[name] = pitchfork(robot.set_from_text(setting), normal_form=False).value

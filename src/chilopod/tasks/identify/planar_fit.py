@@ -32,7 +32,8 @@ _MOST_MOVES, _LONGEST_MOVE = 40, 0.1  # to the end of an interval, in the same u
 _ROOM = 1e-3  # of chi-square
 _MET = 1.0 + 1e-6  # residual that counts as 1
 _RISE = float(chi2.ppf(CONFIDENCE, 1))  # of chi-square at the end of an interval
-_NO_PITCHFORK = 100.0
+NO_PITCHFORK = 100.0
+"""All residuals of a robot without a pitchfork."""
 
 
 def residuals(robot: Robot, data: CriticalMode) -> Array:
@@ -90,7 +91,7 @@ class _Residuals:
 def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
     """Spring and mode less the data, over their tolerances."""
     if found is None:
-        return np.full(robot.body.modules, _NO_PITCHFORK)
+        return np.full(robot.body.modules, NO_PITCHFORK)
     components = (found[1] - np.array(data.components)) / data.component_tolerance
     return np.append((found[0] - data.k1) / data.k1_tolerance, components)
 
@@ -192,7 +193,7 @@ def fits_from_every_start(robot: Robot, data: CriticalMode, progress: Progress =
     for index, start in enumerate(_STARTS):
         fits.append(_fit(robot, data, np.array(start) * scale_of(robot, data)))
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
-    if all((off == _NO_PITCHFORK).all() for _, off in fits):
+    if all((off == NO_PITCHFORK).all() for _, off in fits):
         problem = "must have a pitchfork on its straight walk with some of the constants tried"
         raise AnalysisError(problem, field="robot", value=robot.name)
     return fits
