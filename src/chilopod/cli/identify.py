@@ -141,7 +141,7 @@ class _TwinOptions(_Options):
     evaluations: Annotated[
         int, typer.Option(metavar="N", help="Evaluations that find the valley of good constants.", min=1, max=100000)
     ] = 300
-    samples: Annotated[int, typer.Option(metavar="N", help="Weighted samples of the valley.", min=1, max=200)] = 100
+    samples: Annotated[int, typer.Option(metavar="N", help="Weighted samples of the valley.", min=1, max=10_000)] = 100
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.", min=0)] = 1
 
 

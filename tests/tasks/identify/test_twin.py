@@ -11,6 +11,7 @@ from chilopod.paper.fit_data import base_series_data
 from chilopod.tasks.identify import TEMPLATES, BaseSeries, load_data, twin, twin_series
 from chilopod.tasks.identify.twin import FITTED, TwinIdentification, known, search
 from chilopod.tasks.identify.twin_series import Series, base_series, residuals
+from chilopod.tasks.identify.valley import Surrogate
 
 ROBOT = load_robot("aoi2022")
 DATA = base_series_data()
@@ -223,6 +224,17 @@ def test_a_valley_has_effective_samples_or_says_that_it_has_few():
     assert (np.diff(found.estimates.ends) > 0.0).all()
     fits = [fit for fit in found.fits if not fit.weight] + [fit for fit in found.fits if fit.weight][:10]
     assert "below 20 intervals are not reliable" in "".join(TwinIdentification(ROBOT, found.data, fits).lines())
+
+
+def test_any_number_of_samples_is_drawn():
+    """Of a residual that is a constant's distance from the middle, over 0.1."""
+    parts = np.random.default_rng(0).uniform(size=(30, 2))
+    surrogate = Surrogate(parts, (parts[:, :1] - 0.5) / 0.1)
+    drawn = surrogate.draws(450, np.random.default_rng(1))
+    assert drawn.shape == (450, 2)
+    assert len(np.unique(drawn, axis=0)) > 350
+    np.testing.assert_allclose([drawn[:, 0].mean(), drawn[:, 0].std()], [0.5, 0.1], atol=0.03)
+    assert surrogate.draws(0, np.random.default_rng(1)).shape == (0, 2)
 
 
 @pytest.mark.slow

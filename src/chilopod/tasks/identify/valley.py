@@ -123,8 +123,11 @@ class Surrogate:
         return np.where(((parts >= 0.0) & (parts <= 1.0)).all(axis=1), found, -np.inf)
 
     def draws(self, count: int, rng: np.random.Generator) -> Array:
-        """Parts drawn from the likelihood that the surrogate expects, shape (count, constants), by an ensemble sampler
+        """Parts drawn from the likelihood that the surrogate expects, shape (count, constants), by ensembles of walkers
         with stretch moves (Goodman and Weare 2010)."""
+        return np.concatenate([self._ensemble(rng) for _ in range(0, max(count, 1), _WALKERS)])[:count]
+
+    def _ensemble(self, rng: np.random.Generator) -> Array:
         size = self._parts.shape[1]
         points = np.concatenate([rng.uniform(size=(20 * _WALKERS, size)), self._parts])
         # From tempered weights, so that walkers begin everywhere.
@@ -141,7 +144,7 @@ class Surrogate:
                 level = self.log_likelihood(moved)
                 accept = np.log(rng.uniform(size=len(movers))) < (size - 1) * np.log(stretch) + level - height[movers]
                 places[movers[accept]], height[movers[accept]] = moved[accept], level[accept]
-        return places[rng.permutation(_WALKERS)[:count]]
+        return places[rng.permutation(_WALKERS)]
 
     def misjudged(self, parts: Array, residuals: Array) -> float:
         """Mean square error at other evaluations, over that which the surrogate expects; 1 without any."""
