@@ -9,7 +9,8 @@ if TYPE_CHECKING:
     from chilopod.tasks.identify import identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
     from chilopod.tasks.runs import RunOptions
-    from chilopod.tasks.size import Sizing, size
+    from chilopod.tasks.sizing import size
+    from chilopod.tasks.sizing.result import Sizing
     from chilopod.tasks.turn import Turn, turn
     from chilopod.tasks.walk import Ends, Walks, ends, walk
 else:
@@ -20,7 +21,8 @@ else:
             "identify": ("identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
             "runs": ("RunOptions",),
-            "size": ("Sizing", "size"),
+            "sizing": ("size",),
+            "sizing.result": ("Sizing",),
             "turn": ("Turn", "turn"),
             "walk": ("Ends", "Walks", "ends", "walk"),
         },

@@ -1,0 +1,149 @@
+"""Sizing: values of free numbers at which a robot does what is wished, checked in walks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+from chilopod import units
+from chilopod.analysis.map_axes import Axis, Given, axis
+from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, known_names, leading_mode, unit_of
+from chilopod.errors import ChilopodError, ParameterError
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.tasks.radius_law import DURATION, bent, end_of_walk, is_curved
+from chilopod.tasks.sizing.result import Outcome, Sizing
+from chilopod.tasks.sizing.search import Search
+from chilopod.tasks.sizing.wishes import Wish, parsed_wish
+from chilopod.trials import run
+
+WALKED = 0.02
+"""Largest relative deviation of the radius and the speed of a planar walk from those computed."""
+
+_SETTLED = 15.0  # settling times of a walk
+_LONGEST = 900.0  # s, of a walk
+
+
+def size(
+    robot: Robot,
+    wishes: Mapping[str, float | str],
+    free: Sequence[Given],
+    onset: Onset = Onset(),  # noqa: B008 (frozen)
+    *,
+    twin: bool = False,
+    budget: int = 600,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Sizing:
+    """Find the values of free numbers at which a robot does what is wished, and let it walk.
+
+    Parameters
+    ----------
+    robot, onset
+        Robot whose other numbers stay, and the number that bends it.
+    wishes
+        Value of each wished quantity, SI or text with a unit; text that begins with ``<`` or ``>`` is a limit.
+        Quantities are those of :data:`chilopod.analysis.quantities.QUANTITIES`.
+    free
+        Paths and ranges of the free numbers, as the axes of :func:`chilopod.analysis.map`, but without modules.
+    twin
+        True to let the robot walk in three dimensions too.
+    budget, seed
+        Most evaluations of a robot, some 30 ms each, and as many again to say what stands in the way; seed of the
+        scattered starts.
+    progress
+        Function of the fraction done (0 to 1) and a few words.
+
+    Raises
+    ------
+    ParameterError
+        If a wish or a range is not one, or two of the ranges change the same number.
+    """
+    given = tuple(
+        parsed_wish(robot, onset, name, wishes[name]) for name in known_names([*wishes], QUANTITIES, "wishes")
+    )
+    axes = _axes(robot, free)
+    if twin and robot.twin is None:
+        raise ParameterError("needs a table [twin], which this robot lacks", field="twin", value=robot.name)
+    if budget < 1:
+        raise ParameterError("must be positive", field="budget", value=budget)
+    search = Search(robot, given, axes, onset, budget, seed, progress)
+    outcome = search.run()
+    reasons, front = search.reasons() if outcome in (Outcome.UNMET, Outcome.BUDGET) else ((), [])
+    found = search.at(search.best)
+    again = Measured(onset)
+    values = np.array([search.quantity(again, wish, found) for wish in given])
+    single = len(axes) == len(given) == 1 and not given[0].sense
+    bound = search.bound(again) if outcome is Outcome.MET and single else np.nan
+    search.progress(1.0, "walks")
+    engines = ("planar", "twin")[: 1 + twin]
+    records = {name: run([bent(found, name, _duration(found, again))])[0] for name in engines}
+    walks = {name: end_of_walk(record, found) for name, record in records.items()}
+    if outcome is Outcome.MET and not _as_computed(walks["planar"], found, again):
+        outcome = Outcome.SLOW if _duration(found, again) == _LONGEST else Outcome.OTHERWISE
+    rows = np.array([[*search.numbers(u), *(search.quantity(again, w, search.at(u)) for w in given)] for u in front])
+    return Sizing(
+        _documented(robot, found, given, axes, onset, outcome), robot.name, given, onset, values, axes,
+        search.numbers(search.best), bound, outcome, tuple(reasons), rows.reshape(-1, len(axes) + len(given)), walks,
+        search.evaluations,
+    )  # fmt: skip
+
+
+def _axes(robot: Robot, free: Sequence[Given]) -> tuple[Axis, ...]:
+    axes = tuple(axis(robot, each, "free") for each in free)
+    taken: set[str] = set()
+    for each in axes:
+        if each.whole:
+            raise ParameterError("must be a continuous number", field=f"free {each.path}", value=each.path)
+        both = taken & each.numbers(robot)
+        if both:
+            said = f"must not change a number that another range changes: {', '.join(sorted(both))}"
+            raise ParameterError(said, field=f"free {each.path}", value=each.path)
+        taken |= each.numbers(robot)
+        for end in (each.low, each.high):
+            try:
+                each.change(robot, end)
+            except ChilopodError as error:
+                error.field = f"free {each.path}"
+                raise
+    if not axes:
+        raise ParameterError("must name a number with its range", field="free", value="nothing")
+    return axes
+
+
+def _duration(robot: Robot, measured: Measured) -> float:
+    """Duration of a walk that starts bent, until it has settled, s."""
+    try:
+        return float(np.clip(_SETTLED * measured.settling(robot), DURATION, _LONGEST))
+    except ChilopodError:
+        return DURATION
+
+
+def _as_computed(end: xr.Dataset, robot: Robot, measured: Measured) -> bool:
+    """True if a walk has the radius and the speed that are computed, or is straight where that is stable."""
+    if leading_mode(robot).growth <= 0.0:
+        return end.direction.item() == "straight"
+    try:
+        pairs = (end.axis_radius, measured.radius(robot)), (end.speed, measured.speed(robot))
+    except ChilopodError:
+        return not np.isfinite(end.axis_radius.item())
+    near = all(abs(float(walked) / computed - 1.0) <= WALKED for walked, computed in pairs)
+    return bool(is_curved(end)) and near
+
+
+def _documented(
+    robot: Robot, found: Robot, wishes: Sequence[Wish], axes: Sequence[Axis], onset: Onset, outcome: Outcome
+) -> Robot:
+    """The robot with provenance: what was computed for which wishes, and what was copied."""
+    said = []
+    for wish in wishes:
+        shown = units.format(wish.value, unit_of(wish.quantity, robot, onset), digits=6)
+        said.append(f"{wish.quantity} {'<>'[(wish.sense + 1) // 2] if wish.sense else ''}{shown}")
+    texts = dict(robot.copied().provenance)
+    for each in axes:
+        low, high = (units.format(end, each.unit, digits=6) for end in (each.low, each.high))
+        origin = f"computed: chilopod size, {', '.join(said)}, {each.path} within {low} to {high}; {outcome.label}"
+        texts |= dict.fromkeys(each.numbers(robot), origin)
+    return found.with_(name="sized", provenance=texts)

@@ -1,0 +1,159 @@
+"""Result of a search for a robot that does what is wished."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from chilopod import units
+from chilopod.analysis.map_axes import Axis
+from chilopod.analysis.quantities import QUANTITIES, Onset, unit_of
+from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.labels import Labelled
+from chilopod.notebook import Summary, axes_for, finite
+from chilopod.robot import Robot
+from chilopod.stability.shown import bounded
+from chilopod.tasks.radius_law import is_curved
+from chilopod.tasks.sizing.wishes import Wish
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Outcome(Labelled):
+    """Outcome of a search for a robot; each member's ``sentence`` describes it in words."""
+
+    MET = "met", "every wish is met"
+    OTHERWISE = "walks otherwise", "the wishes are met in theory, but a walk that starts bent does something else"
+    SLOW = "not settled", "the wishes are met in theory; a walk of 15 minutes that starts bent has not settled"
+    UNMET = "unmet", "no robot that was tried meets every wish; this one comes nearest"
+    BUDGET = "budget", "the evaluations were spent before every wish was met; this robot came nearest"
+
+
+@dataclass(frozen=True, eq=False)
+class Sizing(Summary, ReadOnlyArrays):
+    """A robot that does what is wished, or comes nearest to it.
+
+    Attributes
+    ----------
+    robot, source
+        The robot, with provenance that says what was computed and what was copied; name of that which it is made from.
+    wishes, onset, values
+        Wishes, the number that bends the robot, and the values of the wished quantities, SI, shape (wishes,); NaN
+        without one.
+    free, numbers, bound
+        Free numbers with their ranges, their values, SI, shape (numbers,), and the bound on the error of a root, NaN
+        for more than one number.
+    outcome, reasons
+        Outcome, and sentences about what stands in the way.
+    front
+        Points of the Pareto front of two conflicting wishes: free numbers and then quantities, SI, shape (points,
+        numbers + wishes).
+    walks
+        Ends of a walk by the name of the engine, see :func:`chilopod.tasks.radius_law.end_of_walk`.
+    evaluations
+        Number of robots that were evaluated; a branch of curved walks counts as 30.
+    """
+
+    robot: Robot
+    source: str
+    wishes: tuple[Wish, ...]
+    onset: Onset
+    values: Array
+    free: tuple[Axis, ...]
+    numbers: Array
+    bound: float
+    outcome: Outcome
+    reasons: tuple[str, ...]
+    front: Array
+    walks: dict[str, xr.Dataset]
+    evaluations: int
+
+    @property
+    def title(self) -> str:
+        """Robot and outcome."""
+        return f"{self.source}: {self.outcome.sentence}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers, SI; null for missing values."""
+        paths, wished = [each.path for each in self.free], [each.quantity for each in self.wishes]
+        front = [(row[: len(paths)], map(finite, row[len(paths) :])) for row in self.front.tolist()]
+        return {
+            "robot": self.source,
+            "outcome": self.outcome.label,
+            "numbers_si": dict(zip(paths, self.numbers.tolist(), strict=True)),
+            "error_bound_si": finite(self.bound),
+            "ranges_si": {each.path: [each.low, each.high] for each in self.free},
+            "wishes": [
+                {**asdict(wish), "found": finite(value), "walked": {k: self._walked(wish, k) for k in self.walks}}
+                for wish, value in zip(self.wishes, self.values.tolist(), strict=True)
+            ],
+            "walks": {
+                name: {"status": str(end.status.item()), "direction": str(end.direction.item())}
+                for name, end in self.walks.items()
+            },
+            "reasons": list(self.reasons),
+            "front_si": [
+                {"numbers": dict(zip(paths, x, strict=True)), "values": dict(zip(wished, y, strict=True))}
+                for x, y in front
+            ],
+            "evaluations": self.evaluations,
+        }
+
+    def _walked(self, wish: Wish, engine: str) -> float | None:
+        name = {"radius": "axis_radius", "speed": "speed"}.get(wish.quantity)
+        end = self.walks[engine]
+        return finite(float(end[name])) if name and (name == "speed" or is_curved(end)) else None
+
+    def _shown(self, wish: Wish, value: float | None) -> str:
+        unit = unit_of(wish.quantity, self.robot, self.onset)
+        return "-" if value is None or np.isnan(value) else units.format(value, unit, digits=5)
+
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        cells: list[Sequence[str]] = [("", "range or wish", "found", *(f"{name} walk" for name in self.walks))]
+        none = [""] * len(self.walks)
+        for each, value in zip(self.free, self.numbers.tolist(), strict=True):
+            low, high = (units.format(end, each.unit, digits=6) for end in (each.low, each.high))
+            found, error = units.format(value, each.unit, digits=6), units.from_si(self.bound, each.unit)
+            found = f"{bounded(units.from_si(value, each.unit), error)} {each.unit}" if np.isfinite(error) else found
+            cells.append((each.path, f"{low} to {high}", found, *none))
+        for wish, value in zip(self.wishes, self.values.tolist(), strict=True):
+            wished = {0: "", -1: "at most ", 1: "at least "}[wish.sense] + self._shown(wish, wish.value)
+            walked = (self._shown(wish, self._walked(wish, name)) for name in self.walks)
+            cells.append((wish.quantity, wished, self._shown(wish, value), *walked))
+        below = [f"the {name} walk {_direction(end)}" for name, end in self.walks.items()]
+        for row in self.front.tolist():
+            numbers, values = row[: len(self.free)], row[len(self.free) :]
+            met = (f"{w.quantity} {self._shown(w, v)}" for w, v in zip(self.wishes, values, strict=True))
+            at = (units.format(v, a.unit, digits=4) for a, v in zip(self.free, numbers, strict=True))
+            below.append(f"on the Pareto front: {', '.join(met)} at {', '.join(at)}")
+        return [], cells, [*self.reasons, *below]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the free numbers within their ranges; where wishes conflict, their Pareto front."""
+        axes = axes_for(axes)
+        if len(self.front):
+            pair = [len(self.free) + i for i in np.argsort(-np.ptp(self.front[:, len(self.free) :], axis=0))[:2]]
+            shown = [self.wishes[i - len(self.free)] for i in pair]
+            axes.plot(*self.front[:, pair].T, "o-")
+            axes.plot(*(wish.value for wish in shown), "x", color="C3", label="wish")
+            labels = [f"{w.quantity} ({QUANTITIES[w.quantity] or 'SI'})" for w in shown]
+            axes.set(xlabel=labels[0], ylabel=labels[1])
+            axes.legend()
+        else:
+            low, high = (np.array([getattr(each, name) for each in self.free]) for name in ("low", "high"))
+            axes.barh([each.path for each in self.free], (self.numbers - low) / (high - low))
+            axes.set(xlim=(0.0, 1.0), xlabel="place in the range")
+        axes.set_title(self.source)
+        return axes
+
+
+def _direction(end: xr.Dataset) -> str:
+    direction = str(end.direction.item())
+    if direction in ("", "straight"):
+        return "goes straight" if direction else f"ends: {end.status.item()}"
+    return f"turns {direction}{'' if end.settled else ', not settled yet'}"

@@ -1,0 +1,216 @@
+"""Search for the free numbers at which a robot does what is wished.
+
+One wish on one free number is a root, bracketed on a scan of the range and solved by Brent's method. More are a problem
+of least squares within the ranges (scipy's trust region), from the robot itself and from scattered starts. Where wishes
+conflict, weighted sums of the squares of two of them give points of their Pareto front.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.linalg import norm
+from scipy.optimize import brentq, least_squares
+from scipy.stats.qmc import Sobol
+
+from chilopod import units
+from chilopod.analysis.map_axes import Axis
+from chilopod.analysis.quantities import Measured, Onset
+from chilopod.errors import ChilopodError
+from chilopod.frozen import Array
+from chilopod.planar import PlanarModel
+from chilopod.progress import Progress
+from chilopod.robot import Robot
+from chilopod.stability import find_orbit
+from chilopod.tasks.sizing.result import Outcome
+from chilopod.tasks.sizing.wishes import FAILED, Wish
+
+_MET = 1e-6  # largest relative deviation from a wish that is met
+_SCANNED = 12  # intervals of a range in which a root is looked for
+_STARTS = 8  # a power of two
+_BRANCH = 30  # evaluations that take as long as a branch of curved walks
+_UNCHANGED = 1e-9  # range of deviations that are the same
+_AT_END = 1e-3  # distance from the end of a range, relative to it
+_SHARES = 0.1, 0.3, 0.5, 0.7, 0.9  # of the second of two conflicting wishes in the sum of squares
+_FAR = 100.0  # relative deviation of a point that is left out of a front
+_OTHERS = 10.0  # weight of wishes beside those two
+_ROUNDS = 40  # evaluations of least squares for each free number
+
+
+class _SpentError(Exception):
+    """The evaluations of a search are spent."""
+
+
+class Search:
+    """Search for the robot in the unit cube of its free numbers."""
+
+    def __init__(
+        self, robot: Robot, wishes: tuple[Wish, ...], axes: tuple[Axis, ...], onset: Onset, budget: int, seed: int,
+        progress: Progress,
+    ) -> None:  # fmt: skip
+        self.robot, self.wishes, self.axes, self.progress = robot, wishes, axes, progress
+        self._measured, self._budget, self._limit, self._robots = Measured(onset), budget, budget, 0
+        scattered = Sobol(len(axes), rng=np.random.default_rng(seed)).random(_STARTS)
+        own = [self._place(each) for each in axes]
+        # The robot itself is the first start, so that of many answers one near it is found.
+        self._starts = [np.clip(own, 0.01, 0.99), *scattered]
+        self.best: Array = self._starts[0]
+        self._least = np.full(len(wishes), np.inf)
+        self._seen: list[Array] = []
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations so far."""
+        return self._robots + _BRANCH * self._measured.branches
+
+    def numbers(self, place: Array) -> Array:
+        """Free numbers at a place in the unit cube, SI, evenly by their logarithm where they are positive."""
+        parts = zip(self.axes, np.round(place, 15).tolist(), strict=True)
+        return np.array(
+            [a.low * (a.high / a.low) ** p if a.low > 0.0 else a.low + (a.high - a.low) * p for a, p in parts]
+        )
+
+    def at(self, place: Array) -> Robot:
+        """Robot at a place in the unit cube."""
+        robot = self.robot
+        for each, value in zip(self.axes, self.numbers(place).tolist(), strict=True):
+            robot = each.change(robot, float(np.clip(value, each.low, each.high)))
+        return robot
+
+    def _place(self, each: Axis) -> float:
+        own = self.robot.gait.speed if each.path == "speed" else self.robot.get(sorted(each.numbers(self.robot))[0])
+        if each.low > 0.0:
+            return float(np.log(max(own, each.low) / each.low) / np.log(each.high / each.low))
+        return (own - each.low) / (each.high - each.low)
+
+    def quantity(self, measured: Measured, wish: Wish, robot: Robot) -> float:
+        """A wished quantity of a robot; NaN without it."""
+        try:
+            return float(getattr(measured, wish.quantity)(robot))
+        except ChilopodError:
+            return np.nan
+
+    def deviations(self, place: Array) -> Array:
+        """Deviations of a robot from all wishes, see :meth:`Wish.searched`; keeps the best place."""
+        if self.evaluations >= self._limit:
+            raise _SpentError
+        self._robots += 1
+        self.progress(min(0.99, 0.5 * self.evaluations / self._budget), f"{self._robots} robots")
+        try:
+            robot = self.at(place)
+            found = np.array([wish.searched(self._measured, robot) for wish in self.wishes])
+        except ChilopodError:
+            found = np.full(len(self.wishes), FAILED)
+        self._seen.append(found)
+        # Far from all wishes, a robot that has every quantity is nearer than one that has not.
+        sizes = [(norm(self._missed(each)), norm(each)) for each in (found, self._least)]
+        if sizes[0] < sizes[1]:
+            self.best, self._least = place, found
+        return found
+
+    def _missed(self, deviations: Array) -> Array:
+        return np.array([w.missed(d) for w, d in zip(self.wishes, deviations.tolist(), strict=True)])
+
+    def run(self) -> Outcome:
+        """Find the best place."""
+        try:
+            if len(self.axes) == len(self.wishes) == 1 and not self.wishes[0].sense:
+                self._root()
+            for start in self._starts:
+                if not self._met(self._least):
+                    self._fit(start)
+        except _SpentError:
+            return Outcome.MET if self._met(self._least) else Outcome.BUDGET
+        return Outcome.MET if self._met(self._least) else Outcome.UNMET
+
+    @staticmethod
+    def _met(deviations: Array) -> bool:
+        return bool(np.abs(deviations).max(initial=0.0) <= _MET)
+
+    def _root(self) -> None:
+        """Root of one deviation over one number, that which is nearest to the robot's own value."""
+        grid = np.linspace(0.0, 1.0, _SCANNED + 1)
+        values = np.array([self.deviations(np.array([each]))[0] for each in grid.tolist()])
+        values[values == FAILED] = np.nan
+        own = float(self._starts[0][0])
+        brackets = [i for i in range(_SCANNED) if values[i] * values[i + 1] <= 0.0]
+        for i in sorted(brackets, key=lambda i: abs(grid[i : i + 2].mean() - own)):
+            brentq(lambda x: self.deviations(np.array([x]))[0], grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15)
+            if self._met(self._least):
+                return
+        self._starts.insert(0, np.clip(self.best, _AT_END, 1.0 - _AT_END))
+
+    def _fit(self, start: Array, weights: Array | float = 1.0) -> tuple[Array, Array]:
+        """Place and deviations of least squares of weighted deviations from a start."""
+        shift = 1.0 + start  # numbers of the order of one, whose relative steps are even
+        bounds = np.ones(start.size), np.full(start.size, 2.0)
+        found = least_squares(
+            lambda x: weights * self.deviations(x - 1.0), shift, bounds=bounds, diff_step=1e-6, xtol=1e-12, ftol=1e-12,
+            gtol=1e-12, max_nfev=_ROUNDS,
+        )  # fmt: skip
+        place = found.x - 1.0
+        return place, self.deviations(place)
+
+    def bound(self, again: Measured) -> float:
+        """Bound on the error of a root, SI: by its deviation in another computation, and the slope there."""
+        (wish,), step, robot = self.wishes, 1e-5, self.at(self.best)
+        ends = [np.clip(self.best + side * step, 0.0, 1.0) for side in (-1.0, 1.0)]
+        rise = np.ptp([wish.searched(again, self.at(end)) for end in ends]) / (ends[1] - ends[0])[0]
+        off = abs(wish.searched(Measured(again.number), robot)) + 1e-13
+        if wish.quantity == "radius":
+            orbit = find_orbit(PlanarModel(robot, use_symmetry=False), again.state(robot))
+            joints = slice(3, robot.body.modules + 2)
+            off += 2.0 * float(np.sum(orbit.error[joints]) / np.sum(np.abs(orbit.state[joints])))
+        wide = np.ptp([self.numbers(end)[0] for end in ends]) / (ends[1] - ends[0])[0]
+        return float(2.0 * off / max(rise, 1e-300) * wide)
+
+    def reasons(self) -> tuple[list[str], list[Array]]:
+        """Sentences about what stands in the way, and places on the Pareto front of two wishes that conflict."""
+        self._limit = self.evaluations + self._budget
+        said, best, least = [], self.best, self._least
+        for each, part, value in zip(self.axes, best.tolist(), self.numbers(best).tolist(), strict=True):
+            if min(part, 1.0 - part) < _AT_END:
+                end = "lower" if part < 0.5 else "upper"
+                said.append(f"{each.path} is at the {end} end of its range, {units.format(value, each.unit, digits=6)}")
+        seen = np.array([found for found in self._seen if FAILED not in found]).reshape(-1, len(self.wishes))
+        for wish, values in zip(self.wishes, seen.T, strict=True):
+            if values.size and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
+                said.append(f"no free number changes the {wish.quantity}")
+        front: list[Array] = []
+        try:
+            if len(self.wishes) > 1:
+                left_out = [self._left_out(i, best) for i in range(len(self.wishes))]
+                alone = [i for i, (_, found) in enumerate(left_out) if self._met(np.delete(found, i))]
+                said += [f"without the wish for {self.wishes[i].quantity} the others are met" for i in alone]
+                ranked = np.argsort(-self._missed(least), kind="stable").tolist()
+                front = self._front([*dict.fromkeys([*alone, *ranked])][:2], left_out, best)
+        except _SpentError:
+            said.append("the evaluations were spent before it was known which wishes conflict")
+        self.best, self._least = best, least
+        return said or ["no end of a range and no other wish stands in the way: the search saw none nearer"], front
+
+    def _left_out(self, wish: int, start: Array) -> tuple[Array, Array]:
+        """Place that meets all wishes but one best, and the deviations there."""
+        weights = np.array([float(i != wish) for i in range(len(self.wishes))])
+        tried = [self._fit(each, weights) for each in (start, self._starts[0])]
+        return min(tried, key=lambda found: float(norm(weights * found[1])))
+
+    def _front(self, pair: Sequence[int], ends: Sequence[tuple[Array, Array]], start: Array) -> list[Array]:
+        """Places that no other found one surpasses in both wishes of a pair: with either left out, and between."""
+        found = [ends[i] for i in pair]
+        # Each deviation counts relative to that where its own wish is left out.
+        largest = [max(abs(ends[i][1][i]), _MET) for i in pair]
+        for share in _SHARES:
+            weights = np.full(len(self.wishes), _OTHERS)
+            weights[pair] = np.sqrt([1.0 - share, share]) / largest
+            found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights))
+        missed = [self._missed(deviations) for _, deviations in found]
+        kept = [
+            place
+            for (place, _), own in zip(found, missed, strict=True)
+            if (own < _FAR).all() and not any((other[pair] < own[pair] - _MET).all() for other in missed)
+        ]
+        ordered = sorted(kept, key=lambda place: tuple(place.tolist()))
+        pairs = zip([None, *ordered], ordered, strict=False)
+        return [place for last, place in pairs if last is None or np.abs(place - last).max() > _AT_END]
