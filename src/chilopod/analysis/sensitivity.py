@@ -238,13 +238,16 @@ class _Leading:
         """Derivative of the exponent of the leading mode by a number, and its error, by the return map of half a period
         or of a whole one."""
         mode: Mode = self.mode(symmetric)
+        own = self._robot.get(path)
 
         def projected(value: float) -> Array:
+            if value == own:
+                return np.array([1.0, 0.0, mode.duration])
             image = straight_return(self._robot.with_value(path, value), mode.returns == 2)
-            product = mode.left @ image.jacobian @ mode.right / mode.multiplier  # 1 at the robot itself
+            product = mode.left @ image.jacobian @ mode.right / mode.multiplier
             return np.array([product.real, product.imag, image.duration])
 
-        (real, imaginary, longer), errors = derivative(projected, self._robot.get(path), size_of(self._robot, path))
+        (real, imaginary, longer), errors = derivative(projected, own, size_of(self._robot, path))
         exponent = complex(mode.growth, mode.frequency)
         slope = (complex(real, imaginary) - exponent * longer) / mode.duration
         return slope, float(np.hypot(errors[0], errors[1]) + abs(exponent) * errors[2]) / mode.duration
