@@ -118,14 +118,14 @@ def test_other_sets_of_the_valley_have_parts_of_their_own(growing_below, tmp_pat
 def test_the_cause_is_one_sentence_the_same_everywhere():
     """Readme, page and answers say what follows from the table of the parts in the docs."""
     root = Path(__file__).parents[3]
-    lines = (root / "docs" / "twin.md").read_text(encoding="utf-8").splitlines()
+    lines = (root / "docs" / "twin-results.md").read_text(encoding="utf-8").splitlines()
     rows = [line for line in lines if line.startswith("| ") and "×" in line and " to " in line]
     assert len(rows) == len(FACTORS)
     cells = [[float(number) for number in re.findall(r"[\d.]+", line.split("|")[2])] for line in rows]
     share, low, high = np.array(cells).T
     data = why.shares(ON, np.ones((len(ON), 3))).assign_coords(factor=[factor.name for factor in FACTORS])
     said = why.cause(data.assign(share=("factor", share), share_low=("factor", low), share_high=("factor", high)))
-    for file in ("README.md", "docs/twin.md"):
+    for file in ("README.md", "docs/twin-results.md"):
         assert said in " ".join((root / file).read_text(encoding="utf-8").split())
 
 
