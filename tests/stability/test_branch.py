@@ -256,3 +256,19 @@ def test_a_straight_curve_is_followed_in_long_steps_in_any_units(unit):
     assert 20 < len(branch.points) < 50
     first, last = branch.points[0], branch.points[-1]
     assert np.allclose(last.orbit, 1e4 * first.orbit, rtol=1e-6)
+
+
+def test_the_first_point_of_a_doubled_branch_leads_to_the_same_branch():
+    def logistic(r):
+        return from_map(lambda x: ([r * x[0] * (1.0 - x[0])], [[r - 2.0 * r * x[0]]]), 1)
+
+    (first, *_) = locate(logistic, (1.5, 3.9), orbit=[1 / 3])
+    doubled = follow(logistic, switch(logistic, first)[0], (2.9, 3.5))
+    start = doubled.special_points[0]
+    assert doubled.periods == 2
+    for again in (switch(logistic, start)[0], start):
+        branch = follow(logistic, again, (2.9, 3.5))
+        assert branch.periods == 2
+        kinds = [(point.special, round(point.value, 9)) for point in branch.special_points]
+        assert kinds == [(Kind.PERIOD_DOUBLING, 3.0), (Kind.PERIOD_DOUBLING, round(1.0 + 6.0**0.5, 9))]
+        assert not branch.remarks

@@ -400,3 +400,11 @@ def test_symmetries_are_checked_at_every_value_of_a_family():
     own = solve_ivp(lambda t, x: pushed(t, x, 0.25), (0.0, 1.0), start, rtol=1e-12, atol=1e-12).y[:, -1]
     assert np.abs(end - own).max() < 1e-10  # another system of the family has its own flow
     assert [of(0.0, orbit=each).orbit[0] for each in ([1.0, 0.0], (2.0, 0.0), np.array([3, 0]))] == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("harmonic", [1e3, 1e4, 3e4, 1e5])
+def test_a_fast_harmonic_has_the_period(harmonic):
+    """At round fractions of the period it is zero but for the round-off of its argument."""
+    system = from_rhs(lambda t, x: [np.sin(harmonic * t) - x[0]], 1, 2 * pi)
+    (multiplier,) = multipliers(system, [0.0]).values
+    assert multiplier.real == pytest.approx(exp(-2 * pi), abs=1e-11)

@@ -273,3 +273,22 @@ def test_a_slow_family_is_not_called_once_the_time_is_over():
     assert found.status is SearchStatus.BUDGET
     assert len(calls) < 15
     assert f"{found.searched[0]:.9g} to {found.searched[1]:.9g}, {found.evaluations} orbits" in str(found)
+
+
+@pytest.mark.parametrize("low", [-1.0, 0.0, 0.1])
+@pytest.mark.parametrize("cells", [2, 3, 4, 5])
+def test_a_point_among_the_symmetric_orbits_of_a_ring(cells, low):
+    """The cells move alike there, so the point is that of one cell, found by variational equations in scipy."""
+    turn = np.roll(np.eye(cells), 1, 0)
+
+    def rhs(t, x, p):
+        return p * x - x**3 + 0.3 * np.cos(t) + 0.2 * (np.roll(x, 1) - 2.0 * x + np.roll(x, -1))
+
+    def family(p):
+        return from_rhs(rhs, cells, 2 * np.pi, args=(p,), spatial_symmetry=turn)
+
+    found = locate(family, (low, 0.3), orbit=np.zeros(cells))
+    assert found.status is SearchStatus.COMPLETE
+    (point,) = found
+    assert abs(point.value - 0.13426795201142) <= point.error_bound + 1e-13
+    assert point.error_bound < 1e-9

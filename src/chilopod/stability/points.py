@@ -33,11 +33,11 @@ class Criticality(Labelled):
 
     SUPERCRITICAL = (
         "supercritical",
-        "the new orbits grow from zero past the point and take over the stability that the old one loses there",
+        "the new orbits grow from zero past the point and are as stable as the old one was before it",
     )
     SUBCRITICAL = (
         "subcritical",
-        "the new orbits lie before the point and are less stable than the old one: past it the motion jumps away",
+        "the new orbits lie before the point and are less stable than the old one; past it the motion may jump away",
     )
     UNDECIDED = "undecided", "the coefficient is zero within its error"
     NOT_DEFINED = "not defined", "a point of this kind has none: no cubic coefficient decides what happens"

@@ -50,6 +50,7 @@ LONGEST = 0.15
 BUDGET = 200_000
 """Default budget of flows of a branch."""
 
+_MEETING = 1e-6  # distance of a multiplier from +1 at a special point where branches meet
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 _EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
 _GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
@@ -243,7 +244,11 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
     else:
         units = curve.units(start.orbit.size)
         tangent = start.tangent * start.units / units
-        anchor = curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
+        meeting = start.special not in (None, Kind.FOLD) and float(np.abs(start.multipliers - 1.0).min()) <= _MEETING
+        first = replace(
+            start, tangent=tangent / np.linalg.norm(tangent), units=units, special=start.special if meeting else None
+        )
+        anchor = curve.anchor(first, ahead=step if meeting else 0.0, leaving=meeting)
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()
     return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor

@@ -179,7 +179,9 @@ def switch(
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
             raise ParameterError("must be a special point", field="point", value=point.value)
-        old, known = point.tangent * point.units, point.periods
+        # At the start of a branch of doubled period the point belongs to the orbits that it leaves.
+        halved = point.period is not None and point.bifurcation.period < 0.75 * point.period
+        old, known = point.tangent * point.units, point.periods // (2 if halved else 1)
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")

@@ -286,6 +286,8 @@ def near_orbit(
         # In the space of the orbit's symmetries H - 1 is regular also where a symmetry-breaking mode is critical.
         basis = symmetric_basis(system, x, size, _SYMMETRIC)
         shared = None if basis is None else size[:, None] * basis
+        if basis is not None:  # no correction would remove what is left of asymmetry
+            start = start._replace(states=start.states / size @ basis @ basis.T * size)
         found = shot(lambda _: system, start, size, section, None, shared, budget, careful)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:

@@ -345,6 +345,10 @@ def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, 
             _, _, regular, singular = dgesv(matrix, right)
             if not singular and np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
                 return np.asarray(regular)
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=cutoff)[0])
+        # In few shared states H - 1 may be small altogether; LAPACK takes no cutoff of 1.
+        largest = float(np.linalg.norm(matrix, 2))
+        if largest <= cutoff:
+            return np.zeros_like(right)
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=cutoff / min(1.0, largest))[0])
     except np.linalg.LinAlgError:
         raise AnalysisError("the equations of the orbit's nodes have no solution", field="orbit") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -150,7 +151,8 @@ def _order(entries: bytes, n: int) -> int:
 
 _MOST_STATED = 16
 _STATED: dict[Any, _Stated] = {}
-_TIMES = np.array([0.01, 0.023])  # in periods: just after its start, as a pulse may be given for one period alone
+# In periods: just after its start, as a pulse may be given for one period alone, where no fast harmonic is zero.
+_TIMES = math.sqrt(2.0) * np.array([0.007, 0.016])
 
 
 def from_rhs(

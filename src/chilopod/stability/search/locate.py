@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
@@ -215,12 +216,12 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     except SpentError as error:
         return [(None, Crossings((), SearchStatus.BUDGET, (error.problem,), 0))]
 
-    def whole(values: Array) -> tuple[Array, Array]:
+    def whole(block: Block | None, values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
         if samples.known:
             shape = found[0].image.jacobian.shape
             errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
-        elif blocks == (None,):
+        elif block is None or block.trivial:
             errors = samples.errors(found, uncertain)
         else:  # a symmetry-breaking mode does not affect the orbit's accuracy
             errors = np.full(len(found), uncertain)
@@ -230,7 +231,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
         found = find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable)
         return replace(found, remarks=(*remarks, *found.remarks))
 
-    return [(block, crossings_in(block, whole, search)) for block in blocks]
+    return [(block, crossings_in(block, partial(whole, block), search)) for block in blocks]
 
 
 def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> Found:
