@@ -100,12 +100,16 @@ ANGLES = np.full((200, 5), 10.0)
         (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), "rad", "angle = '10 rad': too large.*degrees"),
         (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), None, "column = 'a': must have a unit"),
         (as_csv(TIMES, ANGLES, "time [deg],a,b,c,d,e"), "deg", r"column = 'time \[deg\]': must have a unit"),
+        (
+            as_csv(TIMES, ANGLES, ",".join(["t", *(f"joint {i} [deg]" for i in (5, 4, 3, 2, 1))])), None,
+            "must be the joints, front to rear.*rise by 1",
+        ),
         (as_csv(TIMES, ANGLES), "rad", "contradicts unit = 'rad'"),
         (as_csv(TIMES[::-1], ANGLES), None, r"times = \[9.95, 9.9\]: must rise"),
         ('name = "aoi2022"\nstride = 1\n', None, "must be a line of names"),
         ("\x89HDF and more", None, "is not a text file"),
     ],
-)
+)  # fmt: skip
 def test_a_recording_that_is_none_is_refused_in_one_line(tmp_path, text, unit, said):
     (tmp_path / "walk.csv").write_bytes(text.encode("latin-1"))
     with pytest.raises(ChilopodError, match=f"walk.csv: .*{said}"):

@@ -19,6 +19,7 @@ from chilopod.text_file import read_text
 _LARGEST, _LONGEST = 50_000_000, 3600.0  # bytes, s
 _CYCLES, _NUMBERS = 5, 100  # of the gait, and angles, which a recording must have
 _UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
+_NUMBER = re.compile(r"(\d+)\W*$")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +78,11 @@ def _csv(text: str) -> tuple[list[str], Array]:
     except ValueError as error:
         problem = f"must be a line of names, then lines of as many numbers, empty in gaps ({error})"
         raise RobotFileError(problem) from None
+    told = [_NUMBER.search(_UNIT.sub("", name)) for name in names[1:]]
+    numbers = [int(each[1]) for each in told if each]
+    if len(numbers) == len(told) > 0 and numbers != list(range(numbers[0], numbers[0] + len(numbers))):
+        said = "must be the joints, front to rear"
+        raise ParameterError(said, field="columns", value=", ".join(names[1:]), allowed="names whose numbers rise by 1")
     return names, table
 
 
