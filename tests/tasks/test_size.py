@@ -157,3 +157,17 @@ def test_a_wish_that_no_free_number_changes_is_named():
     found = size(ROBOT, {"onset": "12.5 N*mm/deg"}, [SPRING])
     assert found.outcome is Outcome.UNMET
     assert "no free number changes the onset" in found.reasons
+    assert found.numbers[0] == pytest.approx(ROBOT.get(K1))
+    met = size(ROBOT, {"onset": found.values[0]}, [SPRING])
+    assert met.outcome is Outcome.MET
+    assert np.isnan(met.bound)
+    assert "no free number changes the onset" in met.reasons
+
+
+def test_curved_walks_beside_a_stable_straight_one_are_said_not_to_be_searched():
+    robot = ROBOT.override("gait.module_phase", "100 deg")
+    found = size(robot, {"radius": "0.6 m"}, [("springs.stiffness[0]", "11.4 N*mm/deg", "11.5 N*mm/deg")], budget=12)
+    assert found.outcome is not Outcome.MET
+    assert any("subcritical" in reason for reason in found.reasons)
+    other = size(ROBOT, {"radius": "0.6 m"}, [("springs.stiffness[0]", "13 N*mm/deg", "14 N*mm/deg")], budget=12)
+    assert not any("subcritical" in reason for reason in other.reasons)

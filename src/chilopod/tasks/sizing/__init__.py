@@ -71,7 +71,7 @@ def size(
         raise ParameterError("must be positive", field="budget", value=budget)
     search = Search(robot, given, axes, onset, budget, seed, progress)
     outcome = search.run()
-    reasons, front = search.reasons() if outcome in (Outcome.UNMET, Outcome.BUDGET) else ((), [])
+    reasons, front = search.reasons() if outcome in (Outcome.UNMET, Outcome.BUDGET) else (search.remarks(), [])
     found = search.at(search.best)
     again = Measured(onset)
     values = np.array([search.quantity(again, wish, found) for wish in given])

@@ -8,6 +8,7 @@ conflict, weighted sums of the squares of two of them give points of their Paret
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.linalg import norm
@@ -22,7 +23,7 @@ from chilopod.frozen import Array
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress
 from chilopod.robot import Robot
-from chilopod.stability import find_orbit
+from chilopod.stability import Criticality, find_orbit
 from chilopod.tasks.sizing.result import Outcome
 from chilopod.tasks.sizing.wishes import FAILED, Wish
 
@@ -58,6 +59,7 @@ class Search:
         self.best: Array = self._starts[0]
         self._least = np.full(len(wishes), np.inf)
         self._seen: list[Array] = []
+        self._changed = True  # by one number, if it alone is free
 
     @property
     def evaluations(self) -> int:
@@ -131,7 +133,12 @@ class Search:
     def _root(self) -> None:
         """Root of one deviation over one number, that which is nearest to the robot's own value."""
         grid = np.linspace(0.0, 1.0, _SCANNED + 1)
+        here = self.deviations(self._starts[0])[0]
         values = np.array([self.deviations(np.array([each]))[0] for each in grid.tolist()])
+        self._changed = bool(here == FAILED or np.abs(values - here).max() > _UNCHANGED)
+        if not self._changed:
+            self.best, self._starts = self._starts[0], []
+            return
         values[values == FAILED] = np.nan
         own = float(self._starts[0][0])
         brackets = [i for i in range(_SCANNED) if values[i] * values[i + 1] <= 0.0]
@@ -153,7 +160,10 @@ class Search:
         return place, self.deviations(place)
 
     def bound(self, again: Measured) -> float:
-        """Bound on the error of a root, SI: by its deviation in another computation, and the slope there."""
+        """Bound on the error of a root, SI: by its deviation in another computation, and the slope there; NaN if the
+        number does not change the wish."""
+        if not self._changed:
+            return np.nan
         (wish,), step, robot = self.wishes, 1e-5, self.at(self.best)
         ends = [np.clip(self.best + side * step, 0.0, 1.0) for side in (-1.0, 1.0)]
         rise = np.ptp([wish.searched(again, self.at(end)) for end in ends]) / (ends[1] - ends[0])[0]
@@ -176,7 +186,9 @@ class Search:
         seen = np.array([found for found in self._seen if FAILED not in found]).reshape(-1, len(self.wishes))
         for wish, values in zip(self.wishes, seen.T, strict=True):
             if values.size and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
-                said.append(f"no free number changes the {wish.quantity}")
+                said.append(self.unchanged(wish))
+            if wish.quantity == "radius" and self._subcritical(self.at(best)):
+                said.append("the onset is subcritical, and curved walks beside a stable straight one are not searched")
         front: list[Array] = []
         try:
             if len(self.wishes) > 1:
@@ -189,6 +201,20 @@ class Search:
             said.append("the evaluations were spent before it was known which wishes conflict")
         self.best, self._least = best, least
         return said or ["no end of a range and no other wish stands in the way: the search saw none nearer"], front
+
+    def unchanged(self, wish: Wish) -> str:
+        """Sentence about a wish that no free number changes."""
+        return f"no free number changes the {wish.quantity}"
+
+    def remarks(self) -> list[str]:
+        """Sentences about wishes that are met."""
+        return [] if self._changed else [self.unchanged(self.wishes[0])]
+
+    def _subcritical(self, robot: Robot) -> bool:
+        with suppress(ChilopodError):
+            found = self._measured.number.first(robot, normal_form=True)
+            return found.point.criticality is Criticality.SUBCRITICAL
+        return False
 
     def _left_out(self, wish: int, start: Array) -> tuple[Array, Array]:
         """Place that meets all wishes but one best, and the deviations there."""
