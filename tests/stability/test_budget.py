@@ -19,6 +19,7 @@ from chilopod.stability import (
     from_map,
     from_rhs,
     locate,
+    locate_hopf,
     multipliers,
     sweep,
 )
@@ -304,3 +305,25 @@ def test_exceptions_of_a_system_name_its_function(system, name, ask):
     with pytest.raises(AnalysisError, match=f"^{name}: raised ValueError: no table$") as caught:
         ask(system(), [2.0, 0.0])
     assert isinstance(caught.value.__cause__, ValueError)
+
+
+def test_the_time_of_a_search_for_hopf_points_includes_its_first_system():
+    """Thousands of calls examine a function that cannot be traced."""
+    calls = []
+
+    def slow(t, x, p):
+        calls.append(t)
+        time.sleep(1e-3)
+        return [p * x[0] - x[1] - (x[0] ** 3 if x[0] < 1e9 else 0.0), x[0]]
+
+    def family(p):
+        return from_rhs(slow, 2, None, args=(p,), guess_period=6.0)
+
+    with pytest.raises(SpentError):
+        locate_hopf(family, (-1.0, 1.0), [0.0, 0.0], seconds=0.3)
+    assert len(calls) <= 320
+
+
+def test_a_period_of_an_orbit_must_be_guessed():
+    with pytest.raises(ParameterError, match="guess_period: must be given where the period is None"):
+        from_rhs(lambda t, x: -x, 2, None)

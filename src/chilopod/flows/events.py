@@ -47,7 +47,9 @@ def checked_events(events: object) -> tuple[Event, ...]:
     if isinstance(events, Event):
         return (events,)
     if not isinstance(events, Sequence) or not all(isinstance(event, Event) for event in events):
-        raise ParameterError("must be a list", field="events", value=events, allowed="[Event(guard, reset), ...]")
+        raise ParameterError(
+            "must be a list of events", field="events", value=events, allowed="[Event(guard, reset), ...]"
+        )
     return tuple(events)
 
 

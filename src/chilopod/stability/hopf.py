@@ -126,7 +126,8 @@ def _piece(
 ) -> tuple[Located, Sample]:
     """Hopf points in an interval that is not so wide that rates change by decades, and the last equilibrium."""
     low, high = between
-    system, start = equilibrium_at(family, low, equilibrium)
+    with Deadline(limit.remaining):
+        system, start = equilibrium_at(family, low, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
     samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, limit.remaining)
 

@@ -247,6 +247,8 @@ class _Stated:
         symmetries: dict[str, Any],
     ) -> None:
         autonomous = period is None
+        if autonomous and guess_period is None:
+            raise ParameterError("must be given where the period is None", field="guess_period", value=None)
         length = positive("guess_period" if autonomous else "period", guess_period if autonomous else period)
         given = RightHandSide(dimension, length, autonomous, events, **about)
         own: dict[str, Any] = {"velocity": _unknown, "guess_period": length} if autonomous else {}
