@@ -1,12 +1,24 @@
 """How a curve of bifurcation points is followed: where it ends and why, and what is refused."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, SpecialPoint2, follow2, switch2
+from chilopod.stability import (
+    BifurcationPoint,
+    CodimensionTwo,
+    Ending,
+    Kind,
+    SpecialPoint2,
+    begin,
+    follow,
+    follow2,
+    from_map,
+    switch2,
+)
 from chilopod.stability.codimension_two import detection
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from helpers.systems import doubling, of_map
@@ -192,3 +204,15 @@ def test_a_point_that_may_be_anywhere_is_none(monkeypatch):
     curve = follow2(turning, TURNS, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3)
     assert not curve.special
     assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+
+
+def test_another_second_parameter_than_that_of_the_point_is_refused():
+    def cubic(p, q):
+        return from_map(lambda x: ([x[0] + 0.1 * (p + q * x[0] - x[0] ** 3)], [[1.0 + 0.1 * (q - 3.0 * x[0] ** 2)]]), 1)
+
+    branch = follow(partial(cubic, q=1.5), begin(partial(cubic, q=1.5), -2.0, [-1.6]), (-2.0, 2.0))
+    fold = branch.special_points[0].bifurcation
+    box = (-2.0, 2.0), (-1.0, 2.5)
+    assert follow2(cubic, fold, box, second=1.5, points=3).kind is Kind.FOLD
+    with pytest.raises(ParameterError, match=r"second = 1.4: is not that of the start.*0\.68"):
+        follow2(cubic, fold, box, second=1.4)

@@ -29,6 +29,7 @@ from chilopod.stability.tracing.tracer import Ending, trace
 BUDGET = 20_000
 """Default budget of a curve, in return maps with derivatives."""
 
+_MOVED = 1e-4  # largest correction of the start, relative to the box
 _MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
 
 Progress2 = Callable[[int, Point2], None]
@@ -98,6 +99,9 @@ def follow2(
     nu = complex(start.multiplier)
     with curve.budget:
         first = curve.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)), start.period)
+        if outward is None and (np.abs(first.place.values - values) > _MOVED * np.ptp(box, axis=1)).any():
+            said = f"is not that of the start: the nearest point of a curve is at {in_one_line(first.place.values)}"
+            raise ParameterError(said, field="second", value=second, allowed="the q of the family of `locate`")
         detector = Detector(curve, start.kind, coefficients)
         origin = detector.station(first)
 
