@@ -77,7 +77,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
     @property
     def title(self) -> str:
         """Verdict in words."""
-        return f"{self.name}: the straight walk of the twin is {VERDICTS[self.stable]}"
+        return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
 
     def as_json(self) -> dict[str, Any]:
         """The result as plain numbers; complex ones as [real, imaginary]."""
@@ -99,7 +99,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         size = f"{math.degrees(self.amplitude):.3g}°"
-        head = ("bends", "multiplier", "error", "modulus", "shape", "yaw joints, front to rear")
+        head = ("bends", "multiplier", "error", "modulus", "shape", "joints")
         rows = [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
         closes = f"The walk changes by {self.mismatch:.0e} in a cycle"
         if self.reach is None:
@@ -108,6 +108,8 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         else:
             bends = f"bends up to about {math.degrees(self.reach):.1g}°"
             said = f"{closes}. The derivative holds for {bends}, beyond which contacts change"
+            if not self.contacts:
+                return [], [head, *rows], [f"{closes}. None of the {bends} changes a contact."]
         return [], [head, *rows], [f"{said}: {', '.join(self.contacts) or 'none found'}."]
 
     def plot(self, axes: Axes | None = None) -> Axes:
