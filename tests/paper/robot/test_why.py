@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from chilopod import load_robot
 from chilopod.analysis.parameters import K1, stiffness
@@ -111,6 +112,9 @@ def test_other_sets_of_the_valley_have_parts_of_their_own(growing_below, tmp_pat
     assert len(list((tmp_path / "multipliers").iterdir())) == 4
     panel = trust.why_sets(found)
     assert panel.text[1].endswith("sets: nothing.")
+    assert "or more" not in panel.text[0]
+    beyond = trust.why_sets(found.assign(end=xr.full_like(found.end, 80.0)))
+    assert "80.0\u00a0N·mm/deg or more" in beyond.text[0]
     raised = why.over_sets(context).assign(share=found.share + 0.5)
     assert "standing feet stick" in trust.why_sets(raised).text[1]
 

@@ -121,7 +121,7 @@ def why_sets(data: xr.Dataset) -> Panel:
         for about, own, rest in zip(data.about.values, data.share.values[0], others.values.T, strict=True)
     ]
     always = [str(about) for about, least in zip(data.about.values, data.share.min("set"), strict=True) if least > 1.0]
-    ends = [_spring(float(end[-1])) for end in data.end.values]
+    ends = [f"{_spring(end)}{' or more' * (end == SEARCHED[1])}" for end in data.end.values[:, -1].tolist()]
     return Panel(
         name="robot-why-sets",
         title="The reasons, by other constants that fit as well",
