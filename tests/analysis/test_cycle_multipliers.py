@@ -140,6 +140,54 @@ def test_what_has_no_cycle_map_is_refused(overrides, complaint):
         walk_multipliers(STIFF.set_from_text(overrides))
 
 
+FALL = """<mujoco><option timestep="0.01"/><worldbody>
+  <body><joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
+  <geom size="0.1" mass="1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("push", "travel", "complaint"),
+    [
+        (0.0, (), "motion: must repeat: z changes by -[0-9.]+ in each cycle"),
+        (1.0, ("z",), "motion: must repeat: x changes by [0-9.]+ in each cycle"),
+        (1.0, ("x", "z"), "motion: must repeat: rate of x changes by 0.5 in each cycle"),
+    ],
+)
+def test_a_motion_that_moves_on_is_refused(push, travel, complaint):
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(FALL), np.full((50, 1), push), travel)
+    with pytest.raises(AnalysisError, match=complaint):
+        cycle_multipliers("fall", cycle, np.zeros(len(cycle.names)), ["rate of x"])
+
+
+@pytest.mark.parametrize(
+    ("start", "bends", "complaint"),
+    [
+        (np.zeros(4), ["y"], r"start = \[0.0, 0.0, 0.0, 0.0\]: must be the coordinates of a state; allowed: 3 finite"),
+        ([0.0, np.nan, 0.0], ["y"], "start = .*must be the coordinates of a state"),
+        (np.zeros(3), ["rate of X"], "bends = 'rate of X': is no coordinate; did you mean 'rate of x'"),
+        (np.zeros(3), "y", "bends = 'y': must be a list of names; allowed: y, rate of x, rate of y"),
+        (np.zeros(3), [], "bends = .*must be a list of names"),
+    ],
+)
+def test_a_start_and_bends_that_are_none_are_refused(start, bends, complaint):
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), np.zeros((5, 2)), travel=("x",))
+    with pytest.raises(ParameterError, match=complaint):
+        cycle_multipliers("cart", cycle, start, bends)
+
+
+def test_controls_must_be_finite():
+    with pytest.raises(ParameterError, match="control = nan: must be finite"):
+        CycleMap(mujoco.MjModel.from_xml_string(CART), [[0.0, np.nan]])
+
+
+def test_bends_of_a_slide_are_shown_in_metres():
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), np.zeros((100, 2)), travel=("x",))
+    for bends, size in ((["y"], "0.0175 m"), (["y", "rate of y"], "0.0175")):
+        words = "\n".join(cycle_multipliers("cart", cycle, np.zeros(3), bends).lines())
+        assert size in words
+        assert "°" not in words
+
+
 def test_a_model_without_such_a_state_and_a_walk_that_falls_are_refused():
     ball = '<mujoco><worldbody><body><joint type="ball"/><geom size="0.1"/></body></worldbody></mujoco>'
     with pytest.raises(ParameterError, match="must have a state that can be put back"):

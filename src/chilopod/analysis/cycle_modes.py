@@ -61,11 +61,12 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
     state: Array  # coordinates at the start of a cycle, see CycleMap
     mismatch: float  # largest change of a coordinate over a cycle
     exact: tuple[CycleMode, ...]  # modes of the derivative, by falling modulus; none if the walk does not close
-    reach: float | None  # largest bend along them that changes no contact, rad
-    amplitude: float  # size of finite bends, rad
+    reach: float | None  # largest bend along them that changes no contact, rad (m along a slide)
+    amplitude: float  # size of finite bends, rad (m along a slide)
     finite: tuple[CycleMode, ...]  # modes of bends of that size
     spread: Array  # range of each yaw joint at the start of consecutive cycles, rad, (N-1,)
     contacts: tuple[str, ...]  # those that a larger bend than the reach changes, or that differ between cycles
+    unit: str = "°"  # of bends as shown: ° for angles, m for lengths, none for both
 
     @property
     def stable(self) -> bool | None:
@@ -97,16 +98,21 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
             "contacts": list(self.contacts),
         }
 
+    def _shown(self, bend: float, digits: int) -> str:
+        """A bend in words."""
+        number = math.degrees(bend) if self.unit == "°" else bend
+        return f"{number:.{digits}g}{' ' * (self.unit == 'm')}{self.unit}"
+
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
-        size = f"{math.degrees(self.amplitude):.3g}°"
+        size = self._shown(self.amplitude, 3)
         head = ("bends", "multiplier", "error", "modulus", "shape", "joints")
         rows = [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
         closes = f"The walk changes by {self.mismatch:.0e} in a cycle"
         if self.reach is None:
-            scatter = f"yaw joints scatter over {math.degrees(self.spread.max()):.2g}°"
+            scatter = f"bends scatter over {self._shown(float(self.spread.max()), 2)}"
             said = f"{closes}, {scatter}, and there is no derivative. Contacts change from cycle to cycle"
         else:
-            bends = f"bends up to about {math.degrees(self.reach):.1g}°"
+            bends = f"bends up to about {self._shown(self.reach, 1)}"
             said = f"{closes}. The derivative holds for {bends}, beyond which contacts change"
             if not self.contacts:
                 return [], [head, *rows], [f"{closes}. None of the {bends} changes a contact."]

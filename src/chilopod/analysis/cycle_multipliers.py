@@ -19,7 +19,8 @@ from scipy.special import stdtrit
 
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
 from chilopod.engine import Engine, engine_named
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.engine.arguments import as_array
+from chilopod.errors import AnalysisError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
@@ -41,6 +42,7 @@ _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
 _FORGOTTEN, _BLOCK = 2, 4  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
 _NOT_BENT = 1e-9  # part of a mode
+_DRIFT, _EVEN = 0.2, 2.0  # m, rad, per second, in all cycles that are followed; largest change over the least
 
 
 def walk_multipliers(
@@ -75,15 +77,26 @@ def cycle_multipliers(
     name, cycle, start
         Name of the robot, map of a cycle, and coordinates from which it settles, (n,).
     bends, amplitude, cycles
-        Names of the coordinates by which modes are scaled and named, size of finite bends, rad, and the number of
-        cycles that they are followed, at least 12.
+        Names of the coordinates by which modes are scaled and named, size of finite bends, rad (m along a slide), and
+        the number of cycles that they are followed, at least 12.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is none of these.
+    AnalysisError
+        If the walk falls, or moves on in a coordinate in every cycle instead of settling.
     """
     if not 0.0 < amplitude < 1.0:
         raise ParameterError("must be a small angle", field="amplitude", value=amplitude, allowed="above 0, below 1")
     if cycles < 3 * _BLOCK:
         raise ParameterError("must be more", field="cycles", value=cycles, allowed=f"{3 * _BLOCK} or more")
-    at = np.array([cycle.names.index(each) for each in bends])
-    x, closes = _closed(cycle, start)
+    at = _indices(cycle, bends)
+    x = as_array("start", start)
+    if x.shape != (len(cycle.names),) or not np.isfinite(x).all():
+        allowed = f"{len(cycle.names)} finite numbers: {', '.join(cycle.names)}"
+        raise ParameterError("must be the coordinates of a state", field="start", value=x.tolist(), allowed=allowed)
+    x, closes = _closed(cycle, x)
     derivative, step = _derivative(cycle, x)
     basis, dual = _leading(derivative, at)
     exact: tuple[CycleMode, ...] = ()
@@ -92,10 +105,13 @@ def cycle_multipliers(
         exact = _modes(np.concatenate(tiny), basis[at], 1)
     found = _followed(cycle, x, amplitude * basis, dual / amplitude, _FORGOTTEN + cycles)
     matrices, seen = (each[_FORGOTTEN:] for each in found)
+    if not exact:
+        _check_settled(cycle, seen)
     reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(seen))
     mismatch, spread = float(np.abs(seen[-1] - seen[-2]).max()), np.ptp(seen[:, at], axis=0)
     finite = _modes(matrices, basis[at], _BLOCK)
-    return CycleMultipliers(name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts)
+    unit = "m" if {*bends} <= cycle.lengths else "" if {*bends} & cycle.lengths else "°"
+    return CycleMultipliers(name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit)
 
 
 def finite_modes(
@@ -111,13 +127,36 @@ def finite_modes(
     The arguments are the same, and ``basis``, leading modes (n, r) and their dual (r, n) of a similar walk that has
     settled at ``start``. Returns the modes, the state that has settled, (n,), and the basis.
     """
-    at, x = np.array([cycle.names.index(each) for each in bends]), start
+    at, x = _indices(cycle, bends), start
     for _ in range(_SETTLING if basis is None else _FORGOTTEN * _BLOCK):
         x = cycle(x[None])[0][0]
     forgotten = _FORGOTTEN if basis is None else _BLOCK
     modes, dual = basis or _leading(_derivative(cycle, x, _STEPS[:1])[0], at)
     matrices, _ = _followed(cycle, x, amplitude * modes, dual / amplitude, forgotten + cycles)
     return _modes(matrices[forgotten:], modes[at], _BLOCK), x, (modes, dual)
+
+
+def _indices(cycle: CycleMap, bends: Sequence[str]) -> NDArray[np.intp]:
+    """Indices of coordinates with these names."""
+    if isinstance(bends, str) or not len(bends):
+        raise ParameterError("must be a list of names", field="bends", value=bends, allowed=", ".join(cycle.names))
+    for each in bends:
+        if each not in cycle.names:
+            near = nearest_name(str(each), cycle.names)
+            allowed = ", ".join(cycle.names)
+            raise ParameterError("is no coordinate", field="bends", value=each, allowed=allowed, nearest=near)
+    return np.array([cycle.names.index(each) for each in bends])
+
+
+def _check_settled(cycle: CycleMap, seen: Array) -> None:
+    """AnalysisError if a coordinate changes by about the same in each cycle, from states before each, (cycles, n)."""
+    moves = np.diff(seen, axis=0)
+    least, most = np.abs(moves).min(axis=0), np.abs(moves).max(axis=0)
+    even = (np.abs(np.sign(moves).sum(axis=0)) == len(moves)) & (most <= _EVEN * least)
+    if (on := even & (np.abs(moves.sum(axis=0)) > _DRIFT)).any():
+        name, move = cycle.names[int(on.argmax())], float(moves[-1, on.argmax()])
+        allowed = "a motion that settles; the argument travel of CycleMap leaves out positions that may move on"
+        raise AnalysisError(f"must repeat: {name} changes by {move:.3g} in each cycle", field="motion", allowed=allowed)
 
 
 def _closed(cycle: CycleMap, x: Array) -> tuple[Array, bool]:

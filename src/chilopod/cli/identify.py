@@ -116,7 +116,8 @@ def planar(options: _PlanarOptions) -> None:
     def solve(progress: Callable[[str], Progress]) -> tuple[Found, More]:
         if isinstance(data, identify.RecordedWalks):
             if options.measure or options.check:
-                raise ParameterError("must not be given with recorded walks", field="--next, --check")
+                field = "--next" if options.measure else "--check"
+                raise ParameterError("must not be given with recorded walks", field=field)
             folder = given.parent if given else Path()
             return identify.identify_recorded(robot, data, folder, progress("identification")), {}
         found = identify.identify_planar(robot, data, options.points, variants, progress("identification"))

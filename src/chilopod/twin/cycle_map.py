@@ -33,7 +33,8 @@ class CycleMap:
     roll turn the world's axes into its own), and positions of the other joints, without those of ``travel``; then
     velocities of the free body ahead, to the left (both horizontal, along its heading) and up, its angular velocity in
     its own frame, and rates of all other joints. MuJoCo's solver starts every cycle without a memory of the last one,
-    so the map is a function of the state. ``names`` are those of the coordinates, ``period`` is a cycle in s.
+    so the map is a function of the state. ``names`` are those of the coordinates, of which ``lengths`` are in m,
+    ``period`` is a cycle in s.
 
     Parameters
     ----------
@@ -56,12 +57,17 @@ class CycleMap:
         if self.control.ndim != 2 or self.control.shape[1] != self.model.nu or not len(self.control):
             allowed = f"a row for each step, {self.model.nu} columns"
             raise ParameterError("must be a table", field="control", value=self.control.shape, allowed=allowed)
+        if not np.isfinite(self.control).all():
+            wrong = float(self.control[~np.isfinite(self.control)][0])
+            raise ParameterError("must be finite", field="control", value=wrong)
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.model.opt.tolerance, self.period = _TOLERANCE, len(self.control) * float(self.model.opt.timestep)
         joints = [self.model.joint(i).name or f"joint {i}" for i in range(free, len(kinds))]
         self._kept = np.array([i for i, name in enumerate(joints) if name not in travel], dtype=np.intp)
         if len(self._kept) != len(joints) - len(travel):
             raise ParameterError("must name joints", field="travel", value=travel, allowed=", ".join(joints))
+        slides = {name for name, kind in zip(joints, kinds[free:], strict=True) if kind == _PLAIN[1]}
+        self.lengths = frozenset(slides | {*("height",)[:free]})
         rates = [f"rate of {name}" for name in (*_SPEEDS[: 6 * free], *joints)]
         self.names = (*("height", "roll", "pitch")[: 3 * free], *(joints[i] for i in self._kept), *rates)
 

@@ -1,7 +1,10 @@
 """The planar model's constants from the critical spring and its mode."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.optimize import least_squares
 
 from chilopod.analysis.parameters import K1, stiffness
@@ -9,6 +12,7 @@ from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
+from chilopod.show.figures import identification
 from chilopod.tasks.identify import TEMPLATES, CriticalMode, RecordedWalks, critical, load_data, planar, planar_fit
 
 ROBOT = load_robot("aoi2022-planar")
@@ -24,7 +28,7 @@ def test_residuals_need_the_number_of_modules_of_the_data():
 def test_a_robot_without_a_pitchfork_is_refused(monkeypatch):
     # Of such a robot every search ends where it began.
     monkeypatch.setattr(critical, "bifurcations", lambda *_, **__: [])
-    with pytest.raises(AnalysisError, match="must have a pitchfork on its straight walk"):
+    with pytest.raises(AnalysisError, match="must have a pitchfork between k1 = 4 N"):
         planar.identify_planar(ROBOT, DATA)
 
 
@@ -68,9 +72,51 @@ def test_data_that_contradict_each_other_allow_nothing():
     assert np.isnan(ranges).all()
 
 
+def test_data_with_tiny_tolerances_have_a_profile_and_a_figure():
+    """Residuals of all constants are large then, and not those of a robot without a pitchfork."""
+    data = CriticalMode(**{**dict(DATA), "component_tolerance": 1e-9})
+    found = planar.identify_planar(ROBOT, data, points=3)
+    assert np.isnan(found.ranges).all()
+    noted = found.estimates.identified("mine.toml").provenance
+    assert all(noted[path].endswith("; no constants meet all data") for path in planar_fit.FREE)
+    assert np.isfinite(found.profile.friction).all()
+    assert (found.profile.largest_residual > 1e4).all()
+    assert identification.panel(found).draw(True).axes
+
+
+def test_a_figure_is_drawn_without_any_prediction(found):
+    names = "friction", "half_width", "largest_residual"
+    rows = dict.fromkeys(names, np.ones(3)) | {name: np.full(3, x) for name, x in planar._no_predictions({}).items()}
+    profile = xr.Dataset(
+        {name: ("forward_offset", row) for name, row in rows.items()}, {"forward_offset": [0.0, 1.0, 2.0]}
+    )
+    assert identification.panel(replace(found, profile=profile)).draw(False).axes
+
+
+def test_a_search_ends_among_robots_without_a_pitchfork(monkeypatch):
+    """They are slow to compute, and say nothing of where pitchforks are."""
+    tried = []
+
+    def pitchfork(self, robot):
+        tried.append(robot)
+        return None
+
+    rng = np.random.default_rng(0)
+    monkeypatch.setattr(planar_fit.Pitchforks, "__call__", pitchfork)
+
+    def minimize(fun, start, constraints, **rest):
+        for _ in range(1000):
+            constraints["fun"](start + rng.uniform(0.0, 1.0, start.shape))
+        raise AssertionError
+
+    monkeypatch.setattr(planar_fit, "minimize", minimize)
+    assert np.isnan(planar_fit.allowed_ranges(ROBOT, DATA, BEST)).all()
+    assert len(tried) <= 6 * (planar_fit._MOST_LOST + 2)
+
+
 def test_a_profile_ends_where_no_pitchfork_is_left(monkeypatch):
     """Beyond, each search would begin with nothing, among constants that are slow to compute."""
-    tried = []
+    tried, nothing = [], planar_fit.no_pitchfork(DATA)
 
     def fitted(robot, data, start):
         tried.append(start[2])
@@ -78,7 +124,7 @@ def test_a_profile_ends_where_no_pitchfork_is_left(monkeypatch):
 
     def off(robot, data):
         gone = robot.get("legs.forward_offset") > BEST[2] + 0.002
-        return np.full(6, planar_fit.NO_PITCHFORK if gone else 0.5)
+        return nothing if gone else np.full(6, 0.5)
 
     monkeypatch.setattr(planar, "least_largest", fitted)
     monkeypatch.setattr(planar, "residuals", off)
@@ -87,7 +133,7 @@ def test_a_profile_ends_where_no_pitchfork_is_left(monkeypatch):
     profile = planar._profile(ROBOT, DATA, BEST, span, 11, {}, lambda part, said: None)
     gone = profile.forward_offset.values > BEST[2] + 0.002
     assert len(tried) == 11 - gone.sum() + 1
-    np.testing.assert_array_equal(profile.largest_residual, np.where(gone, planar_fit.NO_PITCHFORK, 0.5))
+    np.testing.assert_array_equal(profile.largest_residual, np.where(gone, nothing.max(), 0.5))
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(profile.friction)), np.flatnonzero(gone)[1:])
 
 

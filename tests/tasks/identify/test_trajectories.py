@@ -65,10 +65,12 @@ def test_intervals_cover_the_constants_of_robots_that_are_recorded_from_any_mome
 def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):
     robot = ROBOT.set_from_text(["springs.stiffness=12 N*mm/deg"])
     record = walked(robot, 8.0).isel(time=slice(20, None))
-    record["joint_angle"] += np.random.default_rng(1).normal(0.0, 0.01, record.joint_angle.shape)
-    (tmp_path / "walk.nc").write_bytes(netcdf(record))
+    for seed, name in enumerate(("walk.nc", "again.nc")):
+        noise = np.random.default_rng(seed).normal(0.0, 0.01, record.joint_angle.shape)
+        (tmp_path / name).write_bytes(netcdf(record.assign(joint_angle=record.joint_angle + noise)))
     free = {"ground.friction": ("150 N*s/m", "350 N*s/m"), "springs.stiffness": ("8 N*mm/deg", "16 N*mm/deg")}
-    walks = RecordedWalks(free={**free, "body.mass": (2.0, 20.0)}, trajectory=[{"file": "walk.nc"}] * 2)
+    files = [{"file": "walk.nc"}, {"file": "again.nc"}]
+    walks = RecordedWalks(free={**free, "body.mass": (2.0, 20.0)}, trajectory=files)
     found = identify_recorded(robot, walks, tmp_path).as_json()
     known, _, wide = found["combinations"]
     assert max(map(abs, known["changes"].values())) < 0.05
@@ -105,8 +107,9 @@ ANGLES = np.full((200, 5), 10.0)
             "must be the joints, front to rear.*rise by 1",
         ),
         (as_csv(TIMES, ANGLES), "rad", "contradicts unit = 'rad'"),
-        (as_csv(TIMES[::-1], ANGLES), None, r"times = \[9.95, 9.9\]: must rise"),
-        ('name = "aoi2022"\nstride = 1\n', None, "must be a line of names"),
+        (as_csv(TIMES[::-1], ANGLES), None, r"times of samples 1 and 2 = \[9.95, 9.9\]: must rise"),
+        (as_csv(TIMES, ANGLES).replace("10.0000", "1e400", 1), None, "column = inf: must be finite, or empty"),
+            ('name = "aoi2022"\nstride = 1\n', None, "must be a line of names"),
         ("\x89HDF and more", None, "is not a text file"),
     ],
 )  # fmt: skip
@@ -114,6 +117,13 @@ def test_a_recording_that_is_none_is_refused_in_one_line(tmp_path, text, unit, s
     (tmp_path / "walk.csv").write_bytes(text.encode("latin-1"))
     with pytest.raises(ChilopodError, match=f"walk.csv: .*{said}"):
         read_recordings(ROBOT, data("walk.csv", unit=unit), tmp_path)
+
+
+def test_a_recording_does_not_count_twice(tmp_path):
+    for name in ("walk.csv", "copy.csv"):
+        (tmp_path / name).write_text(as_csv(TIMES, ANGLES))
+    with pytest.raises(ChilopodError, match=r"trajectory.file = 'copy.csv': has the same walk as walk.csv"):
+        read_recordings(ROBOT, data("walk.csv", "copy.csv"), tmp_path)
 
 
 def test_a_setting_of_a_walk_cannot_be_free(tmp_path):

@@ -180,7 +180,9 @@ def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
             axes, typeset(name) if _variants_of(data) else "", (x[place], values[place]), (0, away), ha=ha, va=va
         )
     values = np.array([data[name].values for name in names])
-    axes.set(ylim=(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5), ylabel=f"critical k₁ ({SPRING_UNIT})")
+    axes.set_ylabel(f"critical k₁ ({SPRING_UNIT})")
+    if np.isfinite(values).any():
+        axes.set_ylim(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5)
 
 
 def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:
@@ -193,7 +195,7 @@ def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:
     for place in 1e3 * _changes(data):
         axes.axvline(place, color=style.VERMILLION, lw=1.2, linestyle="--")
         style.note(axes, f"changes at\n{place:.1f} mm", (place, 0.0), (6, 10))
-    high = np.nanmax(np.abs(values))
+    high = np.nanmax(np.abs(values), initial=np.finfo(float).tiny)
     axes.set_ylim(-1.5 * high, 1.5 * high)
     for at, words, va in ((0.97, "subcritical", "top"), (0.03, "supercritical", "baseline")):
         axes.text(0.97, at, words, transform=axes.transAxes, ha="right", va=va, fontsize=style.SMALL)

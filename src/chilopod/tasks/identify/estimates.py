@@ -36,6 +36,8 @@ class Estimates:
     spread
         Covariance of the constants, SI, for half of a 90 % interval in place of a standard deviation, shape (constants,
         constants); NaN where it is not known.
+    remark
+        Words that the provenance of each constant ends with.
     """
 
     given: Robot
@@ -43,6 +45,7 @@ class Estimates:
     values: Array
     ends: Array
     spread: Array
+    remark: str = ""
 
     @property
     def best(self) -> Robot:
@@ -52,7 +55,7 @@ class Estimates:
     def identified(self, source: str) -> Robot:
         """The same, with the intervals as provenance."""
         best, known = self.best, self.as_json()["constants"].items()
-        texts = {path: f"identified from {source}; 90 %: {each['interval_text']}" for path, each in known}
+        texts = {path: f"identified from {source}; 90 %: {each['interval_text']}{self.remark}" for path, each in known}
         return best.with_(name="identified", provenance={**best.provenance, **texts})
 
     def as_json(self) -> dict[str, Any]:

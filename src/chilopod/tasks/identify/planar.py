@@ -31,13 +31,13 @@ from chilopod.tasks.identify.data import CriticalMode
 from chilopod.tasks.identify.estimates import Estimates, Identified
 from chilopod.tasks.identify.planar_fit import (
     FREE,
-    NO_PITCHFORK,
     allowed_ranges,
     best_of,
     confidence_intervals,
     fits_from_every_start,
     free_constants,
     least_largest,
+    no_pitchfork,
     residuals,
     scale_of,
     spread,
@@ -100,7 +100,8 @@ class Identification(Identified):
     def estimates(self) -> Estimates:
         """The constants with their intervals."""
         free = free_constants(self.given, self.data)
-        return Estimates(self.given, free, self.constants, self.intervals, self.spread)
+        remark = "; no constants meet all data" if np.isnan(self.ranges).any() else ""
+        return Estimates(self.given, free, self.constants, self.intervals, self.spread, remark)
 
     def as_json(self) -> dict[str, Any]:
         """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
@@ -188,13 +189,14 @@ def _profile(
     middle = int(np.abs(offsets - best[2]).argmin())
     done = 0
     for direction in (range(middle, count), range(middle - 1, -1, -1)):
-        last, largest = best, 0.0
+        last, lost, largest = best, False, np.nan
         for index in direction:
             found, constants = _no_predictions(variants), np.full(len(FREE), np.nan)
-            if largest < NO_PITCHFORK:
+            if not lost:
                 last = constants = least_largest(robot, data, np.append(last[:2], offsets[index]))
-                largest = float(np.abs(residuals(with_constants(robot, constants), data)).max())
-            if largest < NO_PITCHFORK:
+                off = residuals(with_constants(robot, constants), data)
+                lost, largest = np.array_equal(off, no_pitchfork(data)), float(np.abs(off).max())
+            if not lost:
                 found = _predictions(with_constants(robot, constants), variants)
             fitted = {"friction": constants[0], "half_width": constants[1], "largest_residual": largest}
             rows[index] = fitted | found

@@ -10,6 +10,8 @@ import numpy as np
 from scipy.optimize import least_squares, minimize
 from scipy.stats import chi2
 
+from chilopod import units
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.progress import Progress, silent
@@ -32,14 +34,22 @@ _MOST_MOVES, _LONGEST_MOVE = 40, 0.1  # to the end of an interval, in the same u
 _ROOM = 1e-3  # of chi-square
 _MET = 1.0 + 1e-6  # residual that counts as 1
 _RISE = float(chi2.ppf(CONFIDENCE, 1))  # of chi-square at the end of an interval
-NO_PITCHFORK = 100.0
-"""All residuals of a robot without a pitchfork."""
+_MOST_LOST = 20  # robots without a pitchfork, in one search for an end
+
+
+class _LostError(Exception):
+    """Too many robots without a pitchfork."""
 
 
 def residuals(robot: Robot, data: CriticalMode) -> Array:
     """Computed numbers less the data, over their tolerance, shape (N,)."""
     _check(robot, data)
     return _off(searched(robot, data.between), robot, data)
+
+
+def no_pitchfork(data: CriticalMode) -> Array:
+    """Residuals that stand for a robot without a pitchfork, shape (N,): twice the data, above those of other robots."""
+    return np.array([2.0 * data.k1 / data.k1_tolerance, *[2.0 / data.component_tolerance] * len(data.components)])
 
 
 def _check(robot: Robot, data: CriticalMode) -> None:
@@ -74,13 +84,23 @@ class _Residuals:
         self._robot, self._data, self._scale = robot, data, scale_of(robot, data)
         self._pitchfork = Pitchforks(data.between)
         self._values: dict[bytes, Array] = {}
+        self.lost = 0  # robots without a pitchfork
 
     def __call__(self, scaled: Array) -> Array:
         key = scaled.tobytes()
         if key not in self._values:
             robot = with_constants(self._robot, scaled * self._scale)
-            self._values[key] = _off(self._pitchfork(robot), robot, self._data)
+            found = self._pitchfork(robot)
+            self.lost += found is None
+            self._values[key] = _off(found, robot, self._data)
         return self._values[key]
+
+    def both_signs(self, scaled: Array) -> Array:
+        """Residuals, then these with the other sign, for searches that end among robots without a pitchfork."""
+        if self.lost > _MOST_LOST:
+            raise _LostError
+        off = self(scaled)
+        return np.concatenate([off, -off])
 
     def jacobian(self, scaled: Array) -> Array:
         """Forward differences, shape (residuals, 3)."""
@@ -91,27 +111,28 @@ class _Residuals:
 def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
     """Spring and mode less the data, over their tolerances."""
     if found is None:
-        return np.full(robot.body.modules, NO_PITCHFORK)
+        return no_pitchfork(data)
     components = (found[1] - np.array(data.components)) / data.component_tolerance
     return np.append((found[0] - data.k1) / data.k1_tolerance, components)
 
 
 def allowed_ranges(robot: Robot, data: CriticalMode, best: Array) -> Array:
     """Projections of the set {max |residual| <= 1}, shape (3, 2), SI; NaN if it is empty. Where no end is found, the
-    search ends the range.
+    search ends the range. So it does where a search meets robots without a pitchfork only.
 
     Each end is a minimum of one constant within the set, by sequential quadratic programming from the best constants
     and from the ends that were found before: the set is a curved valley. The residuals at an end are searched.
     """
     off, scale = _Residuals(robot, data), scale_of(robot, data)
-    within = {"fun": lambda x: 1.0 - _both_signs(off(x)), "jac": lambda x: -_both_signs(off.jacobian(x))}
+    within = {"fun": lambda x: 1.0 - off.both_signs(x), "jac": lambda x: -_both_signs(off.jacobian(x))}
     ends: dict[tuple[int, int], Array] = {}
     for constant, side in np.ndindex(len(FREE), 2):
         goal = (1.0, -1.0)[side] * np.eye(len(FREE))[constant]
         for start in (best / scale, *ends.values()):
+            off.lost = 0
             found = _least(goal, start, _BOUNDS, within)
             known = ends.get((constant, side))
-            if known is not None and goal @ found >= goal @ known:
+            if found is None or (known is not None and goal @ found >= goal @ known):
                 continue
             searched_off = residuals(with_constants(robot, found * scale), data)
             if np.abs(np.append(searched_off, off(found))).max() <= _MET:
@@ -128,13 +149,16 @@ def _both_signs(off: Array) -> Array:
     return np.concatenate([off, -off])
 
 
-def _least(slopes: Array, start: Array, bounds: Any, within: dict[str, Any]) -> Array:
-    """Place where a linear function with these slopes is least within bounds and a constraint."""
-    found = minimize(
-        lambda x: slopes @ x, start, jac=lambda x: slopes, method="SLSQP", bounds=bounds,
-        constraints={"type": "ineq", **within}, options={"maxiter": 60, "ftol": 1e-8},
-    )  # fmt: skip
-    return np.asarray(found.x)
+def _least(slopes: Array, start: Array, bounds: Any, within: dict[str, Any]) -> Array | None:
+    """Place where a linear function with these slopes is least within bounds and a constraint; None if the search ends
+    among robots without a pitchfork."""
+    with suppress(_LostError):
+        found = minimize(
+            lambda x: slopes @ x, start, jac=lambda x: slopes, method="SLSQP", bounds=bounds,
+            constraints={"type": "ineq", **within}, options={"maxiter": 60, "ftol": 1e-8},
+        )  # fmt: skip
+        return np.asarray(found.x)
+    return None
 
 
 def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array:
@@ -193,8 +217,9 @@ def fits_from_every_start(robot: Robot, data: CriticalMode, progress: Progress =
     for index, start in enumerate(_STARTS):
         fits.append(_fit(robot, data, np.array(start) * scale_of(robot, data)))
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
-    if all((off == NO_PITCHFORK).all() for _, off in fits):
-        problem = "must have a pitchfork on its straight walk with some of the constants tried"
+    if all(np.array_equal(off, no_pitchfork(data)) for _, off in fits):
+        low, high = (units.format(end, PAPER_UNIT, digits=4) for end in data.between)
+        problem = f"must have a pitchfork between k1 = {low} and {high} with some of the constants tried"
         raise AnalysisError(problem, field="robot", value=robot.name)
     return fits
 
@@ -215,9 +240,9 @@ def least_largest(robot: Robot, data: CriticalMode, start: Array) -> Array:
     """Constants with the offset of ``start`` whose largest residual is smallest, SI, shape (3,)."""
     off, place = _Residuals(robot, data), start / scale_of(robot, data)
     within = {
-        "fun": lambda x: x[3] - _both_signs(off(x[:3])),
+        "fun": lambda x: x[3] - off.both_signs(x[:3]),
         "jac": lambda x: np.insert(-_both_signs(off.jacobian(x[:3])), 3, 1.0, axis=1),
     }
     bounds = [*_BOUNDS[:2], (place[2], place[2]), (0.0, None)]
     found = _least(np.eye(4)[3], np.append(place, np.abs(off(place)).max()), bounds, within)
-    return found[:3] * scale_of(robot, data)
+    return start if found is None else found[:3] * scale_of(robot, data)

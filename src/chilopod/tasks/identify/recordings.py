@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +42,11 @@ def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Rec
         for path in data.free.paths:
             if {path, path.partition("[")[0]} & fixed:
                 raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
-    return [_read(each, robot.set_from_text(each.settings), folder / each.file) for each in data.trajectory]
+    walks = [_read(each, robot.set_from_text(each.settings), folder / each.file) for each in data.trajectory]
+    for one, other in combinations(walks, 2):
+        if np.array_equal(one.times, other.times) and np.array_equal(one.angles, other.angles, equal_nan=True):
+            raise ParameterError(f"has the same walk as {one.name}", field="trajectory.file", value=other.name)
+    return walks
 
 
 def _read(given: Trajectory, robot: Robot, path: Path) -> Recording:
@@ -103,13 +108,16 @@ def _sizes(names: list[str], unit: str | None) -> Array:
 
 def _checked(robot: Robot, table: Array) -> tuple[Array, Array]:
     """Times from the first sample on, and joint angles."""
-    joints, times, angles = robot.body.modules - 1, table[:, 0], np.where(np.isfinite(table), table, np.nan)[:, 1:]
+    joints, times, angles = robot.body.modules - 1, table[:, 0], table[:, 1:]
+    if np.isinf(table).any():
+        raise ParameterError("must be finite, or empty in gaps", field="column", value=float("inf"))
     if angles.shape[1] != joints:
         problem = f"must be {joints} besides time, one for each joint of {robot.name}"
         raise ParameterError(problem, field="columns", value=angles.shape[1])
     if not (np.diff(times) > 0.0).all():
         at = int((np.diff(times) > 0.0).argmin())
-        raise ParameterError("must rise", field="times", value=times[at : at + 2].tolist())
+        pair = f"times of samples {at + 1} and {at + 2}"
+        raise ParameterError("must rise", field=pair, value=times[at : at + 2].tolist())
     known = np.isfinite(angles)
     if (largest := np.abs(angles[known]).max(initial=0.0)) > 0.5 * np.pi:
         allowed = "joint angles up to 90 deg; if these are degrees, say so by the unit deg"
