@@ -164,7 +164,7 @@ def test_a_motion_that_moves_on_is_refused(push, travel, complaint):
     [
         (np.zeros(4), ["y"], r"start = \[0.0, 0.0, 0.0, 0.0\]: must be the coordinates of a state; allowed: 3 finite"),
         ([0.0, np.nan, 0.0], ["y"], "start = .*must be the coordinates of a state"),
-        (np.zeros(3), ["rate of X"], "bends = 'rate of X': is no coordinate; did you mean 'rate of x'"),
+        (np.zeros(3), ["rate of X"], "bends = 'rate of X': must be a coordinate; did you mean 'rate of x'"),
         (np.zeros(3), "y", "bends = 'y': must be a list of names; allowed: y, rate of x, rate of y"),
         (np.zeros(3), [], "bends = .*must be a list of names"),
     ],

@@ -144,7 +144,7 @@ def _indices(cycle: CycleMap, bends: Sequence[str]) -> NDArray[np.intp]:
         if each not in cycle.names:
             near = nearest_name(str(each), cycle.names)
             allowed = ", ".join(cycle.names)
-            raise ParameterError("is no coordinate", field="bends", value=each, allowed=allowed, nearest=near)
+            raise ParameterError("must be a coordinate", field="bends", value=each, allowed=allowed, nearest=near)
     return np.array([cycle.names.index(each) for each in bends])
 
 

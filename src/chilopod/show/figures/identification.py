@@ -98,8 +98,8 @@ def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
         return "So nothing can be said of numbers that were not fitted."
 
     def span(name: str) -> str:
-        values = data[name].values[inside]
-        return f"{number(float(np.nanmin(values)))} to {number(float(np.nanmax(values)))}"
+        values = data[name].values[inside & np.isfinite(data[name].values)]
+        return f"{number(float(values.min()))} to {number(float(values.max()))}" if values.size else "not found"
 
     variants = listing(f"{span(name)} for {typeset(name)}" for name in _variants_of(data))
     others = f"Along the shaded valley the critical spring of variants, which were not fitted, is {variants}. "
@@ -195,7 +195,7 @@ def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:
     for place in 1e3 * _changes(data):
         axes.axvline(place, color=style.VERMILLION, lw=1.2, linestyle="--")
         style.note(axes, f"changes at\n{place:.1f} mm", (place, 0.0), (6, 10))
-    high = np.nanmax(np.abs(values), initial=np.finfo(float).tiny)
+    high = np.abs(values[np.isfinite(values)]).max(initial=np.finfo(float).tiny)
     axes.set_ylim(-1.5 * high, 1.5 * high)
     for at, words, va in ((0.97, "subcritical", "top"), (0.03, "supercritical", "baseline")):
         axes.text(0.97, at, words, transform=axes.transAxes, ha="right", va=va, fontsize=style.SMALL)
