@@ -180,12 +180,24 @@ def test_controls_must_be_finite():
         CycleMap(mujoco.MjModel.from_xml_string(CART), [[0.0, np.nan]])
 
 
-def test_bends_of_a_slide_are_shown_in_metres():
+def test_coordinates_have_units():
     cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), np.zeros((100, 2)), travel=("x",))
-    for bends, size in ((["y"], "0.0175 m"), (["y", "rate of y"], "0.0175")):
-        words = "\n".join(cycle_multipliers("cart", cycle, np.zeros(3), bends).lines())
-        assert size in words
-        assert "°" not in words
+    assert dict(zip(cycle.names, cycle.units, strict=True)) == {"y": "m", "rate of x": "m/s", "rate of y": "m/s"}
+    walk = walk_cycle(STIFF)[0]
+    units = dict(zip(walk.names, walk.units, strict=True))
+    assert (units["height"], units["roll"], units["yaw1"], units["rate of up"]) == ("m", "rad", "rad", "m/s")
+    assert (units["rate of roll"], units["rate of yaw1"]) == ("rad/s", "rad/s")
+
+
+@pytest.mark.parametrize(
+    ("bends", "size"),
+    [(["y"], "0.0175 m"), (["rate of x", "rate of y"], "0.0175 m/s"), (["y", "rate of y"], "0.0175")],
+)
+def test_bends_are_shown_in_their_unit(bends, size):
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), np.zeros((100, 2)), travel=("x",))
+    rows = cycle_multipliers("cart", cycle, np.zeros(3), bends).lines()
+    assert any(f"  {size}  " in f"  {row}  " for row in rows)
+    assert not any("°" in row for row in rows)
 
 
 def test_a_model_without_such_a_state_and_a_walk_that_falls_are_refused():

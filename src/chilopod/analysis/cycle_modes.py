@@ -61,12 +61,12 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
     state: Array  # coordinates at the start of a cycle, see CycleMap
     mismatch: float  # largest change of a coordinate over a cycle
     exact: tuple[CycleMode, ...]  # modes of the derivative, by falling modulus; none if the walk does not close
-    reach: float | None  # largest bend along them that changes no contact, rad (m along a slide)
-    amplitude: float  # size of finite bends, rad (m along a slide)
+    reach: float | None  # largest bend along them that changes no contact
+    amplitude: float  # size of finite bends
     finite: tuple[CycleMode, ...]  # modes of bends of that size
-    spread: Array  # range of each yaw joint at the start of consecutive cycles, rad, (N-1,)
+    spread: Array  # range of each bend at the start of consecutive cycles, (N-1,)
     contacts: tuple[str, ...]  # those that a larger bend than the reach changes, or that differ between cycles
-    unit: str = "°"  # of bends as shown: ° for angles, m for lengths, none for both
+    unit: str = "rad"  # unit of bends: rad (shown in degrees), m, rad/s, m/s, or "" if they differ
 
     @property
     def stable(self) -> bool | None:
@@ -100,8 +100,9 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
 
     def _shown(self, bend: float, digits: int) -> str:
         """A bend in words."""
-        number = math.degrees(bend) if self.unit == "°" else bend
-        return f"{number:.{digits}g}{' ' * (self.unit == 'm')}{self.unit}"
+        if self.unit == "rad":
+            return f"{math.degrees(bend):.{digits}g}°"
+        return f"{bend:.{digits}g} {self.unit}".rstrip()
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         size = self._shown(self.amplitude, 3)

@@ -77,8 +77,8 @@ def cycle_multipliers(
     name, cycle, start
         Name of the robot, map of a cycle, and coordinates from which it settles, (n,).
     bends, amplitude, cycles
-        Names of the coordinates by which modes are scaled and named, size of finite bends, rad (m along a slide), and
-        the number of cycles that they are followed, at least 12.
+        Names of the coordinates by which modes are scaled and named, size of finite bends in their unit, and the
+        number of cycles that they are followed, at least 12.
 
     Raises
     ------
@@ -110,7 +110,8 @@ def cycle_multipliers(
     reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(seen))
     mismatch, spread = float(np.abs(seen[-1] - seen[-2]).max()), np.ptp(seen[:, at], axis=0)
     finite = _modes(matrices, basis[at], _BLOCK)
-    unit = "m" if {*bends} <= cycle.lengths else "" if {*bends} & cycle.lengths else "°"
+    units = {cycle.units[each] for each in at}
+    unit = units.pop() if len(units) == 1 else ""
     return CycleMultipliers(name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit)
 
 

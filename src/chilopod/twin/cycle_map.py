@@ -33,8 +33,8 @@ class CycleMap:
     roll turn the world's axes into its own), and positions of the other joints, without those of ``travel``; then
     velocities of the free body ahead, to the left (both horizontal, along its heading) and up, its angular velocity in
     its own frame, and rates of all other joints. MuJoCo's solver starts every cycle without a memory of the last one,
-    so the map is a function of the state. ``names`` are those of the coordinates, of which ``lengths`` are in m,
-    ``period`` is a cycle in s.
+    so the map is a function of the state. ``names`` and ``units`` are those of the coordinates, ``period`` is a
+    cycle in s.
 
     Parameters
     ----------
@@ -66,10 +66,11 @@ class CycleMap:
         self._kept = np.array([i for i, name in enumerate(joints) if name not in travel], dtype=np.intp)
         if len(self._kept) != len(joints) - len(travel):
             raise ParameterError("must name joints", field="travel", value=travel, allowed=", ".join(joints))
-        slides = {name for name, kind in zip(joints, kinds[free:], strict=True) if kind == _PLAIN[1]}
-        self.lengths = frozenset(slides | {*("height",)[:free]})
+        measures = ["m" if kind == _PLAIN[1] else "rad" for kind in kinds[free:]]
         rates = [f"rate of {name}" for name in (*_SPEEDS[: 6 * free], *joints)]
         self.names = (*("height", "roll", "pitch")[: 3 * free], *(joints[i] for i in self._kept), *rates)
+        units = ["m/s"] * 3 * free + ["rad/s"] * 3 * free + [f"{unit}/s" for unit in measures]
+        self.units = (*("m", "rad", "rad")[: 3 * free], *(measures[i] for i in self._kept), *units)
 
     def reduced(self, positions: Array, rates: Array) -> Array:
         """Coordinates, shape (runs, n) or (n,), from MuJoCo's ``qpos`` (..., nq) and ``qvel`` (..., nv)."""

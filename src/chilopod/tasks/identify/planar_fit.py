@@ -99,8 +99,7 @@ class _Residuals:
         """Residuals, then these with the other sign, for searches that end among robots without a pitchfork."""
         if self.lost > _MOST_LOST:
             raise _LostError
-        off = self(scaled)
-        return np.concatenate([off, -off])
+        return _both_signs(self(scaled))
 
     def jacobian(self, scaled: Array) -> Array:
         """Forward differences, shape (residuals, 3)."""
