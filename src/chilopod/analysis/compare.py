@@ -251,7 +251,7 @@ def _effects(
                 known[changed] = function(robot)
             except ChilopodError:
                 known[changed] = math.nan
-            show(min(1.0, len(known) / most), f"{len(known)} robots")
+            show(min(1.0, len(known) / most), f"{len(known)} of up to {most} robots")
         return known[changed]
 
     whole = frozenset(range(count))

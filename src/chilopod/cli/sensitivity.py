@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -107,8 +106,8 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
             if share is None and not equals:
                 said = "must be a share, or a number with its tolerance"
                 raise ParameterError(said, value=text, allowed="10%, body.mass=0.3 kg")
-            if share is not None and not 0.0 < share < math.inf:
-                raise ParameterError("must be positive and finite", value=text)
+            if share is not None and not 0.0 < share < 1.0:
+                raise ParameterError("must be a share above 0 % and below 100 %", value=text)
             if equals:
                 check_parameter(robot, path)
                 paths = [each for each in others if each.partition("[")[0] == path] or [path]

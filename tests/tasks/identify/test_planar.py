@@ -158,7 +158,9 @@ def test_the_template_is_read_as_the_papers_data(tmp_path):
     file.write_text(TEMPLATES["planar"])
     assert load_data(file, CriticalMode, RecordedWalks) == DATA
     file.write_text(TEMPLATES["planar"].replace("12 N*mm/deg", "50 N*mm/deg"))
-    with pytest.raises(RobotFileError, match=r"mine.toml: between = .* two rising springs with k1 = 50 N"):
+    with pytest.raises(
+        RobotFileError, match=r"mine.toml: between = .*: must hold k1; allowed: two rising springs with k1 = 50 N"
+    ):
         load_data(file, CriticalMode, RecordedWalks)
     file.write_text(TEMPLATES["planar"].replace("component_tolerance", "component_tolerances"))
     with pytest.raises(RobotFileError, match="unknown key; did you mean 'component_tolerance'"):

@@ -107,6 +107,8 @@ ANGLES = np.full((200, 5), 10.0)
             "must be the joints, front to rear.*rise by 1",
         ),
         (as_csv(TIMES, ANGLES), "rad", "contradicts unit = 'rad'"),
+        (as_csv(TIMES, ANGLES).replace("10.0000", "abc", 1), None, "of 6 numbers, .*: line 2, .*'abc'"),
+        ("# from the lab\n\n" + as_csv(TIMES, ANGLES) + "\n1", None, "of 6 numbers, .*: line 204, "),
         (as_csv(TIMES[::-1], ANGLES), None, r"times of samples 1 and 2 = \[9.95, 9.9\]: must rise"),
         (as_csv(TIMES, ANGLES).replace("10.0000", "1e400", 1), None, "column = inf: must be finite, or empty"),
             ('name = "aoi2022"\nstride = 1\n', None, "must be a line of names"),
@@ -124,6 +126,20 @@ def test_a_recording_does_not_count_twice(tmp_path):
         (tmp_path / name).write_text(as_csv(TIMES, ANGLES))
     with pytest.raises(ChilopodError, match=r"trajectory.file = 'copy.csv': has the same walk as walk.csv"):
         read_recordings(ROBOT, data("walk.csv", "copy.csv"), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ([], r"springs.stiffness\[0\] = '41 N\*mm/deg': must be that of the recording; allowed: 9 N\*mm/deg in"),
+        ([SPRING, "gait.stride=4 cm"], r"gait.stride = '4 cm': must be that of the recording; allowed: 3 cm in"),
+    ],
+)
+def test_settings_that_contradict_the_record_of_a_simulation_are_refused(tmp_path, settings, said):
+    (tmp_path / "walk.nc").write_bytes(netcdf(walked(SOFT, 9.0)))
+    given = RecordedWalks(free=FREE, trajectory=[{"file": "walk.nc", "settings": settings}])
+    with pytest.raises(ChilopodError, match=f"walk.nc: {said}"):
+        read_recordings(ROBOT, given, tmp_path)
 
 
 def test_a_setting_of_a_walk_cannot_be_free(tmp_path):

@@ -56,8 +56,8 @@ class CriticalMode(Description):
     def _is_a_critical_mode(self) -> Self:
         if not (len(self.between) == 2 and self.between[0] < self.k1 < self.between[1]):
             k1, *shown = (units.format(each, _STIFFNESS.display, digits=6) for each in (self.k1, *self.between))
-            problem = f"must be two rising springs with k1 = {k1} between them"
-            raise ParameterError(problem, field="between", value=shown, allowed="text with a unit; bare numbers are SI")
+            allowed = f"two rising springs with k1 = {k1} between them; bare numbers are in N*m/rad"
+            raise ParameterError("must hold k1", field="between", value=shown, allowed=allowed)
         mode = np.array(self.components)
         if abs(np.linalg.norm(mode) - 1.0) > _UNIT:
             raise ParameterError(

@@ -132,6 +132,7 @@ class Identified(Summary):
         said = [f"independent combinations, by half of their {CONFIDENCE:.0%} interval:"] * bool(found["combinations"])
         for each in found["combinations"]:
             least = _SMALL * max(map(abs, each["changes"].values()))
-            texts = [f"{path} {100.0 * x:+.2g} %" for path, x in each["changes"].items() if abs(x) >= least]
+            shown = [(path, x, ".2g" if abs(x) < 1.0 else ".0f") for path, x in each["changes"].items()]
+            texts = [f"{path} {100.0 * x:+{digits}} %" for path, x, digits in shown if abs(x) >= least]
             said.append(f"  {', '.join(texts)}{' (left open)' if each['open'] else ''}")
         return [], cells, [*said, *self._remarks()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -42,47 +43,79 @@ def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Rec
         for path in data.free.paths:
             if {path, path.partition("[")[0]} & fixed:
                 raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
-    walks = [_read(each, robot.set_from_text(each.settings), folder / each.file) for each in data.trajectory]
+    free = {path.partition("[")[0] for path in data.free.paths}
+    walks = [_read(each, robot.set_from_text(each.settings), folder / each.file, free) for each in data.trajectory]
     for one, other in combinations(walks, 2):
         if np.array_equal(one.times, other.times) and np.array_equal(one.angles, other.angles, equal_nan=True):
             raise ParameterError(f"has the same walk as {one.name}", field="trajectory.file", value=other.name)
     return walks
 
 
-def _read(given: Trajectory, robot: Robot, path: Path) -> Recording:
+def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Recording:
     try:
-        is_text = path.suffix.lower() not in (".nc", ".nc4")
-        names, table = _csv(read_text(path, "recording", RobotFileError, _LARGEST)) if is_text else _netcdf(path)
+        if path.suffix.lower() in (".nc", ".nc4"):
+            data = _netcdf(path)
+            _check_settings(robot, data, free)
+            names, table = _columns(data)
+        else:
+            names, table = _csv(read_text(path, "recording", RobotFileError, _LARGEST))
         return Recording(given.file, given.settings, *_checked(robot, table * _sizes(names, given.unit)))
     except ChilopodError as error:
         error.source = str(path)
         raise
 
 
-def _netcdf(path: Path) -> tuple[list[str], Array]:
-    """Names of columns and the columns of a netCDF file of one walk."""
+def _netcdf(path: Path) -> xr.Dataset:
+    """Record of one walk, with joint_angle over time and joint."""
     if not path.exists():
         raise RobotFileError("no such file")
     try:
         data = xr.load_dataset(path, decode_times=False)
         data = data.squeeze("robot") if "robot" in data.dims else data
-        angles = data["joint_angle"].transpose("time", "joint")
+        return data.assign(joint_angle=data["joint_angle"].transpose("time", "joint"))
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         problem = f"must be a netCDF file of one walk, with joint_angle over time and joint ({type(error).__name__})"
         raise RobotFileError(problem) from None
-    time, joint = (f"{each.name} [{each.attrs.get('units', '')}]" for each in (data["time"], angles))
-    return [time, *[joint] * angles.sizes["joint"]], np.column_stack([data["time"].values, angles.values])
+
+
+def _columns(data: xr.Dataset) -> tuple[list[str], Array]:
+    """Names of columns and the columns of a record."""
+    time, angles = data["time"], data["joint_angle"]
+    names = [f"{each.name} [{each.attrs.get('units', '')}]" for each in (time, angles)]
+    return [names[0], *names[1:] * angles.sizes["joint"]], np.column_stack([time.values, angles.values])
+
+
+def _check_settings(robot: Robot, data: xr.Dataset, free: set[str]) -> None:
+    """ParameterError if the record of a simulated walk has other springs or another gait than the robot."""
+    recorded: dict[str, Array] = {}
+    with suppress(ChilopodError, KeyError):
+        own = Robot.from_toml(data.attrs["robot"])
+        recorded = {path: np.array(own.get(path)) for path in own.parameters() if path.startswith("gait.")}
+        springs = np.moveaxis(data["stiffness"].values, data["stiffness"].get_axis_num("joint"), 0)
+        recorded |= {
+            f"springs.stiffness[{at}]": values
+            for at, values in zip(range(robot.body.modules - 1), springs, strict=False)
+        }
+    for path, values in recorded.items():
+        if path.partition("[")[0] not in free and not np.allclose(values, robot.get(path), rtol=1e-6, atol=0.0):
+            ends, unit = np.unique([values.min(), values.max()]).tolist(), robot.unit_of(path)
+            allowed = " to ".join(units.format(end, unit, digits=6) for end in ends) + " in the settings"
+            said, value = "must be that of the recording", units.format(robot.get(path), unit, digits=6)
+            raise ParameterError(said, field=path, value=value, allowed=allowed)
 
 
 def _csv(text: str) -> tuple[list[str], Array]:
     """Names of columns in the first line, and the columns."""
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")] or [""]
-    names, *rows = ([cell.strip(' "') for cell in line.split(max(",;\t", key=lines[0].count))] for line in lines)
-    try:
-        table = np.array([[float(cell or "nan") for cell in row] for row in rows]).reshape(len(rows), len(names))
-    except ValueError as error:
-        problem = f"must be a line of names, then lines of as many numbers, empty in gaps ({error})"
-        raise RobotFileError(problem) from None
+    lines = {at: line for at, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")}
+    comma = max(",;\t", key=next(iter(lines.values()), "").count)
+    names, *rows = ([cell.strip(' "') for cell in line.split(comma)] for line in lines.values() or [""])
+    table = np.empty((len(rows), len(names)))
+    for row, at, cells in zip(table, list(lines)[1:], rows, strict=True):
+        try:
+            row[:] = np.array([float(cell or "nan") for cell in cells]).reshape(len(names))
+        except ValueError as error:
+            problem = f"must be a line of names, then lines of {len(names)} numbers, empty in gaps: line {at}, {error}"
+            raise RobotFileError(problem) from None
     told = [_NUMBER.search(_UNIT.sub("", name)) for name in names[1:]]
     numbers = [int(each[1]) for each in told if each]
     if len(numbers) == len(told) > 0 and numbers != list(range(numbers[0], numbers[0] + len(numbers))):
