@@ -4,7 +4,7 @@ In compiled code :func:`as_lanes` makes an array of them of an array of plain nu
 its numbers are added, multiplied and so on as any number; a plain number beside them is the same in every lane. No lane
 knows of another, and a computation has the same bits in one lane as in eight, whatever is in the other seven: every
 operation rounds as IEEE 754 says, and which sums are fused with a product, into one rounding, is settled here and not
-by LLVM, which would choose otherwise for another width. So what computes with them is to be compiled by
+by LLVM, which would choose otherwise for another width. So what must have the same bits in any width is compiled by
 :data:`chilopod.compiled.njit`, without leave to fuse. (A processor older than 2013 has no fused instruction: the same
 bits take it much longer.)
 """

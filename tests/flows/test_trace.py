@@ -13,7 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from chilopod.flows.tracing.trace import evaluate, evaluate_jacobian, trace
-from chilopod.flows.tracing.traced import Untraceable
+from chilopod.flows.tracing.traced import REPLACED, Untraceable
 from chilopod.stability import from_rhs
 
 STIFFNESS = 1.7
@@ -89,6 +89,19 @@ TAKEN = {
     "builtins": (lambda t, x: [max(x[0], 0.1, x[1]) - min(x), abs(x[1]) + float(x[0]) + pow(x[1], 2)], 2, ()),
     "math": (lambda t, x: [math.hypot(*x) - math.atan2(x[0], x[1]), floor(3 * x[0]) + fabs(x[1]) + cos(t)], 2, ()),
     "clip, norm, mean": (lambda t, x: np.clip(x, -0.5, 0.5) + np.linalg.norm(x) - x.mean() + np.max(x), 3, ()),
+    "comparison with oneself": (lambda t, x: np.where((x < x) | (x >= 2 * x - x), x, 2 * x), 2, ()),
+    "pairs": (lambda t, x: np.add.reduce(np.where(x[:, None] < x[None, :], 1.0, 0.0), axis=1) - x, 3, ()),
+    "kept axes": (
+        lambda t, x: np.add.reduce(
+            np.outer(x, x) / np.linalg.norm(np.outer(x, x + 1.0), axis=1, keepdims=True)
+            - np.mean(np.outer(x, x), axis=1, keepdims=True)
+            + np.max(np.outer(x, x), axis=1, keepdims=True),
+            axis=0,
+        ),
+        3,
+        (),
+    ),
+    "sign of a number": (lambda t, x: np.copysign(x, 0.0) + np.copysign(x, -2.0 * x) + np.copysign(x[0], -1.0), 2, ()),
     "both conditions": (lambda t, x: np.where((x[0] > 0) & ~(x[1] < 0.2), 1.0, x), 2, ()),
     "complex step habits": (lambda t, x: [np.sign(x[1].real) - np.real(x[0]), x.imag[0] + x[0]], 2, ()),
     "arrays of states": (lambda t, x: (x.reshape(2, 2) @ np.array([[0.0, 1.0], [-1.0, 0.2]])).ravel(), 4, ()),
@@ -170,6 +183,31 @@ def test_what_cannot_be_traced_is_said_so(case):
     rhs, n, args = REFUSED[case]
     with pytest.raises(Untraceable, match=r"\w"):
         trace(rhs, n, args)
+
+
+def test_an_operation_that_is_recorded_wrongly_is_said_so(monkeypatch):
+    monkeypatch.setitem(REPLACED, np.clip, lambda value, *_: value)
+
+    def reset(t, x):
+        return [x.clip(-0.1, 0.1)[0], x[1]]
+
+    with pytest.raises(Untraceable, match="recorded with other values than numpy's"):
+        trace(lambda t, x: x.clip(-0.1, 0.1), 2)
+    with pytest.raises(Untraceable, match="recorded with other values than numpy's"):
+        trace(lambda t, x: -x, 2, events=[(lambda t, x: x.clip(-0.1, 0.1)[0] - 0.05, None)])
+    with pytest.raises(Untraceable, match="recorded with other values than numpy's"):
+        trace(lambda t, x: -x, 2, events=[(lambda t, x: x[0], reset)])
+
+
+def test_a_reset_with_memory_is_refused():
+    speeds = []
+
+    def reset(t, x):
+        speeds.append(x[1])
+        return [x[0], -x[1] * len(speeds)]
+
+    with pytest.raises(Untraceable, match="memory or random numbers"):
+        trace(lambda t, x: -x, 2, events=[(lambda t, x: x[0], reset)])
 
 
 def test_a_family_is_traced_once():

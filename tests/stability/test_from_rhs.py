@@ -7,6 +7,7 @@ import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, locate, multipliers
@@ -252,6 +253,29 @@ def test_states_in_any_units(called):
         values.append((state / units, derivative * units / units[:, None]))
     np.testing.assert_allclose(values[1][0], values[0][0], rtol=1e-13)
     np.testing.assert_allclose(values[1][1], values[0][1], rtol=1e-12)
+
+
+def test_a_called_flow_bounds_each_entry_in_its_own_units():
+    sizes = np.array([1e-6, 1.0])
+    generator = np.array([[-0.1, 1.0], [-1.0, -0.1]])
+
+    def rhs(t, x):
+        return generator @ (x / sizes) * sizes if t > -9.0 else x  # cannot be traced
+
+    _, derivative, error = from_rhs(rhs, 2, 2 * pi).flow_with_error(sizes, 0.0, 2.0)
+    exact = expm(2.0 * generator) * sizes[:, None] / sizes
+    assert (np.abs(derivative - exact) <= error).all()
+    assert (error <= 1e-9 * np.abs(exact)).all()
+
+
+def test_a_jump_is_sought_about_an_orbit_of_any_size():
+    def rhs(t, x):
+        if abs(x[0]) > 0.1:
+            return x * np.nan  # not defined far from the orbit
+        return x * (1.0 if t % 1.0 < 0.3 else 2.0)
+
+    with pytest.warns(UndeclaredSwitch, match=r"jumps at t = 0\.3, not among"):
+        from_rhs(rhs, 1, 1.0, orbit=[1e-3])
 
 
 # Time

@@ -168,6 +168,14 @@ def test_a_large_system_without_directions():
     assert len(found.remarks) == 1
 
 
+def test_a_large_stiff_system():
+    """Taylor series take too many steps: the directions go the way of the implicit flow."""
+    rates = np.geomspace(0.3, 1e5, 100)
+    found = multipliers(from_rhs(lambda t, x: -rates * x, 100, 1.0), np.zeros(100), leading=2)
+    np.testing.assert_allclose(found.values[:2], np.exp(-rates[:2]), atol=found.error_bound)
+    assert found.error_bound < 1e-9
+
+
 def test_a_known_orbit_that_is_none():
     generator = -np.diag(np.linspace(1.0, 20.0, 100))
     with pytest.raises(AnalysisError, match="must be a periodic orbit"):

@@ -52,11 +52,14 @@ def test_guesses_that_are_orbits(form, symmetry):
     system = duffing(symmetry=symmetry)
     known = find_orbit(system, [1.88, 0.64])
     times = np.linspace(0.0, 2.0 * np.pi, 33)
-    states = [duffing().flow_with_error(known.state, 0.0, t)[0] if t else known.state for t in times]
-    states = np.array(states) + 0.05
+
+    def along(times):
+        return 0.05 + np.array([duffing().flow(known.state, 0.0, t)[0] if t else known.state for t in times])
+
+    states = along(times)
     guess = {
         "rows": states[:-1],
-        "times": (times + 3.0, states),
+        "times": (times + 3.0, along(times + 3.0)),
         "record": xr.DataArray(states, {"time": times}, ("time", "state")),
     }[form]
     found = find_orbit(system, guess)

@@ -18,6 +18,7 @@ from chilopod.stability import (
     multipliers,
     sweep,
 )
+from chilopod.stability.floquet import full_period
 from chilopod.stability.problem.capabilities import offers, spatial_symmetries
 from chilopod.stability.problem.returns import whole_period
 from helpers.systems import duffing, linear
@@ -243,3 +244,13 @@ def test_corrections_stay_where_the_motion_is(guess):
     orbit = find_orbit(PeriodicSystem(2, 2.0 * np.pi, flow, symmetry=-np.eye(2)), guess)
     np.testing.assert_allclose(orbit.state, [1.901458, 0.634591], atol=1e-6)
     assert max(asked) < 1e5
+
+
+def test_a_flow_of_volumes_alone_does_not_make_a_system_stiff():
+    system = linear(lambda t0, t1: np.diag([0.5, 0.1]) ** (t1 - t0), 2, flow_volume=lambda x, t0, t1: (-3.0, 0.0))
+    np.testing.assert_allclose(multipliers(system).values, [0.5, 0.1], rtol=1e-12)
+
+
+def test_tiny_multipliers_have_the_larger_bound():
+    found = full_period(np.array([1e-9, 1e-12], complex), np.array([1e-16, 1e-8]), 1, np.zeros(2), 1.0)
+    assert found.error_bound == 1e-8

@@ -12,6 +12,7 @@ from chilopod.stability import (
     CodimensionTwo,
     Ending,
     Kind,
+    PeriodicSystem,
     SpecialPoint2,
     begin,
     follow,
@@ -216,3 +217,30 @@ def test_another_second_parameter_than_that_of_the_point_is_refused():
     assert follow2(cubic, fold, box, second=1.5, points=3).kind is Kind.FOLD
     with pytest.raises(ParameterError, match=r"second = 1.4: is not that of the start.*0\.68"):
         follow2(cubic, fold, box, second=1.4)
+
+
+@pytest.mark.parametrize(("order", "kind"), [(3, CodimensionTwo.FOLD_FLIP), (4, CodimensionTwo.PITCHFORK_FOLD)])
+def test_a_multiplier_of_minus_1_breaks_a_symmetry_of_even_order(order, kind):
+    """A fold of y beside a multiplier -(1 + q) of x; the symmetry turns the plane of the first two states."""
+    angle = 2.0 * np.pi / order
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+
+    def family2(p, q):
+        def flow(x, t0, t1):
+            derivative = np.eye(3)
+            first, last = round(order * t0), round(order * t1)
+            for part in range(first, last):
+                frame = np.linalg.matrix_power(turn.T, part)
+                x, derivative = frame.T @ x, frame.T @ derivative
+                slopes = np.diag([-(1.0 + q), 0.3, 1.0 - 2.0 * x[2]])
+                x = frame @ turn.T @ np.array([-(1.0 + q) * x[0], 0.3 * x[1], x[2] + p - x[2] ** 2])
+                derivative = frame @ turn.T @ slopes @ derivative
+            return x, derivative
+
+        more = {"symmetry": turn}
+        return PeriodicSystem(3, 1.0, flow, flow_with_error=lambda *given: (*flow(*given), 1e-14), **more)
+
+    point = BifurcationPoint(Kind.FOLD, 0.0, 0.0, np.zeros(3), np.eye(3, dtype=complex)[2], 1.0 + 0j, 0.0)
+    (found,) = follow2(family2, point, ((-1.0, 1.0), (-0.31, 0.3)), second=-0.3, coefficients=False).special
+    assert found.kind is kind
+    np.testing.assert_allclose(found.values, 0.0, atol=1e-6)

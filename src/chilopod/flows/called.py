@@ -63,8 +63,8 @@ class CalledFlow:
         sizes = self._sizes(x, parts)
         return self._over(x, parts, self.tolerance, sizes, self._gradient(x, sizes)[0])
 
-    def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, float]:
-        """State and derivative, with a bound on the error of the largest entry of the derivative."""
+    def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
+        """State and derivative, with a bound on the error of each entry of the derivative."""
         parts = self._parts(t0, t1)
         sizes = self._sizes(x, parts)
         gradient, floor = self._gradient(x, sizes)
@@ -79,7 +79,7 @@ class CalledFlow:
         other = _OTHER * float(np.abs((shifted - derivative) * unit).max())
         error = max(rough, other) + floor * float(np.abs(derivative * unit).max())
         error = max(error, self._missed(x, parts, derivative * unit, sizes))
-        return state, derivative, error * float((1.0 / unit).max())
+        return state, derivative, error / unit
 
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""

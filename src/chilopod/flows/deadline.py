@@ -17,7 +17,7 @@ import numpy as np
 from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
 
-_STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
+_LIMIT: ContextVar[Deadline | None] = ContextVar("limit", default=None)
 _SAID: ContextVar[set[str] | None] = ContextVar("said", default=None)
 _PACKAGE = __name__.partition(".")[0]
 
@@ -27,8 +27,9 @@ class SpentError(ChilopodError, RuntimeError):
 
 
 class Deadline:
-    """A time limit, s from now, infinite for none; within its context a flow ends at the limit, even inside an
-    integration, and a message is shown once. Time that numba spends compiling is not counted."""
+    """A time limit, s from now, infinite for none; within its context a flow ends at the limit or at that of an
+    outer context, even inside an integration, and a message is shown once. Time that numba spends compiling is not
+    counted."""
 
     def __init__(self, seconds: float = math.inf) -> None:
         given: object = seconds
@@ -58,7 +59,9 @@ class Deadline:
     def __enter__(self) -> Self:
         self._left.callback(_SAID.reset, _SAID.set(self._said if (outer := _SAID.get()) is None else outer))
         if self._ends < math.inf:  # else an outer limit holds
-            self._left.callback(_STOP.reset, _STOP.set(self._stop))
+            if (outer_limit := _LIMIT.get()) is not None:
+                self._ends = min(self._ends, outer_limit._ends)
+            self._left.callback(_LIMIT.reset, _LIMIT.set(self))
             self._wait()
         return self
 
@@ -79,14 +82,14 @@ class Deadline:
 def stop() -> Array:
     """Flag for compiled code, shape (1,): not zero once the limit is reached; a SpentError if it is already."""
     check()
-    found = _STOP.get()
-    return np.zeros(1) if found is None else found
+    found = _LIMIT.get()
+    return np.zeros(1) if found is None else found._stop
 
 
 def check() -> None:
     """Raise a SpentError if the limit is reached."""
-    found = _STOP.get()
-    if found is not None and found[0] != 0.0:
+    found = _LIMIT.get()
+    if found is not None and found._stop[0] != 0.0:
         raise over()
 
 

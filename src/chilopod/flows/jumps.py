@@ -28,7 +28,7 @@ def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
     than a fiftieth of its range in 1/4096 of the period without a switch: an integrator might step over that."""
     period = float(edges[-1])
     times = (np.arange(_GRID) + 0.5) * (period / _GRID)
-    x = base + (float(np.abs(base).max()) or 1.0) * np.cos(3.0 * np.arange(base.size) + 1.0)
+    x = _beside(base)
     samples = slopes(np.asarray(times, dtype=np.float64), np.repeat(x[:, None], _GRID, axis=1))
     samples = np.asarray(np.where(np.isfinite(samples), samples, 0.0), dtype=np.float64)
     span = np.ptp(samples, axis=1, keepdims=True)
@@ -39,6 +39,11 @@ def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
     near = np.convolve(change.max(axis=0) > _FAST, np.ones(2 * _MARGIN + 1), mode="same") > 0.0
     borders = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
     return np.asarray(borders.reshape(-1, 2) * (period / _GRID))
+
+
+def _beside(base: Array, turn: float = 0.0) -> Array:
+    """State at about the distance of a state's own size."""
+    return base + (float(np.abs(base).max()) or 1.0) * np.cos(3.0 * np.arange(base.size) + 1.0 + turn)
 
 
 def longest_step(fast: Array, period: float, a: float, b: float) -> float:
@@ -55,7 +60,7 @@ def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> 
     spacing at a jump: large ones are bisected down to 1e-12 of the period.
     """
     base = np.zeros(n) if orbit is None else orbit
-    states = np.array([base + np.cos(3.0 * np.arange(n) + 1.0 + s) for s in range(2)]).T
+    states = np.array([_beside(base, s) for s in range(2)]).T
     period = float(edges[-1])
 
     def values(t: float) -> Array:

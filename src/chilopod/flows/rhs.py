@@ -173,8 +173,20 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
                 return True
         return False
 
+    def flow_tangents(x: Array, along: Array, t0: float, t1: float) -> tuple[Array, Array]:
+        try:
+            state, images = taylor["flow_tangents"](x, along, t0, t1)
+        except TooManySteps:
+            state, derivative = implicit().flow(x, t0, t1)
+            images = derivative @ along
+        return state, images
+
     own: Members = {name: either(name) for name in _FLOWS}
-    return own | {"flow_volume": lambda *args: implicit().flow_volume(*args), "is_stiff": is_stiff}
+    return own | {
+        "flow_tangents": flow_tangents,
+        "flow_volume": lambda *args: implicit().flow_volume(*args),
+        "is_stiff": is_stiff,
+    }
 
 
 def _edges(switch_times: Sequence[float], period: float) -> Array:

@@ -138,7 +138,7 @@ def full_period(nu: ComplexArray, error: Array, k: int, state: Array, period: fl
     """The multipliers mu = nu^k of the full period from those of the return map, with their errors."""
     modulus = np.abs(nu)
     resolved = modulus > _RESOLVED
-    bound = float(error[resolved].max()) if resolved.any() else float(error.min())
+    bound = float(error[resolved].max()) if resolved.any() else float(error.max())
     if k == 1:
         return Multipliers(nu, None, bound, error, state, period)
     # By the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.

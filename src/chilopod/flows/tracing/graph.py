@@ -298,8 +298,11 @@ _builds("sign")(Graph.step)
 _builds("heaviside")(lambda g, a, b: g.select(a, _one(g), g.number(0.0)))
 _builds("maximum", "fmax")(lambda g, a, b: g.select(g.add(a, b, -1.0), a, b))
 _builds("minimum", "fmin")(lambda g, a, b: g.select(g.add(a, b, -1.0), b, a))
-_builds("greater", "greater_equal")(lambda g, a, b: g.select(g.add(a, b, -1.0), _one(g), g.number(0.0)))
-_builds("less", "less_equal")(lambda g, a, b: g.select(g.add(a, b, -1.0), g.number(0.0), _one(g)))
+# Equal nodes have the difference 0, whose sign is not positive.
+_builds("greater")(lambda g, a, b: g.select(g.add(a, b, -1.0), _one(g), g.number(0.0)))
+_builds("greater_equal")(lambda g, a, b: g.select(g.add(b, a, -1.0), g.number(0.0), _one(g)))
+_builds("less")(lambda g, a, b: g.select(g.add(b, a, -1.0), _one(g), g.number(0.0)))
+_builds("less_equal")(lambda g, a, b: g.select(g.add(a, b, -1.0), g.number(0.0), _one(g)))
 _builds("logical_not", "invert")(lambda g, a: g.add(_one(g), a, -1.0))
 _builds("logical_and", "bitwise_and")(Graph.multiply)
 _builds("logical_or", "bitwise_or")(lambda g, a, b: g.add(g.add(a, b), g.multiply(a, b), -1.0))
@@ -307,7 +310,13 @@ _builds("floor")(Graph.floor)
 _builds("trunc")(lambda g, a: g.select(a, g.floor(a), _ceil(g, a)))
 _builds("floor_divide")(lambda g, a, b: g.floor(g.divide(a, b)))
 _builds("hypot")(lambda g, a, b: g.function(ops.SQRT, g.add(g.multiply(a, a), g.multiply(b, b))))
-_builds("copysign")(lambda g, a, b: g.multiply(g.select(a, a, g.multiply(g.number(-1.0), a)), g.step(b)))
+
+
+@_builds("copysign")
+def _copysign(g: Graph, a: int, b: int) -> int:
+    minus = g.number(-1.0)
+    size = g.select(a, a, g.multiply(minus, a))
+    return g.select(g.multiply(minus, b), g.multiply(minus, size), size)
 
 
 @_builds("ceil")

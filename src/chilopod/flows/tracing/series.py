@@ -232,6 +232,8 @@ def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: A
             values[i, 0] = states[i, m % states.shape[1]]
         values[n, 0] = times[m % times.size]
         choose(tape, series)
+        if (nodes >= tape.layout[4]).any():  # of resets
+            values_at(tape.program, tape.terms, tape.slopes, tape.layout[4:6], 0, 1.0, values, series.branches)
         for i in range(nodes.size):
             found[i, m] = values[nodes[i], 0]
 

@@ -128,19 +128,19 @@ def _numeric(value: Any) -> Any:
     return np.zeros(value.shape) if isinstance(value, TracedArray) else value
 
 
-def _norm(value: Any, ord: Any = None, axis: Any = None, **_: Any) -> Any:
+def _norm(value: Any, ord: Any = None, axis: Any = None, keepdims: Any = False) -> Any:
     if ord not in (None, 2) or (axis is None and np.ndim(value) != 1 and ord is not None):
         raise Untraceable("it takes a norm other than Euclid's")
-    return np.sqrt(np.add.reduce(as_traced(value) ** 2, axis=axis))
+    return np.sqrt(np.add.reduce(as_traced(value) ** 2, axis=axis, keepdims=keepdims))
 
 
-def _mean(value: Any, axis: Any = None, **_: Any) -> Any:
+def _mean(value: Any, axis: Any = None, keepdims: Any = False) -> Any:
     array = as_traced(value)
-    return np.add.reduce(array, axis=axis) / (array.size if axis is None else array.shape[axis])
+    return np.add.reduce(array, axis=axis, keepdims=keepdims) / (array.size if axis is None else array.shape[axis])
 
 
 def _extreme(ufunc: np.ufunc) -> Callable[..., Any]:
-    return lambda value, axis=None, **_: ufunc.reduce(as_traced(value), axis=axis)
+    return lambda value, axis=None, keepdims=False: ufunc.reduce(as_traced(value), axis=axis, keepdims=keepdims)
 
 
 REPLACED |= {

@@ -74,7 +74,7 @@ def trace(
             if not floats:
                 raise
             tape = _traced(functions, dimension, args, 0)
-        _verify(tape, np.array(floats[: tape.parameters]), rhs, args, times, base)
+        _verify(tape, np.array(floats[: tape.parameters]), functions, args, times, base)
         known = tape, {}
         if key is not None:
             if len(kept) >= _MOST_KEPT:
@@ -117,26 +117,45 @@ def _results(graph: Graph, args: tuple[Any, ...], function: Any, count: int | No
 
 
 def _verify(
-    tape: Tape, params: Array, rhs: Callable[..., ArrayLike], args: tuple[Any, ...], times: Sequence[float], base: Any
+    tape: Tape, params: Array, functions: tuple[Any, ...], args: tuple[Any, ...], times: Sequence[float], base: Any
 ) -> None:
-    """Compare the tape with the function at states of various sizes."""
-    n = tape.dimension
+    """Compare the tape with the right-hand side, guards and resets at states of various sizes."""
+    n, (rhs, *event_functions) = tape.dimension, functions
+    checked = [(rhs, tape.slopes)]
+    for kind, node, event in tape.switches.T:
+        if kind == GUARD:
+            guard, reset = event_functions[2 * event : 2 * event + 2]
+            checked.append((lambda *given, guard=guard: np.ravel(guard(*given)), np.array([node])))
+            if reset is not None:
+                checked.append((reset, tape.resets[event]))
     around = np.zeros(n) if base is None else np.asarray(base, dtype=np.float64)
     size = float(np.abs(around).max()) or 1.0
     low, high = float(min(times)), float(max(times))
-    pairs = []
+    places = []
     for i, (spread, turn) in enumerate(itertools.product((0.01, 0.3, 1.0), (0.3, 1.7, 4.1))):
         t = low + (high - low) * ((0.6180339887 * (i + 1)) % 1.0)
         x = around + spread * np.where(around == 0.0, size, np.abs(around)) * np.cos(3.0 * np.arange(n) + turn)
+        places.append((t, x))
+    for function, nodes in checked:
+        _compare(tape, params, lambda t, x, f=function: as_real(f(t, x.copy(), *args)), nodes, places)
+
+
+def _compare(
+    tape: Tape, params: Array, function: Callable[..., Array], nodes: Integers, places: list[tuple[float, Array]]
+) -> None:
+    """Untraceable if nodes have other values than a function of time and state."""
+    pairs, defined = [], []
+    for t, x in places:
         try:
             with np.errstate(all="ignore"):
-                real = as_real(rhs(t, x.copy(), *args))
+                real = function(t, x)
         except Exception:  # not defined at this state
             continue
-        own = evaluate(tape, tape.slopes, t, x, params)
-        x = x * (1 + _NEAR * np.cos(np.arange(n)))
-        near = evaluate(tape, tape.slopes, t * (1 + _NEAR), x, params * (1 - _NEAR))
+        own = evaluate(tape, nodes, t, x, params)
+        beside = x * (1 + _NEAR * np.cos(np.arange(x.size)))
+        near = evaluate(tape, nodes, t * (1 + _NEAR), beside, params * (1 - _NEAR))
         pairs.append((real, own, np.abs(near - own)))
+        defined.append((t, x))
     if not pairs:
         raise Untraceable("it could not be evaluated at any state that was tried")
     real, own, rounding = (np.array(part) for part in zip(*pairs, strict=True))
@@ -149,11 +168,15 @@ def _verify(
     if (np.abs(np.where(both, real - own, 0.0)) > allowed).any() or (
         np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
     ).any():
+        with np.errstate(all="ignore"):
+            again = np.array([function(t, x) for t, x in defined])
+        if np.array_equal(again, real, equal_nan=True):
+            raise Untraceable("it uses an operation that is recorded with other values than numpy's")
         raise Untraceable("it gives other values when called again: it has memory or random numbers")
 
 
 def evaluate(tape: Tape, nodes: Integers, t: Any, x: Any, params: Array) -> Array:
-    """Values of nodes (not of resets), shape (nodes, ...), at times (...) and states (n, ...), or one of either."""
+    """Values of nodes, shape (nodes, ...), at times (...) and states (n, ...), or one of either."""
     from chilopod.flows.tracing import series  # numba takes half a second to import
 
     # Copies, because numba would compile again for read-only arrays.

@@ -256,7 +256,7 @@ class Detector:
         if reverses(self._curve.system(here.at.place.values), mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
         if sign < 0:
-            return together(self._kind, Kind.PITCHFORK if here.at.image.returns == 2 else Kind.PERIOD_DOUBLING)
+            return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
         return together(self._kind, Kind.BRANCH_POINT if self._curve.known else Kind.FOLD)
 
 

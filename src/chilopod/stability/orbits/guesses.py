@@ -57,11 +57,14 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
         raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
     if not (np.diff(times) > 0.0).all():
         raise ParameterError("must have rising times", field="orbit")
-    lasts = float(times[-1] - times[0])
-    if not is_autonomous(system) and not abs(lasts - whole) <= _SAME_PERIOD * whole:
-        raise ParameterError("must cover one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
+    lasts, first = float(times[-1] - times[0]), 0.0
+    if not is_autonomous(system):
+        if not abs(lasts - whole) <= _SAME_PERIOD * whole:
+            raise ParameterError("must cover one period", field="orbit", value=f"{lasts:g}", allowed=f"{whole:g}")
+        first = -float(times[0]) % whole  # time 0, from the first state on
     duration = lasts / returns_per_period(system)
-    return Nodes(CubicSpline(times - times[0], states)(np.arange(_OF_GUESS) * duration / _OF_GUESS), duration)
+    nodes = (first + np.arange(_OF_GUESS) * duration / _OF_GUESS) % lasts
+    return Nodes(CubicSpline(times - times[0], states)(nodes), duration)
 
 
 def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:

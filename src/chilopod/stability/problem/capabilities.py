@@ -121,7 +121,7 @@ def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
 
 def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[Capabilities]:
     """True if a return from state x at time 0 contracts some directions more than its derivative resolves."""
-    return offers(system, "flow_volume") and system.is_stiff(x, 0.0, duration)
+    return offers(system, "flow_volume") and offers(system, "is_stiff") and system.is_stiff(x, 0.0, duration)
 
 
 def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error: bool = False) -> Any:
