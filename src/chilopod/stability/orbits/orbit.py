@@ -131,7 +131,8 @@ def find_orbit(
     guess
         State at time 0 near the orbit, shape (n,), or an :class:`Orbit`; or a whole orbit near it, for multiple
         shooting: states at even times over one period, shape (times, n), or times and states, shapes (times,) and
-        (times, n), as a tuple or an ``xarray.DataArray`` over ``time``, from any time on. The result then has the period of the guess.
+        (times, n), as a tuple or an ``xarray.DataArray`` over ``time``, from any time on. The result then has the
+        period of the guess.
     with_error
         True to bound errors.
     settle
