@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.deadline import Budget, SpentError
 from chilopod.stability import (
     Ending,
     PeriodicSystem,
@@ -23,7 +24,6 @@ from chilopod.stability import (
     multipliers,
     sweep,
 )
-from chilopod.stability.problem.arguments import Budget, SpentError
 from chilopod.stability.search.extent import find_fold
 from chilopod.stability.unit_circle.crossings import SearchStatus
 from helpers.systems import duffing, linear, lorenz

@@ -21,7 +21,7 @@ from chilopod.stability import (
     switch2,
 )
 from chilopod.stability.codimension_two import detection
-from chilopod.stability.normal_forms.amplitude import NormalFormStatus
+from chilopod.stability.normal_forms.normal_form import NormalFormStatus
 from helpers.systems import doubling, of_map
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))

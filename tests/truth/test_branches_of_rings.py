@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from chilopod.errors import ParameterError
 from chilopod.stability import Ending, Kind, follow, locate, switch
-from chilopod.stability.symmetry.equivariants import SymmetricKind
+from chilopod.stability.symmetry.isotypic import SymmetricKind
 from helpers import systems
 
 BETWEEN = (-2.0, 1.0)

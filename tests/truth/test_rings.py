@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from chilopod.stability.symmetry.equivariants import SymmetricKind, symmetric_crossing
 from chilopod.stability.symmetry.groups import commutes, finite_group
-from chilopod.stability.symmetry.isotypic import isotypic
+from chilopod.stability.symmetry.isotypic import SymmetricKind, isotypic, symmetric_crossing
 from chilopod.stability.unit_circle.spectra import Event
 from helpers.spectra import farthest
 

@@ -1,9 +1,10 @@
-"""Checks of the user's input beside a right-hand side, and calls of the user's functions, with errors of one line."""
+"""Checks of the user's arguments, and calls of the user's functions, with errors of one line."""
 
 from __future__ import annotations
 
 import operator
 import re
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -199,3 +200,47 @@ def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slo
         return np.array(columns).T
 
     return slopes
+
+
+_FUNCTIONS = {
+    "family": "family(value) -> the system at a value of the parameter",
+    "family2": "family2(p, q) -> the system at values of two parameters",
+    "progress": "progress(count, point)",
+}
+_COUNTS = {"budget": sys.maxsize, "points": sys.maxsize, "periods": 1000}  # with the largest
+_LENGTHS = {"step", "longest", "precision"}
+
+
+def check_arguments(**given: object) -> None:
+    """Check arguments by their names: functions, whole numbers, positive numbers, and flags."""
+    for field, value in given.items():
+        if field in _FUNCTIONS:
+            if not callable(value):
+                raise ParameterError("must be a function", field=field, value=value, allowed=_FUNCTIONS[field])
+        elif field in _COUNTS:
+            if not (field == "points" and value is None):
+                checked_count(field, value, _COUNTS[field])
+        elif field in _LENGTHS:
+            positive(field, value)
+        elif not isinstance(value, bool | np.bool_):
+            raise ParameterError("must be a truth value", field=field, value=value, allowed="True or False")
+
+
+def checked_interval(between: object) -> tuple[float, float]:
+    """An interval as two finite numbers, the second of which is larger."""
+    low, high = finite_array(between, (2,), "between").tolist()
+    if not (low < high and np.isfinite(high - low)):
+        raise ParameterError("must rise", field="between", value=between, allowed="(lower, higher), both finite")
+    return low, high
+
+
+def checked_box(between: object) -> Array:
+    """Intervals of both parameters, shape (2, 2)."""
+    try:
+        box = np.array([checked_interval(each) for each in between])  # type: ignore[attr-defined]
+    except (TypeError, ParameterError):
+        box = np.empty(0)
+    if box.shape != (2, 2):
+        allowed = "((p_low, p_high), (q_low, q_high))"
+        raise ParameterError("must be two intervals", field="between", value=between, allowed=allowed)
+    return box

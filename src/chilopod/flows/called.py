@@ -1,4 +1,4 @@
-"""The flow of a right-hand side that can only be called: scipy's DOP853 for state and tangents together."""
+"""The flow of a right-hand side that can only be called, by scipy's DOP853 for state and tangents; and its jumps."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import UserCode, numbers
-from chilopod.flows.carrying import TooManySteps, pieces
-from chilopod.flows.jumps import UndeclaredSwitch, longest_step
+from chilopod.flows.arguments import Slopes, UserCode, numbers
+from chilopod.flows.carrying import TooManySteps, longest_step, state_beside, pieces
 from chilopod.frozen import Array
 
 Parts = list[tuple[float, float]]
@@ -33,6 +32,8 @@ _SMALL = 1e-4
 _DISAGREES = 1e-5
 _MOST_CALLS = 2_000_000
 _PATIENCE, _HOPELESS = 50_000, 4.0  # calls, and factor on the largest number beyond which no more are tried
+_PROBES = 257  # samples over the period at which jumps show
+_SETTLED = 3  # zooms that leave only the jump of a change with smooth parts
 _DISAGREEMENT = (
     "the derivative of the flow disagrees with its differences: the right-hand side jumps somewhere in the state. "
     "Write it without branches (numpy.where, sign, maximum), and the jumps are crossed exactly"
@@ -41,6 +42,10 @@ _DISAGREEMENT = (
 
 class NotAnalytic(UserWarning):
     """Warning: a right-hand side can neither be traced nor differentiated by a complex step."""
+
+
+class UndeclaredSwitch(UserWarning):
+    """Warning: a right-hand side that cannot be traced has an undeclared jump."""
 
 
 @dataclass(frozen=True)
@@ -221,3 +226,56 @@ def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array,
         if not (np.abs(tilted.imag / _COMPLEX_STEP - difference) <= allowed).all():
             return False
     return True
+
+
+def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> None:
+    """Warn of jumps of the right-hand side inside the intervals where it should be smooth.
+
+    Its fourth differences at fixed states away from zero (a jump in a coefficient hides at x = 0) do not fall with the
+    spacing at a jump: large ones are bisected down to 1e-12 of the period.
+    """
+    base = np.zeros(n) if orbit is None else orbit
+    states = np.array([state_beside(base, s) for s in range(2)]).T
+    period = float(edges[-1])
+
+    def values(t: float) -> Array:
+        samples = slopes(np.full(2, t), states)
+        return np.where(np.isfinite(samples), samples, 0.0).T.ravel()
+
+    found: list[float] = []
+    for a, b in zip(edges, edges[1:], strict=False):
+        margin = 1e-9 * (b - a)
+        times = np.linspace(a + margin, b - margin, max(9, int(_PROBES * (b - a) / period)) + 1)
+        samples = np.array([values(t) for t in times])
+        rough = _fourth_differences(samples)
+        smallest = 1e-9 * float(np.abs(samples).max())
+        for i in np.flatnonzero(rough > 4.0 * np.median(rough) + smallest):
+            at = _zoom(values, float(times[i]), float(times[i + 4]), 1e-12 * period, smallest)
+            if at is not None and all(abs(at - t) > 1e-9 * period for t in found):
+                found.append(at)
+    if found:
+        listed = ", ".join(f"{t:.9g}" for t in sorted(found)[:6]) + (" ..." if len(found) > 6 else "")
+        said = f"the right-hand side jumps at t = {listed}, not among switch_times: that costs digits and time"
+        deadline.warn(said, UndeclaredSwitch)
+
+
+def _fourth_differences(samples: Array) -> Array:
+    """The largest fourth difference of any component over each five successive samples, shape (samples - 4,)."""
+    return np.asarray(np.abs(np.diff(samples, n=4, axis=0)).max(axis=1))
+
+
+def _zoom(values: Callable[[float], Array], low: float, high: float, width: float, smallest: float) -> float | None:
+    """Place of a function's jump in an interval, to within ``width``; None if the function is smooth there."""
+    settled = np.inf
+    for zoom in itertools.count():
+        times = np.linspace(low, high, 17)
+        rough = _fourth_differences(np.array([values(t) for t in times]))
+        i = int(rough.argmax())
+        if zoom == _SETTLED:
+            settled = rough[i]
+        if rough[i] < smallest or (zoom > _SETTLED and rough[i] < 0.3 * settled):
+            return None
+        low, high = float(times[i]), float(times[i + 4])
+        if high - low < width:
+            return 0.5 * (low + high)
+    raise AssertionError  # unreachable

@@ -1,4 +1,4 @@
-"""A time limit that is checked during flows."""
+"""A time limit that is checked during flows, and a budget of these."""
 
 from __future__ import annotations
 
@@ -77,6 +77,33 @@ class Deadline:
         self._timer = threading.Timer(max(self._ends - _now(), 0.0) + 1e-3, self._wait)
         self._timer.daemon = True
         self._timer.start()
+
+
+_SPENT = "the flows (`budget`) were spent"
+
+
+class Budget(Deadline):
+    """Remaining flows over a return, and time, of a search.
+
+    Inside a ``with`` block of the budget the time, s from now, also ends a running flow.
+    """
+
+    def __init__(self, allowed: float, seconds: float = math.inf) -> None:
+        super().__init__(seconds)
+        self.left = allowed  # remaining number of flows; never below zero
+
+    @property
+    def spent(self) -> str:
+        """The limit that is reached, in words; empty before."""
+        return "the time (`seconds`) was spent" if self.late else _SPENT if self.left <= 0 else ""
+
+    def take(self, count: int = 1) -> None:
+        """Count flows before they are computed; a SpentError if too few are left."""
+        if self.left <= 0:
+            raise SpentError(_SPENT)
+        if self.late:
+            raise over()
+        self.left = max(self.left - count, 0)
 
 
 def stop() -> Array:

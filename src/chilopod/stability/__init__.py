@@ -7,28 +7,24 @@
 False
 """
 
-from chilopod.flows.called import NotAnalytic
+from chilopod.flows.called import NotAnalytic, UndeclaredSwitch
 from chilopod.flows.deadline import SpentError
-from chilopod.flows.events import Event
-from chilopod.flows.jumps import UndeclaredSwitch
+from chilopod.flows.rhs import Event
 from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, switch
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
-from chilopod.stability.codimension_two.switching import switch2
-from chilopod.stability.codimension_two.two_parameters import follow2
+from chilopod.stability.codimension_two.two_parameters import follow2, switch2
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.hopf import locate_hopf
-from chilopod.stability.normal_forms.amplitude import NormalFormStatus
-from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.problem.capabilities import Autonomous, Capabilities, SystemLike
-from chilopod.stability.problem.maps import from_map
 from chilopod.stability.problem.returns import ReturnMap, Section
-from chilopod.stability.problem.system import PeriodicSystem, from_rhs
+from chilopod.stability.problem.system import PeriodicSystem, from_map, from_rhs
 from chilopod.stability.search.locate import Located, locate
 from chilopod.stability.shown import Result
-from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
+from chilopod.stability.symmetry.isotypic import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.tracing.tracer import Ending
 from chilopod.stability.unit_circle.crossings import SearchStatus
 

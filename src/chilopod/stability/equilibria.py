@@ -13,15 +13,22 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import finite_array, numbers
-from chilopod.flows.balance import numerical_balance
+from chilopod.flows.arguments import UserCode, finite_array, numbers
+from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.normal_forms.center_manifold import radii, series
 from chilopod.stability.orbits.orbit import Orbit, near_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint, Criticality
-from chilopod.stability.problem.arguments import UserCode, check_system, system_of
-from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, given_scale, is_autonomous, offers
+from chilopod.stability.problem.capabilities import (
+    Autonomous,
+    Family,
+    SystemLike,
+    check_system,
+    is_autonomous,
+    offers,
+    system_of,
+)
 from chilopod.stability.problem.returns import section_at
 from chilopod.stability.spectrum.eigenvalues import SAFETY, disturbed, eigenvalue_errors, phased
 
@@ -166,8 +173,9 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
     """dx/dt at a state, shape (n,), its derivative, shape (n, n), and bounds on the latter's errors by differences."""
-    size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
-    size = size if given_scale(system) is None else np.asarray(given_scale(system))
+    size = getattr(system, "scale", None)
+    if size is None:
+        size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
     curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
     found, wrong = _expanded(system, curves)
     with np.errstate(all="ignore"):

@@ -19,8 +19,7 @@ from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
-from chilopod.stability.problem.arguments import check_system
-from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, is_stiff, offers
+from chilopod.stability.problem.capabilities import SystemLike, check_system, is_autonomous, is_stiff, offers
 from chilopod.stability.problem.returns import return_maps
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said

@@ -19,21 +19,20 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
-from chilopod.flows.balance import numerical_balance
-from chilopod.flows.deadline import Deadline
+from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
+from chilopod.flows.carrying import numerical_balance
+from chilopod.flows.deadline import Deadline, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.problem.arguments import SpentError, UserCode, check_arguments, checked_interval
-from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, given_scale, offers
+from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, offers
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.search.locate import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.unit_circle.spectra import Crossing, Event
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
 _EPSILON = float(np.finfo(float).eps)
@@ -210,7 +209,7 @@ def _duration(start: Equilibrium, guess_period: float) -> float:
 def _scale(system: Autonomous, start: Equilibrium) -> Array | None:
     """Sizes of the states, shape (n,), for an equilibrium at zero: there the terms of second or third order of the
     right-hand side are as large as the linear ones along some directions."""
-    given = given_scale(system)
+    given = getattr(system, "scale", None)
     if given is not None or start.state.any() or not offers(system, "velocity_series"):
         return given
     n = start.state.size

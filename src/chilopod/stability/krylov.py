@@ -19,9 +19,9 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, shape_of
+from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.problem.arguments import Budget
-from chilopod.stability.problem.capabilities import Capabilities, given_scale, is_autonomous, returns_per_period
+from chilopod.stability.problem.capabilities import Capabilities, check_finite, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import (
     CUTS,
     REPEATED,
@@ -142,8 +142,7 @@ class TangentMap(ReadOnlyArrays):
             if shapes != allowed:
                 said = "gives shapes {} and {}".format(*shapes)
                 raise AnalysisError(said, field="flow_tangents", allowed="{} and {}".format(*allowed))
-        if not np.isfinite(images).all():
-            raise AnalysisError("the flow is not finite over one return", field="flow")
+        check_finite(images)
         if self.system.symmetry is not None:
             state, images = self.system.symmetry @ state, self.system.symmetry @ images
         return state, self._across(images)
@@ -162,8 +161,7 @@ def tangent_map(system: Capabilities, x: Array, section: Section | None = None) 
     velocity, across = None, None
     duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
     state = turned(system, carried(system, x[None], 0.0, duration))[0]
-    if not np.isfinite(state).all():
-        raise AnalysisError("the flow is not finite over one return", field="flow")
+    check_finite(state)
     if is_autonomous(system) and section is not None:
         velocity, across = np.asarray(system.velocity(np.array(state))), Section(x, section.normal, duration)
     return TangentMap(system, x, state, duration, returns_per_period(system), across, velocity)
@@ -173,7 +171,7 @@ def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
     """Sizes of the states, shape (n,), as :func:`.problem.capabilities.sizes`, without the matrix: the
     largest value of a state during a return, or its change within a part of it when the others are disturbed at random
     by their own sizes (the one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 2000)."""
-    given = given_scale(system)
+    given = getattr(system, "scale", None)
     if given is not None:
         return given
     random = np.random.default_rng(0)
@@ -181,8 +179,7 @@ def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
     state, size = x, np.abs(x)
     for a, b in itertools.pairwise(times):
         state = carried(system, state[None], a, b)[0]
-        if not np.isfinite(state).all():
-            raise AnalysisError("the flow is not finite over one return", field="flow")
+        check_finite(state)
         size = np.maximum(size, np.abs(state))
     moves = bool(size.any())
     if not moves:

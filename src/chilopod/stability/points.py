@@ -8,10 +8,9 @@ import numpy as np
 
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
-from chilopod.stability.normal_forms.amplitude import NormalFormStatus
-from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus
 from chilopod.stability.shown import Shown, bounded, number
-from chilopod.stability.symmetry.equivariants import SymmetricCrossing
+from chilopod.stability.symmetry.isotypic import SymmetricCrossing
 
 
 class Kind(Labelled):

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.balance import numerical_balance
-from chilopod.flows.carrying import RESOLUTION, failure, pieces
-from chilopod.flows.jumps import longest_step
+from chilopod.flows.carrying import RESOLUTION, failure, longest_step, numerical_balance, pieces
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.tape import Tape
 from chilopod.flows.tracing.trace import branches_of, evaluate, evaluate_jacobian

@@ -20,8 +20,7 @@ import numpy as np
 
 from chilopod.compiled import fused_njit
 from chilopod.flows.carrying import BUDGET, CHATTERS, DONE, GRAZES, NOT_FINITE, STALLED, TIME_OVER
-from chilopod.flows.taylor.exits import first_exit
-from chilopod.flows.taylor.step_length import agrees, step_size
+from chilopod.flows.taylor.step_length import agrees, first_exit, step_size
 from chilopod.flows.taylor.switching import Motion, await_events, cross, is_timed, settle, start
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.series import expand, loaded

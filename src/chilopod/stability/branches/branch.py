@@ -19,16 +19,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import ChilopodError, ParameterError
+from chilopod.flows.arguments import check_arguments, checked_interval
+from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
 from chilopod.notebook import picture
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
+from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.family_returns import PRECISION
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import Budget, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import carried, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.flows.arguments import finite_array
+from chilopod.flows.arguments import UserCode, check_arguments, finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
@@ -18,15 +18,14 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.orbits.orbit import Orbit, bounded, known_state, searched_orbit
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import UserCode, check_arguments, system_of
 from chilopod.stability.problem.capabilities import (
     Family,
     SystemLike,
-    given_scale,
     is_autonomous,
     offers,
     returns_per_period,
     sizes,
+    system_of,
 )
 from chilopod.stability.problem.returns import Section, carried, returned_states, whole_period
 
@@ -225,7 +224,7 @@ def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
     return map becomes nonlinear, or the orbit's change over the interval, with ratios from the orbit."""
     x, value = start.orbit, start.value
     system, section = curve.system(value), curve.section_at(x, value, start.period)
-    given = given_scale(system)
+    given = getattr(system, "scale", None)
     if given is not None:
         return given
     found = _linear_within(curve, x, value, section)

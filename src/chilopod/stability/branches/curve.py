@@ -17,16 +17,16 @@ from chilopod.frozen import Array, ComplexArray, read_only
 from chilopod.stability.branches.branch_points import (
     Anchor,
     BranchPoint,
+    FamilyReturns,
     OnCurve,
     Returned,
     null_vector,
     symmetric_space,
     within_space,
 )
-from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
-from chilopod.stability.problem.capabilities import checked_flow, given_scale, is_autonomous
+from chilopod.stability.problem.capabilities import checked_flow, is_autonomous, offers
 from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
@@ -151,7 +151,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     def stretches(self, step: Step[Anchor, OnCurve]) -> bool:
         """True unless short steps are wanted, or the system gives the sizes of its states."""
-        return self.long_steps and given_scale(self.system(step.found.value)) is None
+        return self.long_steps and not offers(self.system(step.found.value), "scale")
 
     def exact(self, anchor: Anchor, found: Returned, row: Array) -> Array | None:
         """The matrix at an orbit near a branch point."""

@@ -26,15 +26,14 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, Within, special_point
 from chilopod.stability.crossing_points.description import ContinuumError
-from chilopod.stability.orbit_blocks import crossings_in
+from chilopod.stability.crossing_points.place import crossings_in
 from chilopod.stability.problem.capabilities import offers
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.equations import Step, predicted
-from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, factors
+from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event, Matrices, factors
 from chilopod.stability.unit_circle.zeros import FEW_PLACES, PLACES, interpolated
 
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign

@@ -15,8 +15,7 @@ from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.crossing_points.description import described
-from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, past_singular, place_error
-from chilopod.stability.orbit_blocks import Blocks, orbit_blocks
+from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, orbit_blocks, past_singular, place_error
 from chilopod.stability.orbits.orbit import Orbit, bounded, searched_orbit
 from chilopod.stability.points import Kind
 from chilopod.stability.problem.returns import ReturnMap
@@ -24,8 +23,7 @@ from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.equations import Plane, Step
 from chilopod.stability.tracing.tolerances import AWAY
 from chilopod.stability.tracing.tracer import Parts
-from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.spectra import distances
+from chilopod.stability.unit_circle.spectra import Crossing, distances
 
 SAME_ORBIT = 1e-6
 """Distance between states of one orbit, relative to the sizes of the states."""
@@ -48,7 +46,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         self.low = _LEAVING * step.size if step.start.leaving else 0.0
 
     @functools.cached_property
-    def blocks(self) -> Blocks:
+    def blocks(self) -> tuple[Block | None, ...]:
         """Blocks of the return map along the step, from the spatial symmetries of its last orbit."""
         curve, last = self.curve, self.step.end.last
         section = curve.section_at(last.orbit, last.value, last.period)

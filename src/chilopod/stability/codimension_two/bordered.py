@@ -23,10 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import from_known, known_state
-from chilopod.stability.problem.arguments import Budget, system_of
-from chilopod.stability.problem.capabilities import SystemLike, given_scale, returns_per_period, sizes
+from chilopod.stability.problem.capabilities import SystemLike, offers, returns_per_period, sizes, system_of
 from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.symmetry.groups import symmetric_states
 from chilopod.stability.tracing.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
@@ -256,7 +256,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
         size = sizes(system, place.state, image.duration)
-        if self.known or place.state.any() or given_scale(system) is not None:
+        if self.known or place.state.any() or offers(system, "scale"):
             return size
         # The parameters set the size of an orbit that rests at zero.
         reach = 0.0

@@ -12,19 +12,16 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.crossing_points.place import critical_multipliers
-from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
-from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
+from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, normal_form
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import WITHOUT_CRITICALITY, BifurcationPoint, Criticality, Kind, with_coefficients
 from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, sizes
 from chilopod.stability.problem.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
-from chilopod.stability.symmetry.equivariants import SymmetricCrossing, SymmetricKind, symmetric_crossing
 from chilopod.stability.symmetry.groups import symmetric_basis
-from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.spectra import TARGETS, Event
+from chilopod.stability.symmetry.isotypic import Block, SymmetricCrossing, SymmetricKind, symmetric_crossing
+from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event
 
 _EPSILON = float(np.finfo(float).eps)
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically

@@ -1,5 +1,5 @@
-"""Places at which multipliers cross, along a coordinate in which orbits are smooth, with error bounds. At a
-multiplier +1 of the return map H, where H - 1 is singular, place and orbit are interpolated."""
+"""Crossings in the blocks of an orbit's symmetries, and their places, with error bounds, along a coordinate in which
+orbits are smooth. At a multiplier +1 of the return map H, where H - 1 is singular, place and orbit are interpolated."""
 
 from __future__ import annotations
 
@@ -17,10 +17,47 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import Orbit
+from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import Spectrum, disturbed, return_multipliers, spectrum
-from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
+from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
+from chilopod.stability.symmetry.isotypic import Block, isotypic
+from chilopod.stability.unit_circle.crossings import Crossings
+from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event, Matrices, distances
+
+
+def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...], tuple[str, ...]]:
+    """The blocks of the symmetries of an orbit, a single None for the whole return map, and a sentence if it has none
+    of the system's."""
+    generators = spatial_symmetries(system)
+    if not generators:
+        return (None,), ()
+    group = finite_group(np.stack(generators))
+    if system.symmetry is not None:
+        group = centraliser(group, system.symmetry)
+    group = isotropy(group, orbit.state, np.nan_to_num(orbit.error))
+    if group.order == 1:
+        return (None,), ("the orbit has none of the spatial symmetries",)
+    if commutes(group, orbit.image.jacobian, orbit.image.error) > 1.0:
+        return (None,), ("the return map does not have the spatial symmetries: they are not used",)
+    return isotypic(group), ()
+
+
+def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matrices], Crossings]) -> Crossings:
+    """Crossings in a block of return maps, with multiplicities in the whole map."""
+    if block is None:
+        return search(matrices)
+
+    def reduced(values: Array) -> tuple[Array, Array]:
+        whole, errors = matrices(values)
+        return block.reduced(whole), block.reduced_error(whole, errors) if errors.ndim == 3 else errors
+
+    found, times = search(reduced), block.repeats
+    crossings = tuple(
+        replace(each, multiplicity=times * each.multiplicity, change=times * each.change) for each in found.crossings
+    )
+    return replace(found, crossings=crossings)
+
 
 SAFETY = 1.5  # factor on the error of a multiplier, for that of its rate of change
 

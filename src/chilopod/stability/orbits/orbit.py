@@ -11,18 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
-from chilopod.flows.arguments import finite_array
+from chilopod.flows.arguments import check_arguments, finite_array
 from chilopod.flows.carrying import TooManySteps
-from chilopod.flows.deadline import Deadline
+from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, shot
-from chilopod.stability.problem.arguments import Budget, check_arguments, check_system
 from chilopod.stability.problem.capabilities import (
     Capabilities,
     SystemLike,
-    given_scale,
+    check_system,
     is_autonomous,
     is_stiff,
     offers,
@@ -245,7 +244,7 @@ def from_known(
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
     # No size is smaller than the state's value, unless the system gives the sizes.
-    if not moved.any() or (given_scale(system) is None and (moved <= _RETURNED * np.abs(x)).all()):
+    if not moved.any() or (not offers(system, "scale") and (moved <= _RETURNED * np.abs(x)).all()):
         return Orbit(x, image, np.zeros(x.size))
     size = sizes(system, x, image.duration)
     off = _relative(moved, size)

@@ -18,8 +18,8 @@ import numpy as np
 from scipy.linalg.lapack import dgesv
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.problem.arguments import Budget
 from chilopod.stability.problem.capabilities import Autonomous, SystemLike, checked_flow, is_autonomous
 from chilopod.stability.problem.returns import NODES, RETURN, Section, carried, crossing, section_at
 

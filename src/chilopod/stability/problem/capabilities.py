@@ -1,4 +1,4 @@
-"""Interfaces of a periodic system: required members (:class:`SystemLike`, :class:`Autonomous`), others; and its sizes.
+"""Interfaces of a periodic system: required members (:class:`SystemLike`, :class:`Autonomous`), others; its sizes.
 
 The optional members are those of :class:`Capabilities`. A missing one and one that is None are the same, so instances
 of one class may differ (as those of :class:`chilopod.stability.PeriodicSystem`).
@@ -9,17 +9,18 @@ derivative has the derivative of state i with respect to state j at the start in
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers, shape_of
-from chilopod.flows.balance import numerical_balance
+from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array
-from chilopod.stability.problem.derivatives import compare, is_new
 
 
 @runtime_checkable
@@ -146,11 +147,6 @@ def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error:
     return state, derivative, error if error.ndim else float(error)
 
 
-def given_scale(system: SystemLike) -> Array | None:
-    """The system's own sizes of its states or None."""
-    return getattr(system, "scale", None)
-
-
 def spatial_symmetries(system: SystemLike) -> tuple[Array, ...]:
     """Generators of the spatial symmetries; may be empty."""
     given = getattr(system, "spatial_symmetry", None)
@@ -172,6 +168,25 @@ def _is_long(system: SystemLike, duration: float) -> bool:
     return period is not None and 2.0 * duration * returns_per_period(system) >= period
 
 
+_SYSTEM = "a system from `from_rhs` or `from_map`, or a PeriodicSystem"
+
+
+def check_system(system: object, field: str = "system", value: object = None) -> None:
+    """Check that an argument is a system or, at a value of the parameter, that a family returned one."""
+    if not all(hasattr(system, name) for name in ("dimension", "period", "symmetry", "flow")):
+        said = "must be a system" if field == "system" else f"must return a system, not {type(system).__name__}"
+        raise ParameterError(said, field=field, value=system if field == "system" else value, allowed=_SYSTEM)
+
+
+def system_of(family: Callable[..., SystemLike], *values: float) -> SystemLike:
+    """System of a family at values of its parameters; raises a ChilopodError if there is none."""
+    value = values[0] if len(values) == 1 else values
+    with UserCode("family", value):
+        system = family(*values)
+    check_system(system, "family", value)
+    return system
+
+
 _PART = 1.0 / 16.0  # part of a return
 _SWEEPS = 3
 
@@ -189,7 +204,7 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     So the coupling gives the size of a state that passes through zero or rests there. (At the end of the return
     strongly damped states would not depend on the others.) Of an orbit that is zero throughout only ratios matter.
     """
-    given = given_scale(system)
+    given = getattr(system, "scale", None)
     if given is not None:
         return given
     later, derivative = checked_flow(system, x, 0.0, _PART * duration)
@@ -205,3 +220,60 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     for _ in range(_SWEEPS):
         size = np.maximum(size, (coupling * size).max(axis=1))
     return np.where(size > 0.0, size, size[size > 0.0].min())
+
+
+_ROUNDING = 8.0 * float(np.finfo(float).eps)
+_STEPS = 1e-5, 1e-7, 1e-9  # steps of differences, relative to each state
+_CONTRADICTS = 1e-3  # least relative error of a derivative that is refused
+_OWN = __name__.partition(".")[0]
+_COMPARED: dict[int, object] = {}  # code by its identity: a family's functions share it
+
+
+def _code(function: Any) -> object:
+    """Code of a function, also of a partial one; the class of another callable object."""
+    while isinstance(function, functools.partial):
+        function = function.func
+    return getattr(function, "__code__", type(function))
+
+
+def is_new(function: Any) -> bool:
+    """True if a user's function was not compared yet."""
+    return id(_code(function)) not in _COMPARED
+
+
+def compare(
+    function: Any, mapped: Callable[[Array], Array], x: Array, state: Array, derivative: Array, field: str
+) -> None:
+    """Compare a function's derivative with differences: along one direction and, if these contradict it, entry by
+    entry.
+
+    Those to both sides differ by curvature, noise or a kink: a smaller error is not refused.
+    """
+    code = _code(function)
+    _COMPARED[id(code)] = code  # first, as the comparison calls the function
+    if str(getattr(function, "__module__", "")).partition(".")[0] == _OWN:
+        return
+    steps = np.where(x != 0.0, np.abs(x), float(np.abs(x).max()) or 1.0)
+
+    def compared(shift: Array) -> tuple[NDArray[np.bool_], Array]:
+        with np.errstate(all="ignore"):
+            up, down = mapped(x + shift), mapped(x - shift)
+            change = 0.5 * (up - down)
+            uncertain = 4.0 * np.abs(up - 2.0 * state + down) + _ROUNDING * x.size * (np.abs(up) + np.abs(down))
+            terms = np.abs(derivative) @ np.abs(shift) + np.abs(change)
+            return np.abs(change - derivative @ shift) > uncertain + _CONTRADICTS * terms, change
+
+    try:
+        if not compared(_STEPS[0] * steps * np.cos(3.0 * np.arange(x.size) + 1.0))[0].any():
+            return
+        columns = [[compared(step * shift) for step in _STEPS] for shift in np.diag(steps)]
+    except ChilopodError:  # an edge of the function's domain
+        return
+    for j, column in enumerate(columns):
+        wrong = np.all([each for each, _ in column], axis=0)
+        if wrong.any():
+            del _COMPARED[id(code)]
+            i = int(wrong.argmax())
+            given, other = derivative[i, j], column[0][1][i] / (_STEPS[0] * steps[j])
+            said = f"derivative entry ({i}, {j}) is {given:g}, but a difference gives {other:g}"
+            raise ParameterError(said, field=field, value=x.tolist(), allowed="d state[i] / d x[j]")

@@ -6,8 +6,8 @@ import contextlib
 from collections.abc import Iterator
 
 from chilopod.errors import AnalysisError, ParameterError, in_words
-from chilopod.stability.problem.arguments import UserCode, UserError, system_of
-from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
+from chilopod.flows.arguments import UserCode, UserError
+from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous, system_of
 
 _KEPT = 64  # cached systems: those around a point are used repeatedly
 

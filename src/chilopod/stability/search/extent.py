@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from chilopod.errors import AnalysisError, ChilopodError
+from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import LONGEST, followed, opened
 from chilopod.stability.branches.branch_starts import begin
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.crossing_points.place import Sample
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import Budget, SpentError
 from chilopod.stability.problem.capabilities import Family, returns_per_period
 from chilopod.stability.search.samples import NEAR_FOLD, Samples
 

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
-from chilopod.flows.balance import numerical_balance
+from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
+from chilopod.flows.carrying import numerical_balance
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.description import described
-from chilopod.stability.crossing_points.place import Course, past_singular, place_error
-from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
+from chilopod.stability.crossing_points.place import Course, crossings_in, orbit_blocks, past_singular, place_error
 from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.arguments import SpentError, UserCode, check_arguments, checked_interval
 from chilopod.stability.problem.capabilities import Family
 from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.search.extent import extent
@@ -27,9 +27,8 @@ from chilopod.stability.search.samples import SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.shown import bounded as bounded_text
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import Event, Matrices
+from chilopod.stability.unit_circle.spectra import Crossing, Event, Matrices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -212,7 +211,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     try:
         blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
         # The first orbit may contract strongly within a return, and followed ones less.
-        uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
+        uncertain = _FOLLOWED * _relative(samples.of_flow())
     except SpentError as error:
         return [(None, Crossings((), SearchStatus.BUDGET, (error.problem,), 0))]
 
@@ -267,11 +266,9 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     return point
 
 
-def _relative(image: ReturnMap, at_least: float = 0.0) -> float:
-    """Error of the derivative over its largest entry, or a lower bound of that, in units that balance the states."""
+def _relative(image: ReturnMap) -> float:
+    """Error of the derivative over its largest entry, or over one, in units that balance the states."""
     # An entry of round-off gives no information on the units.
     units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
-    largest = max(at_least, float(np.abs(image.jacobian * units / units[:, None]).max()))
-    if not largest > 0.0:
-        return _LEAST_ERROR
+    largest = max(1.0, float(np.abs(image.jacobian * units / units[:, None]).max()))
     return max(_LEAST_ERROR, float(np.max(image.error * units / units[:, None])) / largest)

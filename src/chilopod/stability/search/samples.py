@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.arguments import UserCode
+from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.problem.arguments import Budget, SpentError, UserCode
 from chilopod.stability.problem.capabilities import Family, SystemLike, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
 from chilopod.stability.search.checked_family import CheckedFamily

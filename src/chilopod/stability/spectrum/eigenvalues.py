@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from chilopod.flows.balance import numerical_balance
+from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.problem.returns import ReturnMap
 

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg.lapack import dgeqrf, dorgqr
 
 from chilopod.errors import AnalysisError
-from chilopod.flows.balance import numerical_balance
+from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.problem.capabilities import Capabilities, SystemLike, is_autonomous, sizes
 from chilopod.stability.problem.returns import ReturnMap, flow_with_error

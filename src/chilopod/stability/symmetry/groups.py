@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.balance import numerical_balance
+from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, read_only
 from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 

@@ -12,8 +12,8 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
-from chilopod.stability.problem.arguments import Budget
 from chilopod.stability.tracing import tolerances
 
 

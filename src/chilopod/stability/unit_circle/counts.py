@@ -10,8 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Crossing, Root, critical_at, rooted, tolerances
-from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
+from chilopod.stability.unit_circle.spectra import (
+    LOST,
+    UNKNOWN,
+    Crossing,
+    Event,
+    Root,
+    Spectra,
+    critical_at,
+    margins,
+    rooted,
+    tolerances,
+)
 from chilopod.stability.unit_circle.zeros import Interval, between
 
 _CLEARLY, _ROOM = 1e-5, 1e3  # distance from the circle, and multiple of errors elsewhere, that needs no error estimate

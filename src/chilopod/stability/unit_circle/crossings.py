@@ -17,8 +17,18 @@ from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.stability.unit_circle.counts import Accounts, Report
-from chilopod.stability.unit_circle.critical import LOST, Crossing, Root, rooted
-from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, Spectra, factors, margins
+from chilopod.stability.unit_circle.spectra import (
+    LOST,
+    TARGETS,
+    Crossing,
+    Event,
+    Matrices,
+    Root,
+    Spectra,
+    factors,
+    margins,
+    rooted,
+)
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
 BUDGET = 5000  # default budget of matrices of a search
