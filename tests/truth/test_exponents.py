@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError
 from chilopod.stability import PeriodicSystem, exponents
-from chilopod.stability.spectrum.splitting import split_leading
+from chilopod.stability.spectrum import split_leading
 from helpers.systems import linear
 
 PERIOD = 2 * pi

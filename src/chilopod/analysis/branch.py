@@ -27,7 +27,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, switch
 from chilopod.stability.branches.branch import LONGEST
-from chilopod.stability.spectrum.eigenvalues import VERDICTS
+from chilopod.stability.spectrum import VERDICTS
 
 TOLERANCE = 1e-10
 """Tolerance of the nonlinear flow along a branch; orbits are accurate to 1e-10 (the tests compare 1e-9 with 1e-14)."""

@@ -12,7 +12,7 @@ import numpy as np
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.notebook import Summary, axes_for
 from chilopod.stability.shown import number
-from chilopod.stability.spectrum.eigenvalues import VERDICTS, stable_within
+from chilopod.stability.spectrum import VERDICTS, stable_within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

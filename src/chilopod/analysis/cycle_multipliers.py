@@ -24,7 +24,7 @@ from chilopod.errors import AnalysisError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
-from chilopod.stability.spectrum.eigenvalues import eigensystem
+from chilopod.stability.spectrum import eigensystem
 from chilopod.statistics import LEVEL
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Kind, Point2
-from chilopod.stability.spectrum.eigenvalues import VERDICTS
+from chilopod.stability.spectrum import VERDICTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

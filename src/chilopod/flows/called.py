@@ -56,8 +56,7 @@ class CalledFlow:
     rhs: Callable[..., ArrayLike]
     args: tuple[Any, ...]
     edges: Array  # times from 0 to the period at which the integration stops and starts anew
-    # borders of the parts of the period with fast changes of the function, shape (parts, 2): steps are limited there
-    fast: Array
+    fast: Array  # borders of the parts of the period with fast changes, where steps are limited, shape (parts, 2)
     times: Array  # one inside every interval between edges
     reason: str  # obstacle to tracing the function
     tolerance: float  # local error per step
@@ -266,8 +265,8 @@ def _fourth_differences(samples: Array) -> Array:
 
 def _zoom(values: Callable[[float], Array], low: float, high: float, width: float, smallest: float) -> float | None:
     """Place of a function's jump in an interval, to within ``width``; None if the function is smooth there."""
-    settled = np.inf
-    for zoom in itertools.count():
+    zoom, settled = 0, np.inf
+    while high - low >= width:
         times = np.linspace(low, high, 17)
         rough = _fourth_differences(np.array([values(t) for t in times]))
         i = int(rough.argmax())
@@ -275,7 +274,5 @@ def _zoom(values: Callable[[float], Array], low: float, high: float, width: floa
             settled = rough[i]
         if rough[i] < smallest or (zoom > _SETTLED and rough[i] < 0.3 * settled):
             return None
-        low, high = float(times[i]), float(times[i + 4])
-        if high - low < width:
-            return 0.5 * (low + high)
-    raise AssertionError  # unreachable
+        low, high, zoom = float(times[i]), float(times[i + 4]), zoom + 1
+    return 0.5 * (low + high)

@@ -19,12 +19,11 @@ from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
-from chilopod.stability.problem.capabilities import SystemLike, check_system, is_autonomous, is_stiff, offers
+from chilopod.stability.problem.capabilities import SystemLike, check_system, is_autonomous, offers
 from chilopod.stability.problem.returns import return_maps
 from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
-from chilopod.stability.spectrum.eigenvalues import VERDICTS, phased, spectrum, stable_within
-from chilopod.stability.spectrum.splitting import moderate_cut, split_product, split_stiff
+from chilopod.stability.spectrum import VERDICTS, phased, spectrum, split_return, stable_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -218,12 +217,7 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: fl
     with Deadline(seconds):
         found = find_orbit(system, orbit)
         image = found.image
-        if is_stiff(system, found.state, image.duration):
-            log_nu, modes, moved = split_stiff(system, found.state, image)
-        else:
-            cut = moderate_cut(system, found.state, image)
-            log_nu, modes, moved = split_product(cut.factors, cut.errors)
-            modes = cut.basis @ modes
+        log_nu, modes, moved = split_return(system, found.state, image)
     bound = image.returns * (moved + 4.0 * _EPSILON * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k, with the imaginary part in (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))

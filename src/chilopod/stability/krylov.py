@@ -33,7 +33,7 @@ from chilopod.stability.problem.returns import (
     section_at,
     turned,
 )
-from chilopod.stability.spectrum.eigenvalues import FIRST_ORDER, eigensystem, eigenvalue_errors
+from chilopod.stability.spectrum import FIRST_ORDER, eigensystem, eigenvalue_errors
 
 LARGE = 100  # number of states from which a few directions are cheaper than the whole derivative
 

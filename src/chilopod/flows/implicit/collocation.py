@@ -37,8 +37,7 @@ _NOISE = 2.0**-51  # round-off relative to the terms whose difference is the err
 class Control(NamedTuple):
     """Step control of an integration over an interval of time on which the right-hand side is smooth."""
 
-    # start and end
-    t0: float
+    t0: float  # start and end
     t1: float
     longest: float  # longest step
     branches: Any  # branches of the switches, shape (switches,)
@@ -53,9 +52,8 @@ class Outcome(NamedTuple):
     """Results that an integration fills in, in units of the states."""
 
     derivative: Any  # shape (n, n), multiplied by the derivative; shape (0, 0) for none
-    # largest moduli of the states and of the entries of the derivative so far, shapes (n,) and as `derivative`
-    largest: Any
-    extent: Any
+    largest: Any  # largest moduli of the states so far, shape (n,)
+    extent: Any  # and of the entries of the derivative
     report: Any  # number of steps, time reached, and logarithm of the growth of volume, which is added, shape (3,)
 
 
@@ -83,12 +81,10 @@ class Method(NamedTuple):
 class Step(NamedTuple):
     """A step with s stages."""
 
-    # f and its jacobian at the start, shapes (n,) and (n, n)
-    slope: Any
+    slope: Any  # f and its jacobian at the start, shapes (n,) and (n, n)
     jacobian: Any
     moved: Any  # states of the stages less the state at the start, shape (s, n)
-    # f and its jacobian in the stages, shapes (s, n) and (s, n, n)
-    slopes: Any
+    slopes: Any  # f and its jacobian in the stages, shapes (s, n) and (s, n, n)
     jacobians: Any
     matrix: Any  # matrix of Newton's method, shape (s n, s n), overwritten by its elimination
     columns: Any  # derivative of the stages with respect to the state at the start, shape (s n, n)

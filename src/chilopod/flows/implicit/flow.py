@@ -36,10 +36,8 @@ class ImplicitFlow(ReadOnlyArrays):
     tape: Tape  # the right-hand side, without events; it may switch in time, not in the state
     params: Array  # values of its parameters
     edges: Array  # times from 0 to the period that no step may straddle
-    # borders of the parts of the period with fast changes of the function, shape (parts, 2): steps are limited there
-    fast: Array
-    # estimated error of a step relative to the size of each state and entry of the derivative; the error is far smaller
-    tolerance: float
+    fast: Array  # borders of the parts of the period with fast changes, where steps are limited, shape (parts, 2)
+    tolerance: float  # estimated error of a step, far above the error, relative to every state and derivative
 
     def __post_init__(self) -> None:
         if not can_be_implicit(self.tape):

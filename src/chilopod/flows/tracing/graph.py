@@ -82,29 +82,19 @@ class Graph:
 
     def linear(self, terms: Sequence[tuple[int, int]]) -> int:
         """A sum of nodes with constant weights."""
-        constant = 0.0
+        constant, one = 0.0, self.number(1.0)
         kept: dict[int, int] = {}
         for weight, node in terms:
             w, v = self.value(weight), self.value(node)
-            if w == 0.0:
-                continue
             if w is not None and v is not None:
                 constant += w * v
                 continue
             if v is not None:
-                weight, node, w, v = node, weight, v, w  # a number times a parameter
-                if w == 0.0:
-                    continue
+                weight, node = node, weight  # a number times a parameter
             if node in kept:
-                other = self.value(kept[node])
-                if w is not None and other is not None:
-                    kept[node] = self.number(w + other)
-                    if w + other == 0.0:
-                        del kept[node]
-                    continue
-                weight = self.linear([(self.number(1.0), kept[node]), (self.number(1.0), weight)])
-            kept[node] = weight
-        one = self.number(1.0)
+                weight = self.linear([(one, kept.pop(node)), (one, weight)])
+            if self.value(weight) != 0.0:
+                kept[node] = weight
         if not kept:
             return self.number(constant)
         if constant != 0.0:

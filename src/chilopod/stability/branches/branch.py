@@ -32,7 +32,7 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.problem.returns import carried, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
-from chilopod.stability.spectrum.eigenvalues import VERDICTS
+from chilopod.stability.spectrum import VERDICTS
 from chilopod.stability.tracing.equations import Step
 from chilopod.stability.tracing.tolerances import SHORTEST
 from chilopod.stability.tracing.tracer import Ending, outward, trace
@@ -57,6 +57,7 @@ _GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happe
 _AHEAD = 10.0 * SHORTEST * LONGEST  # distance ahead of a lost curve's end at which an orbit is past a grazing
 _JUMPS, _SMOOTH = 0.3, 0.1  # change of the derivative, relative to it, in a grazing; and largest part of it before
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
+_FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]
@@ -311,6 +312,24 @@ def followed(
             remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
     said = tuple(dict.fromkeys(remarks))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
+
+
+def find_fold(
+    family: Family, value: float, orbit: Array, scale: float, rising: bool = True, budget: Budget | None = None
+) -> BifurcationPoint | None:
+    """Follow an orbit, with the systems' symmetry in time, round the next fold; None without one.
+
+    The orbit must not be in the fold: a curve that starts there does not pass it. The search extends as far as
+    ``scale``, to higher values if ``rising``, else to lower ones.
+    """
+    between = value - scale, value + scale
+    with contextlib.suppress(ChilopodError):
+        curve = Curve(family, 2.0 * scale, between=between, symmetric=True, budget=budget or Budget(np.inf))
+        with curve.budget:
+            start = begin(family, value, orbit, rising, symmetric=True)
+            branch = followed(curve, *opened(curve, start, _FIRST), LONGEST, _FOLD_STEPS, False, until=Kind.FOLD)
+            return next((each.bifurcation for each in branch.special_points if each.special is Kind.FOLD), None)
+    return None
 
 
 def _at_event(curve: Curve, last: BranchPoint) -> bool:

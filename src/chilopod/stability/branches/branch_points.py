@@ -22,7 +22,7 @@ from chilopod.stability.problem.returns import (
     section_at,
     whole_period,
 )
-from chilopod.stability.spectrum.eigenvalues import stable_within
+from chilopod.stability.spectrum import stable_within
 from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.tracing.equations import Before
 
@@ -73,13 +73,10 @@ class Anchor(ReadOnlyArrays):
     """A point from which steps start: see :class:`chilopod.stability.tracing.equations.Anchor`."""
 
     last: BranchPoint  # the point
-    # Jacobian of [H - x; tangent . step] with respect to state and parameter in units, shape (n+1, n+1).
-    matrix: Array
+    matrix: Array  # Jacobian of [H - x; tangent . step] by state and parameter, in units, shape (n+1, n+1)
     before: Before | None = None  # previous point in coordinates of this one
-    # Section of returns during the step, for a system without a period of its own.
-    section: Section | None = None
-    # Projection onto the states with the orbit's spatial symmetries, shape (n, n); None if there are none.
-    space: Array | None = None
+    section: Section | None = None  # section of returns during the step, for a system without a period of its own
+    space: Array | None = None  # projection onto the states with the orbit's spatial symmetries, if any, shape (n, n)
     leaving: bool = False  # True at a branch point: the matrix then belongs to a place ahead
     lengthening: float = 0.0  # relative change of the period along the curve
 

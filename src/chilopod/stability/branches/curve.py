@@ -28,7 +28,7 @@ from chilopod.stability.floquet import full_period
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 from chilopod.stability.problem.capabilities import checked_flow, is_autonomous, offers
 from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
-from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
+from chilopod.stability.spectrum import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
 
@@ -121,12 +121,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return Anchor(last, matrix, Before(back, tangent, matrix_before), section, space, leaving, lengthening)
 
     def parameters(self, anchor: Anchor) -> tuple[slice, Array]:
-        """Index of the parameter among the coordinates, and its unit."""
         n = anchor.last.orbit.size
         return slice(n, n + 1), np.array([self.scale])
 
     def residual(self, anchor: Anchor, moved: Array, values: Array) -> tuple[Returned, Array]:
-        """The return of a state, and H - x in units."""
         sizes, space, value = self.units(moved.size - 1)[:-1], anchor.space, float(values[0])
         x = anchor.last.orbit + sizes * moved[:-1]
         if space is not None:

@@ -25,11 +25,11 @@ from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, Within, special_point
-from chilopod.stability.crossing_points.description import ContinuumError
-from chilopod.stability.crossing_points.place import crossings_in
+from chilopod.stability.crossing_description import ContinuumError
+from chilopod.stability.crossing_place import crossings_in
 from chilopod.stability.problem.capabilities import offers
 from chilopod.stability.problem.returns import ReturnMap
-from chilopod.stability.spectrum.eigenvalues import spectrum
+from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.equations import Step, predicted
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings

@@ -14,8 +14,8 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.crossing_points.description import described
-from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, orbit_blocks, past_singular, place_error
+from chilopod.stability.crossing_description import described
+from chilopod.stability.crossing_place import SAFETY, Course, Sample, orbit_blocks, past_singular, place_error
 from chilopod.stability.orbits.orbit import Orbit, bounded, searched_orbit
 from chilopod.stability.points import Kind
 from chilopod.stability.problem.returns import ReturnMap

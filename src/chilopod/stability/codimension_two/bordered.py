@@ -189,16 +189,13 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return Spot(**vars(at), matrix=np.vstack([matrix, tangent]), tangent=tangent, uncertainty=self._uncertainty(at))
 
     def parameters(self, anchor: Spot) -> tuple[slice, Array]:
-        """Indices of the parameters among the coordinates, and their units."""
         return anchor.frame.parameters, anchor.frame.widths
 
     def residual(self, anchor: Spot, moved: Array, values: Array) -> tuple[Evaluated, Array]:
-        """The equations at a displacement."""
         at = self.evaluated(replace(anchor.frame.moved(anchor.place, moved), values=values), anchor.frame)
         return at, at.residual
 
     def off(self, found: Evaluated, residual: Array, move: Array) -> float:
-        """Largest correction."""
         return float(np.abs(move).max())
 
     def met(self, anchor: Spot, found: Evaluated, off: float, stalled: int, singular: bool) -> bool:
@@ -206,7 +203,6 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return off <= ROUND_OFF or (off <= SETTLED and stalled >= _STALLED)
 
     def step(self, anchor: Spot, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Spot, Evaluated]:
-        """The point of the curve near a guess."""
         solved = self.corrected(anchor, guess, plane)
         missed = float(np.linalg.norm(solved.moved - guess.moved))
         return Step(anchor, solved.moved, solved.found, anchor.tangent, anchor.matrix, solved.corrections, missed)

@@ -20,11 +20,11 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Spot
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
-from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates
+from chilopod.stability.normal_forms.manifold import CriticalOrbit, ReturnedStates
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.problem.returns import returned_states
-from chilopod.stability.spectrum.eigenvalues import spectrum
+from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.tracing.equations import Step
 from chilopod.stability.tracing.tracer import Parts

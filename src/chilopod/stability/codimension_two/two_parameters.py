@@ -24,7 +24,6 @@ from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
-from chilopod.stability.normal_forms.center_manifold import displacements
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.problem.capabilities import offers, sizes, system_of
 from chilopod.stability.problem.returns import return_duration, whole_period
@@ -287,7 +286,7 @@ class _Unfolding:
             return None
         base = self._equations.along(spot, away)
         place = spot.frame.moved(base.place, across * self._response)
-        bent = displacements(self.at, fifth.curve, np.array(a, dtype=np.complex128))
+        bent = self.at.displacements(fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
 
 

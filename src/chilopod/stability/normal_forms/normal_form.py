@@ -14,19 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.labels import Labelled
-from chilopod.stability.normal_forms.center_manifold import (
-    CriticalOrbit,
-    Curve,
-    Manifold,
-    Powers,
-    ReturnedStates,
-    Sampled,
-    Term,
-    displacements,
-    images,
-    turns,
-)
-from chilopod.stability.spectrum.eigenvalues import spectrum
+from chilopod.stability.normal_forms.manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, Sampled, Term
+from chilopod.stability.spectrum import spectrum
 
 _TRIALS = 40  # largest number of sampled amplitudes
 _SHARE = 0.03  # wanted departure of the map from its linear part, relative to the amplitude
@@ -66,7 +55,7 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
     The search lowers the amplitude where the map is far from its linear part, raises it where the noise hides the
     nonlinear terms, bends the curve along the centre manifold, and continues while the error of the coefficient falls.
     """
-    third: Powers = (3, 0) if at.real else (2, 1)
+    third = (3, 0) if at.real else (2, 1)
     manifold = Manifold(mapped, at, 3)
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
     best = None
@@ -127,8 +116,8 @@ def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: 
         factor *= _LONG_UP
         if factor * radius >= high:
             break
-        shift = displacements(at, curve, factor * radius * turns(at))
-        image = images(mapped, at, shift)
+        shift = at.displacements(curve, factor * radius * at.turns())
+        image = at.images(mapped, shift)
         if image is None:
             break
         size = np.abs(at.state) + np.abs(shift) @ reach.T
@@ -251,7 +240,7 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic
     """Error d along the mode of an orbit with this residual, where H - 1 is singular: beside the symmetric orbit of a
     pitchfork the residual is at least cubic d^3, with an apparent quadratic term 3 cubic d; beside a transcritical
     point it is quadratic d^2."""
-    image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
+    image = None if at.multiplier.real < 0.0 else at.images(mapped, np.zeros((1, at.state.size)))
     if image is None:
         return 0.0
     rounding = 2.0 * float(np.finfo(float).eps)

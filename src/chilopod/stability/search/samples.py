@@ -13,12 +13,11 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
-from chilopod.stability.crossing_points.place import Sample, through
-from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, searched_orbit
+from chilopod.stability.crossing_place import Sample, through
+from chilopod.stability.orbits.orbit import from_known, known_state, near_orbit, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.problem.capabilities import Family, SystemLike, sizes
+from chilopod.stability.problem.capabilities import CheckedFamily, Family, SystemLike, sizes
 from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
-from chilopod.stability.search.checked_family import CheckedFamily
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -80,7 +79,7 @@ class Samples:
         self.budget.left = self._allowed
         self.known = guess is None and self.family.timed
         if not self.known:
-            self._keep(_sample(low, self.first))
+            self._keep(Sample(low, self.first.state, self.first.image))
         with self.budget:
             self.path = [] if self.known else self._to_merging(self._followed())
         self.end = self.path[-1].value if self.path else high
@@ -142,7 +141,7 @@ class Samples:
 
     def of_flow(self) -> ReturnMap:
         """The return map at the first orbit, with the error of the flow alone."""
-        if _sample(self.low, self.first).off_plus_one > NEAR_FOLD:
+        if Sample(self.low, self.first.state, self.first.image).off_plus_one > NEAR_FOLD:
             return self.first.image  # the orbit is as accurate as the flow
         return return_map(self.family(self.low), self.first.state, True, self.first.section)
 
@@ -165,7 +164,8 @@ class Samples:
             states = [known_state(system) for system in systems]
             images = return_maps(systems, states)
         for value, system, state, image in zip(values, systems, states, images, strict=True):
-            self._keep(_sample(value, from_known(system, state, image=image, budget=self.budget)))
+            orbit = from_known(system, state, image=image, budget=self.budget)
+            self._keep(Sample(value, orbit.state, orbit.image))
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
         """A sample near a state, with about the period of a neighbouring sample."""
@@ -173,7 +173,8 @@ class Samples:
         system = self.family(value)
         with self.family.calling(value):
             start, section = self._start(system, near, beside.image.duration)
-            return _sample(value, near_orbit(system, start, False, self.budget, section, units=self.size))
+            orbit = near_orbit(system, start, False, self.budget, section, units=self.size)
+        return Sample(value, orbit.state, orbit.image)
 
     def _start(self, system: SystemLike, near: Array, duration: float) -> tuple[Nodes, Section | None]:
         """A state as a guess, and the section there, with one normal while that serves, so that orbits are smooth."""
@@ -347,10 +348,6 @@ class Samples:
                 return bool(np.isfinite(before))
             left, right = (left, middle) if middle.passes(left) else (middle, right)
         return True
-
-
-def _sample(value: float, orbit: Orbit) -> Sample:
-    return Sample(value, orbit.state, orbit.image)
 
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:

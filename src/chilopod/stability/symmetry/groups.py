@@ -42,8 +42,7 @@ class Group(ReadOnlyArrays):
 
     generators: Array  # shape (generators, n, n)
     elements: Array  # all of them, the identity first, shape (order, n, n)
-    # coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both
-    to_orthogonal: Array
+    to_orthogonal: Array  # to coordinates y in which every element is an orthogonal matrix, and back, shape (n, n) both
     from_orthogonal: Array
     # scales of the coordinates x, shape (n,): entry (i, j) of an element is of the order of scales[i] / scales[j] at
     # most; without meaning between coordinates that no element mixes

@@ -42,8 +42,7 @@ class Block(ReadOnlyArrays):
     basis: Array
     dual: Array  # left inverse of the basis, zero on the other blocks, shape (m d, n)
     representation: Array  # orthogonal matrices rho(P) of the elements, shape (order, d, d)
-    # truth values, shape (order,), of elements that act as the identity: new orbits keep them
-    kernel: NDArray[np.bool_]
+    kernel: NDArray[np.bool_]  # True for elements that act as the identity, which new orbits keep, shape (order,)
 
     @property
     def dimension(self) -> int:

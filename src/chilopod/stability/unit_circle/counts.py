@@ -10,19 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chilopod.stability.unit_circle.spectra import (
-    LOST,
-    UNKNOWN,
-    Crossing,
-    Event,
-    Root,
-    Spectra,
-    critical_at,
-    margins,
-    rooted,
-    tolerances,
-)
+from chilopod.stability.unit_circle.spectra import UNKNOWN, Crossing, Event, Root, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
+
+LOST = "multipliers near the circle are known no better than their distance from it"
 
 _CLEARLY, _ROOM = 1e-5, 1e3  # distance from the circle, and multiple of errors elsewhere, that needs no error estimate
 _GREY = 32.0  # distance from the circle, in errors, up to which a multiplier may have left it or not
@@ -150,7 +141,7 @@ class Accounts:
         if gap.x is None or gap.y is None:
             # As if the multipliers continued in their direction.
             number = sum(crossing.multiplicity for crossing in crossings)
-            surely = int((self._spectra.margins(root.place) > tolerances(self._spectra, root)).sum())
+            surely = int((self._spectra.margins(root.place) > self._spectra.tolerances(root)).sum())
             outside = gap.before - surely
             change = (2 * outside - number) * (1 if gap.x is None else -1) if 0 <= outside <= number else 0
             return [replace(crossing, change=change) for crossing in crossings]
@@ -201,7 +192,7 @@ class Accounts:
     def _critical(self, root: Root) -> list[Crossing]:
         key = root, len(self._spectra.values)  # all information on the multipliers beside a root
         if key not in self._known:
-            self._known[key] = critical_at(self._spectra, root)
+            self._known[key] = self._spectra.critical_at(root)
         return self._known[key]
 
     def _is_critical(self, root: Root) -> bool:
@@ -209,7 +200,7 @@ class Accounts:
 
     def _lost(self, root: Root) -> bool:
         """Remark on a root that is rejected only because the multipliers there are unknown; return False."""
-        if self._spectra.exists(root.place) and float(tolerances(self._spectra, root).max()) > UNKNOWN:
+        if self._spectra.exists(root.place) and float(self._spectra.tolerances(root).max()) > UNKNOWN:
             gap = root.left, root.right
             if gap not in self._settled and not (root.touch and root.event is not None):
                 self._remark(LOST, gap)
@@ -242,7 +233,7 @@ class Accounts:
 
             if spectra.holes(x, y) or spectra.left <= 0 or margin(x) * margin(y) >= 0.0:
                 break  # the last one: the errors were larger than their bounds
-            root = rooted(spectra, margin, x, y, None)
+            root = spectra.rooted(margin, x, y, None)
             if not spectra.exists(root.place):
                 break
             if self._jumps(root.place, rank):

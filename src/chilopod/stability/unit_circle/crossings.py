@@ -16,19 +16,8 @@ import numpy as np
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
-from chilopod.stability.unit_circle.counts import Accounts, Report
-from chilopod.stability.unit_circle.spectra import (
-    LOST,
-    TARGETS,
-    Crossing,
-    Event,
-    Matrices,
-    Root,
-    Spectra,
-    factors,
-    margins,
-    rooted,
-)
+from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
+from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event, Matrices, Root, Spectra, factors, margins
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
 BUDGET = 5000  # default budget of matrices of a search
@@ -277,7 +266,7 @@ class _Finder:
             # Zero within the digits of the place, or where there is no matrix.
             return found if abs(found) > slope * max(within, _DIGITS * abs(place)) else 0.0
 
-        return rooted(self.spectra, value, left, right, event, within)
+        return self.spectra.rooted(value, left, right, event, within)
 
     def _between(self, piece: Interval) -> str:
         return between(*map(self.shown, piece))

@@ -17,7 +17,7 @@ from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
-from chilopod.stability.spectrum.eigenvalues import DRAWS, SAFETY, disturbed
+from chilopod.stability.spectrum import DRAWS, SAFETY, disturbed
 
 Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
@@ -30,6 +30,10 @@ _LARGEST = 1e150  # modulus to which larger multipliers are reduced
 _TURNING = 1e-6  # least imaginary part of a complex multiplier, relative to its size
 _SMALL = 1e-3  # modulus of multipliers that are far inside the circle
 _SPARE = 8  # number of factors, beside the idle ones, in the sum over factors to leave out
+UNKNOWN = 1.0  # error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined
+_EPSILON = float(np.finfo(float).eps)
+_ULPS = 64.0
+_TELLING = 0.01  # error of a margin, from -1 to 1, that determines the multiplier's side
 _FILL = 1e-30  # value in place of zeros, relative to the largest entry, for the balance of a triangular matrix
 
 
@@ -49,10 +53,35 @@ def distances(nu: ComplexArray, event: Event) -> Array:
     return np.asarray(np.abs(np.abs(nu) - 1.0) if event is Event.PAIR else np.abs(nu - TARGETS[event]))
 
 
+class Root(NamedTuple):
+    """A place where a multiplier may be critical, with its enclosing interval."""
+
+    place: float
+    left: float
+    right: float
+    event: Event | None  # event whose function vanishes; None if a multiplier was followed by its rank
+    touch: bool = False  # the function does not change sign
+    known: tuple[float, float] = (0.0, 0.0)  # interval without another root of the event, if known
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Multipliers on the unit circle at a value of the parameter."""
+
+    value: float
+    bracket: tuple[float, float]  # interval of the root finder around the value, without errors of the matrices
+    event: Event
+    multiplicity: int  # number of multipliers on the circle, counting both of a pair
+    change: int  # rise of the number outside; 0 for a touch; at an end of the interval for a continued motion
+    multiplier: complex  # critical multiplier, the one with positive imaginary part of a pair
+    collision: bool = False  # True if they meet on the circle and leave it, or come back: a conservative family
+    around: tuple[float, float] = (0.0, 0.0)  # evaluated values on both sides without another root, if known
+
+
 class Spectra:
     """Eigenvalues of a family of matrices M, each computed once.
 
-    Errors come from random changes of M within its errors (:mod:`chilopod.stability.spectrum.eigenvalues`). The
+    Errors come from random changes of M within its errors (:mod:`chilopod.stability.spectrum`). The
     relative error of an entry multiplies the geometric mean of the largest entries of its row and column, in units that
     balance M: this does not depend on the units, and keeps a small multiplier beside a huge one if the matrix separates
     them. M is evaluated at up to ``budget`` values, twice where errors matter, or ``affordable()`` more.
@@ -233,6 +262,72 @@ class Spectra:
             largest = np.fmax.reduce(np.log(np.abs(moved)) + top, axis=1, initial=-np.inf)
         return np.asarray(largest - self._bounds(values, event) + np.log(SAFETY))
 
+    def rooted(
+        self, function: Callable[[float], float], a: float, b: float, event: Event | None, within: float = 0.0
+    ) -> Root:
+        """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
+        most = min(200, max(self.left, 1))
+        finest = max(within, 5e-324)
+        place = float(brentq(function, a, b, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
+        reach = within + 4.0 * _EPSILON * abs(place)
+        return Root(place, max(place - reach, a), min(place + reach, b), event, known=(a, b))
+
+    def tolerances(self, root: Root) -> Array:
+        """Largest margins of multipliers that may be on the circle at a root, shape (m,)."""
+        ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
+        left, right = self.beside(root.place, ulps)
+        errors = self.margin_errors(root.place)
+        if left != right:
+            changes = np.abs(self.margins(right) - self.margins(left))
+            reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
+            errors = errors + changes * min(reach / (right - left), 1.0)
+        if errors.max() <= _TELLING:
+            return np.asarray(errors)
+        # Where the orbit is uncertain, multipliers lie between those of the nearest certain places, or between one such
+        # place and an end of the interval.
+        here = bisect.bisect_left(self.values, root.place)
+        sides = [
+            next((v for v in near if self.margin_errors(v).max() <= _TELLING), None)
+            for near in (self.values[:here][::-1], self.values[here:])
+        ]
+        telling = [side for side in sides if side is not None]
+        if not telling:
+            return np.asarray(errors)
+        first, last = (self.margins(root.place if side is None else side) for side in sides)
+        apart = np.max([self.margin_errors(side) for side in telling], axis=0)
+        return np.minimum(errors, apart + np.abs(last - first))
+
+    def critical_at(self, root: Root) -> list[Crossing]:
+        """Crossings at a root, by place on the circle, without multipliers that rest there; changes are unknown yet."""
+        nu = self.at(np.array([root.place]))[0]
+        allowed = self.tolerances(root)
+        critical = np.abs(self.margins(root.place)) <= allowed
+        if root.event is None:
+            # No function vanishes here: an undetermined multiplier does not count as critical.
+            critical &= allowed <= UNKNOWN
+        rest, found = nu[critical], []
+        conservative, bracket, around = self.conservative, (root.left, root.right), root.known
+        for event, target in TARGETS.items():
+            if not rest.size:
+                break
+            reach = self.factor_sizes(root.place, event)[1][: rest.size].max() + allowed.max()
+            # A real multiplier on the circle is +1 or -1. For any errors, a critical one is so at the nearer of the
+            # two.
+            near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
+            number = int(near.sum()) - self.idle[event]
+            if number > 0 and (not conservative or root.event in (event, None)):
+                best = complex(rest[near][np.abs(rest[near] - target).argmin()])
+                meeting = conservative and number % 2 == 0
+                found.append(Crossing(root.place, bracket, event, number, 0, best, meeting, around))
+            rest = rest[~near]
+        upper = rest[rest.imag > 0.0]
+        if conservative:
+            upper = _meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
+        if upper.size:
+            best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
+            found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative, around))
+        return found
+
 
 def margins(nu: ComplexArray) -> Array:
     """tanh(ln |nu|), falling along the last axis: the distance from the circle near it, -1 for 0, 1 for infinity."""
@@ -288,6 +383,15 @@ def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, second
 
 
+def _meeting(upper: ComplexArray) -> ComplexArray:
+    """The two nearest to each other."""
+    if upper.size < 2:
+        return upper[:0]
+    first, second = np.triu_indices(upper.size, 1)
+    nearest = int(np.abs(upper[first] - upper[second]).argmin())
+    return upper[[first[nearest], second[nearest]]]
+
+
 def _stretches(balanced: Array) -> Array:
     """Logarithms of det(1 + M^T M)^(1/2), M balanced: a positive, analytic divisor that exceeds its dividend."""
     one = np.broadcast_to(np.eye(balanced.shape[-1]), balanced.shape)
@@ -306,115 +410,3 @@ def _eigenvalues(balanced: Array) -> ComplexArray:
     graded = balanced[each[..., None], order[:, :, None], order[:, None, :]]
     nu = np.linalg.eigvals(graded).astype(np.complex128)
     return np.asarray(nu[each, np.argsort(-np.abs(nu), axis=-1)])
-
-
-UNKNOWN = 1.0  # error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined
-
-LOST = "multipliers near the circle are known no better than their distance from it"
-
-_EPSILON = float(np.finfo(float).eps)
-_ULPS = 64.0
-_TELLING = 0.01  # error of a margin, from -1 to 1, that determines the multiplier's side
-
-
-class Root(NamedTuple):
-    """A place where a multiplier may be critical, with its enclosing interval."""
-
-    place: float
-    left: float
-    right: float
-    event: Event | None  # event whose function vanishes; None if a multiplier was followed by its rank
-    touch: bool = False  # the function does not change sign
-    known: tuple[float, float] = (0.0, 0.0)  # interval without another root of the event, if known
-
-
-def rooted(
-    spectra: Spectra, function: Callable[[float], float], a: float, b: float, event: Event | None, within: float = 0.0
-) -> Root:
-    """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
-    most = min(200, max(spectra.left, 1))
-    finest = max(within, 5e-324)
-    place = float(brentq(function, a, b, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
-    reach = within + 4.0 * _EPSILON * abs(place)
-    return Root(place, max(place - reach, a), min(place + reach, b), event, known=(a, b))
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """Multipliers on the unit circle at a value of the parameter."""
-
-    value: float
-    bracket: tuple[float, float]  # interval of the root finder around the value, without errors of the matrices
-    event: Event
-    multiplicity: int  # number of multipliers on the circle, counting both of a pair
-    change: int  # rise of the number outside; 0 for a touch; at an end of the interval for a continued motion
-    multiplier: complex  # critical multiplier, the one with positive imaginary part of a pair
-    collision: bool = False  # True if they meet on the circle and leave it, or come back: a conservative family
-    around: tuple[float, float] = (0.0, 0.0)  # evaluated values on both sides without another root, if known
-
-
-def tolerances(spectra: Spectra, root: Root) -> Array:
-    """Largest margins of multipliers that may be on the circle at a root, shape (m,)."""
-    ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
-    left, right = spectra.beside(root.place, ulps)
-    errors = spectra.margin_errors(root.place)
-    if left != right:
-        changes = np.abs(spectra.margins(right) - spectra.margins(left))
-        reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
-        errors = errors + changes * min(reach / (right - left), 1.0)
-    if errors.max() <= _TELLING:
-        return np.asarray(errors)
-    # Where the orbit is uncertain, multipliers lie between those of the nearest certain places, or between one such
-    # place and an end of the interval.
-    here = bisect.bisect_left(spectra.values, root.place)
-    sides = [
-        next((v for v in near if spectra.margin_errors(v).max() <= _TELLING), None)
-        for near in (spectra.values[:here][::-1], spectra.values[here:])
-    ]
-    telling = [side for side in sides if side is not None]
-    if not telling:
-        return np.asarray(errors)
-    first, last = (spectra.margins(root.place if side is None else side) for side in sides)
-    apart = np.max([spectra.margin_errors(side) for side in telling], axis=0)
-    return np.minimum(errors, apart + np.abs(last - first))
-
-
-def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
-    """Crossings at a root, by place on the circle, without multipliers that rest there; changes are unknown yet."""
-    nu = spectra.at(np.array([root.place]))[0]
-    allowed = tolerances(spectra, root)
-    critical = np.abs(spectra.margins(root.place)) <= allowed
-    if root.event is None:
-        # No function vanishes here: an undetermined multiplier does not count as critical.
-        critical &= allowed <= UNKNOWN
-    rest, found = nu[critical], []
-    conservative, bracket, around = spectra.conservative, (root.left, root.right), root.known
-    for event, target in TARGETS.items():
-        if not rest.size:
-            break
-        reach = spectra.factor_sizes(root.place, event)[1][: rest.size].max() + allowed.max()
-        # A real multiplier on the circle is +1 or -1. For any errors, a critical one is so at the nearer of the
-        # two.
-        near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
-        number = int(near.sum()) - spectra.idle[event]
-        if number > 0 and (not conservative or root.event in (event, None)):
-            best = complex(rest[near][np.abs(rest[near] - target).argmin()])
-            meeting = conservative and number % 2 == 0
-            found.append(Crossing(root.place, bracket, event, number, 0, best, meeting, around))
-        rest = rest[~near]
-    upper = rest[rest.imag > 0.0]
-    if conservative:
-        upper = _meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
-    if upper.size:
-        best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
-        found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative, around))
-    return found
-
-
-def _meeting(upper: ComplexArray) -> ComplexArray:
-    """The two nearest to each other."""
-    if upper.size < 2:
-        return upper[:0]
-    first, second = np.triu_indices(upper.size, 1)
-    nearest = int(np.abs(upper[first] - upper[second]).argmin())
-    return upper[[first[nearest], second[nearest]]]

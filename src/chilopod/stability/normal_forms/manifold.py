@@ -126,8 +126,7 @@ class CriticalOrbit(ReadOnlyArrays):
     state: Array  # the fixed point, shape (n,)
     image: ReturnMap  # return map there, with the errors of its derivative
     multiplier: complex  # nu: exactly +1, exactly -1, or the one of a complex pair with the mode ``right``
-    # Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
-    right: ComplexArray
+    right: ComplexArray  # critical eigenvectors, shape (n,), of unit length in the user's units, and left^H right = 1
     left: ComplexArray
 
     @property
@@ -135,17 +134,38 @@ class CriticalOrbit(ReadOnlyArrays):
         """True for a real multiplier."""
         return self.multiplier.imag == 0.0
 
+    def turns(self) -> ComplexArray:
+        """Sampled directions of z: +-1 for a real one, else a circle."""
+        count = 2 if self.real else _ANGLES
+        result: ComplexArray = np.exp(2j * np.pi * np.arange(count) / count)
+        return result
+
+    def displacements(self, curve: Curve, z: ComplexArray) -> Array:
+        """W(z) - x, shape (*z.shape, n)."""
+        total = np.zeros((*z.shape, self.state.size))
+        for (i, j), coefficient in curve.items():
+            twice = 1.0 if self.real or i == j else 2.0
+            total += twice * ((z**i * z.conj() ** j)[..., None] * coefficient).real
+        return total
+
+    def images(self, mapped: ReturnedStates, displaced: Array) -> Array | None:
+        """H - x at x + ``displaced``, of the same shape; None where the map is undefined."""
+        flat = self.state + displaced.reshape(-1, self.state.size)
+        try:
+            result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - self.state
+        except (AnalysisError, ArithmeticError):
+            return None
+        return result if np.isfinite(result).all() else None
+
 
 @dataclass(frozen=True)
 class Sampled:
     """Chebyshev series of the harmonics of H(W(z)) - x."""
 
-    # Harmonic h at index h, negative ones from the end, of the n states and, last, of left^H (H(W(z)) - x).
-    harmonics: tuple[Series, ...]
+    harmonics: tuple[Series, ...]  # by index, negative ones last; of n states and, at the end, left^H (H(W(z)) - x)
     noise: Array  # bounds on the errors of the samples, shape (n + 1,)
     blur: float  # error of the projection at x itself, from round-off and the map's error
-    # Factor of the radius at which the series of the projection would fall to the expected noise.
-    shrink: float
+    shrink: float  # factor of the radius at which the series of the projection would fall to the expected noise
     falling: bool  # True if the series still fall at their end, unlike noise
     size: Array  # largest distance of every state from x, on the curve or its image, shape (n,)
     radius: float  # largest |z|
@@ -162,32 +182,6 @@ class Sampled:
         """Coefficient of a monomial in the projection of H(W(z)), and its error."""
         value, error = self.taylor(powers)
         return complex(value[-1]), float(error[-1])
-
-
-def turns(at: CriticalOrbit) -> ComplexArray:
-    """Sampled directions of z: +-1 for a real one, else a circle."""
-    count = 2 if at.real else _ANGLES
-    result: ComplexArray = np.exp(2j * np.pi * np.arange(count) / count)
-    return result
-
-
-def displacements(at: CriticalOrbit, curve: Curve, z: ComplexArray) -> Array:
-    """W(z) - x, shape (*z.shape, n)."""
-    total = np.zeros((*z.shape, at.state.size))
-    for (i, j), coefficient in curve.items():
-        twice = 1.0 if at.real or i == j else 2.0
-        total += twice * ((z**i * z.conj() ** j)[..., None] * coefficient).real
-    return total
-
-
-def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array | None:
-    """H - x at x + ``displaced``, of the same shape; None where the map is undefined."""
-    flat = at.state + displaced.reshape(-1, at.state.size)
-    try:
-        result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - at.state
-    except (AnalysisError, ArithmeticError):
-        return None
-    return result if np.isfinite(result).all() else None
 
 
 def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
@@ -235,12 +229,12 @@ class Manifold:
     def sample(self, radius: float) -> Sampled | None:
         """The map on the manifold up to a radius; None where it is undefined."""
         at = self._at
-        directions = turns(at)
-        displaced = displacements(at, self.curve, radius * radii()[:, None] * directions)
+        directions = at.turns()
+        displaced = at.displacements(self.curve, radius * radii()[:, None] * directions)
         highest = np.power(radius, _HIGHEST)
         if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
             return None
-        image = images(self._mapped, at, displaced)
+        image = at.images(self._mapped, displaced)
         if image is None:
             return None
         columns = np.concatenate([image, (image @ at.left.conj())[..., None]], axis=-1)
@@ -276,7 +270,7 @@ class Manifold:
         if n == (1 if at.real else 2):
             return value, error
         random = np.random.default_rng(0)
-        directions = turns(at)
+        directions = at.turns()
         largest = found.radius * radii()[0]
         z = largest * directions
         off = {each: np.abs(excess) + uncertain for each, (excess, uncertain) in self._excess(found).items()}
@@ -286,7 +280,7 @@ class Manifold:
             for each, difference in off.items():
                 signs = random.choice([-1.0, 1.0], n) if at.real else np.exp(2j * np.pi * random.random(n))
                 wrong[each] = solve_homological(at, each, signs * difference, self._resonant[each])
-            shift = displacements(at, wrong, z)
+            shift = at.displacements(wrong, z)
             ratios = np.abs(shift).max(axis=0) / found.size
             ratios = ratios[np.isfinite(ratios) & (ratios > 0.0)]
             if ratios.size:
@@ -294,7 +288,7 @@ class Manifold:
                 shifts.append(factors[-1] * shift)
         if not shifts:
             return value, error
-        image = images(self._mapped, at, displacements(at, self.curve, z) + np.array(shifts))
+        image = at.images(self._mapped, at.displacements(self.curve, z) + np.array(shifts))
         if image is None:
             return value, np.inf
         harmonics = np.fft.fft(image @ at.left.conj())[:, 1] / directions.size

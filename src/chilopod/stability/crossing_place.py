@@ -19,7 +19,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.problem.returns import ReturnMap
-from chilopod.stability.spectrum.eigenvalues import Spectrum, disturbed, return_multipliers, spectrum
+from chilopod.stability.spectrum import Spectrum, disturbed, return_multipliers, spectrum
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings

@@ -1,1 +1,0 @@
-"""Points where multipliers cross the unit circle: place, error bound and description."""

@@ -1,1 +1,0 @@
-"""Eigenvalues of return maps, bounds on their errors, and products of matrices split by scale."""
