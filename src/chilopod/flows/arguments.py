@@ -177,9 +177,8 @@ class Claim:
             raise ParameterError(what, field="period", value=None, allowed=allowed)
         failed = float(self.times[:half][wrong.any(axis=0)][0])
         said = f"must be a {what} of the right-hand side, but fails at t = {failed:g}"
-        raise ParameterError(
-            said, field=self.field, value=self.shift if self.field == "period" else None, allowed=allowed
-        )
+        value = self.shift if self.field == "period" else None
+        raise ParameterError(said, field=self.field, value=value, allowed=allowed)
 
 
 def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slopes:

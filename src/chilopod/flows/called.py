@@ -182,9 +182,8 @@ class CalledFlow:
             if gradient is not None:
                 slope = np.concatenate([slope, (gradient(t, state) @ y[n:].reshape(n, n)).ravel()])
             if not np.isfinite(slope).all():  # scipy would shorten its step without end
-                raise AnalysisError(
-                    f"the motion diverges, or the right-hand side is not finite, at t = {t:g}", field="rhs"
-                )
+                said = f"the motion diverges, or the right-hand side is not finite, at t = {t:g}"
+                raise AnalysisError(said, field="rhs")
             return slope
 
         if not np.isfinite(y).all():

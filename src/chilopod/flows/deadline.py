@@ -83,10 +83,7 @@ _SPENT = "the flows (`budget`) were spent"
 
 
 class Budget(Deadline):
-    """Remaining flows over a return, and time, of a search.
-
-    Inside a ``with`` block of the budget the time, s from now, also ends a running flow.
-    """
+    """Remaining flows over a return, and time, s from now, of a search; within its context that also ends a flow."""
 
     def __init__(self, allowed: float, seconds: float = math.inf) -> None:
         super().__init__(seconds)

@@ -54,9 +54,8 @@ def checked_events(events: object) -> tuple[Event, ...]:
     if isinstance(events, Event):
         return (events,)
     if not isinstance(events, Sequence) or not all(isinstance(event, Event) for event in events):
-        raise ParameterError(
-            "must be a list of events", field="events", value=events, allowed="[Event(guard, reset), ...]"
-        )
+        allowed = "[Event(guard, reset), ...]"
+        raise ParameterError("must be a list of events", field="events", value=events, allowed=allowed)
     return tuple(events)
 
 
@@ -179,9 +178,8 @@ class RightHandSide:
         check_shape(rhs, args, float(self.times[0]), self.base)
         if self.events:
             allowed = "arithmetic, elementary functions and numpy arrays, without branches on the state"
-            raise ParameterError(
-                f"need functions that can be traced: {reason}", field="events", allowed=allowed
-            ) from None
+            said = f"need functions that can be traced: {reason}"
+            raise ParameterError(said, field="events", allowed=allowed) from None
         if self.method != "automatic":
             said = f"needs a function that can be traced: {reason}"
             raise ParameterError(said, field="method", value=self.method, allowed="automatic") from None
@@ -280,7 +278,6 @@ def _edges(switch_times: Sequence[float], period: float) -> Array:
     except (TypeError, ValueError, OverflowError):
         valid = False
     if not valid:
-        raise ParameterError(
-            "must be times within one period", field="switch_times", value=switch_times, allowed=f"[0, {period:g})"
-        )
+        said, allowed = "must be times within one period", f"[0, {period:g})"
+        raise ParameterError(said, field="switch_times", value=switch_times, allowed=allowed)
     return np.unique(np.concatenate([[0.0], switches, [period]]))

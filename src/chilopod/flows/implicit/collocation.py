@@ -194,8 +194,7 @@ def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) ->
 @fused_njit(error_model="numpy")
 def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple[Any, Any]:
     """Defect of f at the start from the polynomial through its values in the stages, filtered by the inverse of
-    1 - h gamma J, of the state and of the columns of the derivative, shape (n, 1 + columns); and the round-off in it.
-    """
+    1 - h gamma J, of the state and the columns of the derivative, shape (n, 1 + columns); and the round-off in it."""
     start, gamma = method.start, method.gamma
     s, n = step.moved.shape
     size = derivative.shape[0]
@@ -227,9 +226,7 @@ def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple
 
 
 @fused_njit(error_model="numpy")
-def _estimated(
-    problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any
-) -> float:
+def _estimate(problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any) -> float:
     """The error of a step relative to the largest values of states and entries of the derivative so far."""
     largest, reached = problem.largest, step.reached
     s, n = step.moved.shape
@@ -357,7 +354,7 @@ def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: A
             h *= 0.3
             h_last = 0.0
             continue
-        off = _estimated(problem, method, x, h, step, control.near, result.derivative, result.extent)
+        off = _estimate(problem, method, x, h, step, control.near, result.derivative, result.extent)
         factor = _FASTEST_GROWTH
         if off > 0.0:
             factor = min(factor, max(_FASTEST_FALL, _SAFETY * (control.tolerance / off) ** (1.0 / (s + 1))))

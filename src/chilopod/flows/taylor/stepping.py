@@ -271,9 +271,8 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
             status = NOT_FINITE
             break
         remaining, soon = (t1 - t) / unit, at_once / unit
-        h, crossing, direction = _chosen(
-            tape, directions, clock, motion, control, (t, unit, remaining, soon), steps, work
-        )
+        when = t, unit, remaining, soon
+        h, crossing, direction = _chosen(tape, directions, clock, motion, control, when, steps, work)
         reached = t1 if h >= remaining else min(t + h * unit, t1)
         in_place = in_place + 1 if reached == t else 0
         if in_place > 0 and crossing < 0:

@@ -299,6 +299,7 @@ _builds("logical_or", "bitwise_or")(lambda g, a, b: g.add(g.add(a, b), g.multipl
 _builds("floor")(Graph.floor)
 _builds("trunc")(lambda g, a: g.select(a, g.floor(a), _ceil(g, a)))
 _builds("floor_divide")(lambda g, a, b: g.floor(g.divide(a, b)))
+_builds("remainder")(lambda g, a, b: g.add(a, g.multiply(b, g.floor(g.divide(a, b))), -1.0))
 _builds("hypot")(lambda g, a, b: g.function(ops.SQRT, g.add(g.multiply(a, a), g.multiply(b, b))))
 
 
@@ -312,11 +313,6 @@ def _copysign(g: Graph, a: int, b: int) -> int:
 @_builds("ceil")
 def _ceil(g: Graph, a: int) -> int:
     return g.multiply(g.number(-1.0), g.floor(g.multiply(g.number(-1.0), a)))
-
-
-@_builds("remainder")
-def _remainder(g: Graph, a: int, b: int) -> int:
-    return g.add(a, g.multiply(b, g.floor(g.divide(a, b))), -1.0)
 
 
 @_builds("arctan2")

@@ -141,9 +141,7 @@ def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> A
     return stand_in(value)
 
 
-def _rebuilt_function(
-    value: types.FunctionType, source: Iterator[Any] | None, seen: dict[int, Any]
-) -> Callable[..., Any]:
+def _rebuilt_function(value: types.FunctionType, source: Iterator[Any] | None, seen: dict[int, Any]) -> Any:
     if id(value) in seen:
         return seen[id(value)]
     outer: dict[str, Any] = {"__builtins__": _BUILTINS, "__name__": value.__module__}
