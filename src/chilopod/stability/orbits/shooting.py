@@ -8,7 +8,6 @@ Problems*, section 4.3), the time to that at which the return ends on the sectio
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -104,9 +103,8 @@ def shot(
     is a basis of the space of the first state's corrections, shape (n, k). Every evaluation takes a return of the
     budget. With ``careful`` steps are short, the return time is free and the section not needed until it nearly closes.
     """
-    equations = _Equations(
-        _Problem(system_at, free, shared, budget, careful), start, _Frame(sizes, sizes, section, careful)
-    )
+    problem = _Problem(system_at, free, shared, budget, careful)
+    equations = _Equations(problem, start, _Frame(sizes, sizes, section, careful))
     rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
     correction: Nodes | None = None
     whole, obstacle = True, ""
@@ -235,7 +233,7 @@ class _Equations:
         if not frame.astray:
             try:
                 near = replace(frame.section, duration=duration)
-                start, rest, (before, first) = crossing(system, x, near, functools.partial(checked_flow, system))
+                start, rest, before, first = crossing(system, x, near)
                 self._ends[0], second = checked_flow(system, before, 0.0, rest)
                 self._linear[0, :, : x.size] = second @ first
                 self.nodes, self._returned = self.nodes._replace(duration=start + rest), True

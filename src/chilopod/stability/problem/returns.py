@@ -8,10 +8,9 @@ Systems*, 1989, ch. 2). Its derivative maps the direction of motion to exactly 0
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
@@ -189,14 +188,12 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
 
 
 def return_map(system: SystemLike, x: Array, with_error: bool = True, section: Section | None = None) -> ReturnMap:
-    """The return map H and its derivative at a state, shape (n,), with a bound on the error if wanted.
-
-    If the system does not depend on time, a return ends on the section: by default across the motion at ``x``.
-    """
+    """The return map H and its derivative at a state, shape (n,), with a bound on the error if wanted. If the system
+    does not depend on time, a return ends on the section: by default across the motion at ``x``."""
     if is_autonomous(system):
         section = section or section_at(system, x)
         assert section is not None
-        start, rest, (before, first) = crossing(system, x, section, functools.partial(checked_flow, system))
+        start, rest, before, first = crossing(system, x, section)
         duration = start + rest
     else:
         section, duration = None, return_duration(system)
@@ -244,22 +241,22 @@ def _projection(velocity: Array, normal: Array) -> Array:
 
 def return_time(system: Autonomous, x: Array, section: Section) -> float:
     """Duration of a motion from a state, shape (n,), back to the section."""
-    nothing = np.broadcast_to(0.0, (x.size, x.size))
-    start, rest, _ = crossing(system, x, section, lambda x, t0, t1: (carried(system, x[None], t0, t1)[0], nothing))
-    return start + rest
+    return sum(crossing(system, x, section, derived=False)[:2])
 
 
-def crossing(
-    system: Autonomous, x: Array, section: Section, flow: Callable[[Array, float, float], tuple[Array, Array]]
-) -> tuple[float, float, tuple[Array, Array]]:
-    """Time of a motion's return to the section: a time shortly before, the rest, and the flow up to that time."""
+def crossing(system: Autonomous, x: Array, section: Section, derived: bool = True) -> tuple[float, float, Array, Array]:
+    """Time of a motion's return to the section: a time shortly before, and the rest; the state and, unless it is not
+    ``derived``, the derivative at that time."""
     for approach in _APPROACHES:
         start = (1.0 - approach) * section.duration
-        before, derivative = flow(x, 0.0, start)
+        if derived:
+            before, derivative = checked_flow(system, x, 0.0, start)
+        else:
+            before, derivative = carried(system, x[None], 0.0, start)[0], np.empty((0, 0))
         check_finite(before, derivative)
         arrival = _arrival(system, before, section, approach * section.duration)
         if arrival is not None:
-            return start, arrival[0], (before, derivative)
+            return start, arrival[0], before, derivative
     said = f"the motion does not come back to where it started after about {section.duration:.6g}"
     raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit and its period")
 
@@ -338,7 +335,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     for i, x in enumerate(before):
         arrival = _arrival(system, x, section, approach * section.duration)
         if arrival is None:
-            _, rest, (x, _) = crossing(system, states[i], section, functools.partial(checked_flow, system))
+            _, rest, x, _ = crossing(system, states[i], section)
             result[i] = turned(system, carried(system, x[None], 0.0, rest))[0]
         else:
             result[i] = arrival[1]
