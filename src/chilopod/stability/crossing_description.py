@@ -48,10 +48,8 @@ def described(
     kind: Kind | None = None,
     with_normal_form: bool = True,
 ) -> BifurcationPoint:
-    """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added.
-
-    The critical multipliers belong to the whole return map; their block and the kind of the point are given if known.
-    """
+    """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added. The
+    critical multipliers belong to the whole return map; their block and the kind of the point are given if known."""
     value, error_bound = place
     spec = spectrum(orbit.image)
     critical = critical_multipliers(spec, crossing)

@@ -78,8 +78,7 @@ class Equilibrium(ReadOnlyArrays):
 @dataclass(frozen=True)
 class HopfForm:
     """The motion on the centre manifold of a Hopf point, z' = lambda z + cubic z |z|^2, and that manifold, the state
-    x + 2 Re(z mode + z^2 second) + mean |z|^2 (Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7).
-    """
+    x + 2 Re(z mode + z^2 second) + mean |z|^2 (Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7)."""
 
     mode: ComplexArray  # unit eigenvector to lambda, shape (n,)
     second: ComplexArray  # coefficients of the manifold, shape (n,)

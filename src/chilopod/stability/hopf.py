@@ -9,9 +9,9 @@ applies to equilibria. Values, errors and coefficients are then computed from f.
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -59,11 +59,7 @@ _WORDS = (
 
 
 def locate_hopf(
-    family: Family,
-    between: tuple[float, float],
-    equilibrium: ArrayLike,
-    budget: int = BUDGET,
-    seconds: float = math.inf,
+    family: Family, between: tuple[float, float], equilibrium: ArrayLike, budget: int = BUDGET, seconds: float = inf
 ) -> Located:
     """Find every Hopf point of an equilibrium in an interval of a parameter.
 

@@ -202,7 +202,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
             error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
             return Cut(units, np.eye(x.size), [whole], [error])
-    parts = _of_moderate_condition(system, x, parts, units, unresolved)
+    parts = _moderate_parts(system, x, parts, units, unresolved)
     sections = [section_basis(system, state, units) for state in (x, *(part.state for part in parts[:-1]))]
     turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
     factors, errors = [], []
@@ -230,9 +230,7 @@ def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) 
     return _Part(start, end, state, factor, np.broadcast_to(error, factor.shape) * units / units[:, None])
 
 
-def _of_moderate_condition(
-    system: SystemLike, x: Array, parts: list[_Part], units: Array, unresolved: int
-) -> list[_Part]:
+def _moderate_parts(system: SystemLike, x: Array, parts: list[_Part], units: Array, unresolved: int) -> list[_Part]:
     """Parts of a return; those that contract too strongly are halved repeatedly."""
     done: list[_Part] = []
     left, asked, most = parts[::-1], len(parts), _MOST_STIFF if unresolved else _MOST

@@ -246,9 +246,8 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
         units = curve.units(start.orbit.size)
         tangent = start.tangent * start.units / units
         meeting = start.special not in (None, Kind.FOLD) and float(np.abs(start.multipliers - 1.0).min()) <= _MEETING
-        first = replace(
-            start, tangent=tangent / np.linalg.norm(tangent), units=units, special=start.special if meeting else None
-        )
+        special = start.special if meeting else None
+        first = replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=special)
         anchor = curve.anchor(first, ahead=step if meeting else 0.0, leaving=meeting)
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()

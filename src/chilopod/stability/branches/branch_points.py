@@ -226,10 +226,8 @@ class FamilyReturns:
         return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
     def by_parameter(self, x: Array, value: float, section: Section | None, mapped: Array | None = None) -> Array:
-        """dH/dp at a state, per scale, shape (n,), from H there if it is known.
-
-        The parabola through a third value is needed near branch points, where the matrix of a curve is nearly singular.
-        """
+        """dH/dp at a state, per scale, shape (n,), from H there if it is known. The parabola through a third value is
+        needed near branch points, where the matrix of a curve is nearly singular."""
         units, steepness = self.units(x.size)[:-1], self.steepness
         mapped = self.mapped(x, value, section) if mapped is None else mapped
         for last in (False, True):

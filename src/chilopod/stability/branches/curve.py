@@ -104,9 +104,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     ) -> Anchor:
         """The anchor of a point with its matrix, and the previous point with its matrix."""
         n = last.orbit.size
-        space = symmetric_space(
-            self.system(last.value), last.orbit, self.units(n)[:n], last.tangent[:n] if leaving else None
-        )
+        mode = last.tangent[:n] if leaving else None
+        space = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
         if before is None:
             return Anchor(last, matrix, None, section, space, leaving)
         back, tangent, lengthening = self.moved(last, before.orbit, before.value), np.array(before.tangent), 0.0

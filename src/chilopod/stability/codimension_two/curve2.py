@@ -147,19 +147,11 @@ class Curve2(Result):
     def to_dataset(self) -> xr.Dataset:
         """Dataset over ``point``; ``special`` is empty at ordinary points. Multipliers are of the return map."""
         kinds = {"special": [getattr(point, "kind", None) for point in self.points]}
-        names = (
-            "values",
-            "error_bound",
-            "coefficient",
-            "coefficient_error",
-            "frequency",
-            "period",
-            "orbit",
-            "multipliers",
-        )
+        names = ("values", "error_bound", "coefficient", "coefficient_error")
+        more = ("frequency", "period", "orbit", "multipliers")
         first, last = (end.label for end in self.endings)
         about = {"kind": self.kind.label, "first_end": first, "last_end": last}
-        return dataset("point", columns(self.points, *names) | kinds, **about)
+        return dataset("point", columns(self.points, *names, *more) | kinds, **about)
 
 
 @dataclass(frozen=True, eq=False)

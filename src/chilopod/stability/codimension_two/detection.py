@@ -261,11 +261,9 @@ class Detector:
 
 def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.nan, np.nan)) -> Point2:
     image, place, nu = here.at.image, here.at.place, here.multiplier
-    known = (None, None) if np.isnan(coefficient[0]) else coefficient
+    both = (None, None) if np.isnan(coefficient[0]) else coefficient
     frequency = abs(float(np.angle(nu**image.returns))) / image.period
-    return Point2(
-        place.values, bound, place.state, here.mode, nu, here.spectrum.values, frequency, image.period, *known
-    )
+    return Point2(place.values, bound, place.state, here.mode, nu, here.spectrum.values, frequency, image.period, *both)
 
 
 def _zero(test: Test, length: float) -> tuple[float, float, float] | None:

@@ -51,8 +51,7 @@ class Series(ReadOnlyArrays):
     @property
     def roughness(self) -> Array:
         """Size of the last coefficients, shape (entries,): noise of the samples, or truncation error."""
-        tail: Array = np.abs(self.coefficients[-_TAIL:]).max(axis=0)
-        return tail
+        return np.asarray(np.abs(self.coefficients[-_TAIL:]).max(axis=0))
 
     @property
     def falling(self) -> NDArray[np.bool_]:
@@ -137,8 +136,7 @@ class CriticalOrbit(ReadOnlyArrays):
     def turns(self) -> ComplexArray:
         """Sampled directions of z: +-1 for a real one, else a circle."""
         count = 2 if self.real else _ANGLES
-        result: ComplexArray = np.exp(2j * np.pi * np.arange(count) / count)
-        return result
+        return np.asarray(np.exp(2j * np.pi * np.arange(count) / count))
 
     def displacements(self, curve: Curve, z: ComplexArray) -> Array:
         """W(z) - x, shape (*z.shape, n)."""
@@ -190,19 +188,17 @@ def _expected_noise(at: CriticalOrbit, reached: Array) -> Array:
     return np.append(rounding, np.abs(at.left) @ rounding)
 
 
-def solve_homological(
-    at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
-) -> ComplexArray:
+def solve_homological(at: CriticalOrbit, powers: Powers, right: NDArray[np.inexact], resonant: bool) -> ComplexArray:
     """Solution w of (nu^i conj(nu)^j - A) w = r, shape (n,), without a critical part if ``resonant``."""
     i, j = powers
     n = at.state.size
     factor = at.multiplier**i * at.multiplier.conjugate() ** j
     matrix = factor * np.eye(n) - at.image.jacobian
     if not resonant:
-        return np.asarray(np.linalg.solve(matrix, right_side), dtype=np.complex128)
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.complex128)
     q, p = at.right, at.left
     bordered = np.block([[matrix, q[:, None]], [p.conj()[None], np.zeros((1, 1))]])
-    padded = np.append(right_side - q * (p.conj() @ right_side), 0.0)
+    padded = np.append(right - q * (p.conj() @ right), 0.0)
     return np.asarray(np.linalg.solve(bordered, padded)[:n], dtype=np.complex128)
 
 
@@ -248,9 +244,8 @@ class Manifold:
         seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
         shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
         falling = any(one.falling[-1] for one in found)
-        return Sampled(
-            found, np.maximum(floor, seen), float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1]
-        )
+        noise = np.maximum(floor, seen)
+        return Sampled(found, noise, float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1])
 
     def bend(self, found: Sampled) -> bool:
         """Improve the manifold from samples on it; return True if it changed measurably."""

@@ -299,10 +299,8 @@ class Samples:
         return path[len(behind) :]
 
     def _turns_back(self, behind: list[Sample], found: Sample) -> bool:
-        """True if a multiplier heads for +1 and is on the same side after a step that should pass or come nearer.
-
-        The orbit may be one that leaves at a pitchfork; shorter steps tell. Multipliers grow exponentially.
-        """
+        """True if a multiplier heads for +1 and is on the same side after a step that should pass or come nearer. The
+        orbit may be one that leaves at a pitchfork; shorter steps tell. Multipliers grow exponentially."""
         if len(behind) < 2 or found.value - behind[-1].value <= _TELLING * self.width:
             return False
         first, left = behind
@@ -333,10 +331,8 @@ class Samples:
         return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
 
     def _goes_through(self, left: Sample, right: Sample) -> bool:
-        """True if one orbit has a multiplier that passes +1 between two samples: then samples come together there.
-
-        Two orbits that pass each other at a distance have multipliers on different sides, and samples stay apart.
-        """
+        """True if one orbit has a multiplier that passes +1 between two samples, which come together there: two orbits
+        that pass each other at a distance have multipliers on different sides, and samples stay apart."""
         apart = np.inf
         for _ in range(_HALVED):
             before, apart = apart, float((np.abs(right.orbit - left.orbit) / self.size).max())

@@ -274,6 +274,4 @@ def _elements(generators: bytes, n: int) -> Array:
 def reverses(system: SystemLike, mode: ComplexArray, size: Array) -> bool:
     """True if a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
     own = np.abs(mode / size).max()
-    return any(
-        bool((np.abs(matrix @ mode + mode) / size).max() <= _LOOSE * own) for matrix in spatial_symmetries(system)
-    )
+    return any((np.abs(matrix @ mode + mode) / size).max() <= _LOOSE * own for matrix in spatial_symmetries(system))

@@ -65,10 +65,8 @@ class Block(ReadOnlyArrays):
         return self.dimension if self.real else 1
 
     def reduced(self, matrices: Array) -> Array:
-        """Reduced form of matrices M, shape (..., n, n), that commute with the group (else of the mean of P M P^-1).
-
-        Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d. Complex type: dual @ M @ basis.
-        """
+        """Reduced form of matrices M, shape (..., n, n), that commute with the group (else of the mean of P M P^-1):
+        A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d for the real type, dual @ M @ basis for the complex."""
         return self._diagonal(self.dual @ matrices @ self.basis)
 
     def reduced_error(self, matrices: Array, error: Array | float = 0.0) -> Array:

@@ -92,9 +92,8 @@ class Step(Generic[A, S]):
         """Displacement at a place by the cubic through both ends and tangents, and the matrix, interpolated."""
         t, size, first = place / self.size, self.size, self.start.tangent
         last = self.tangent / float(first @ self.tangent)
-        moved = (
-            size * t * (1.0 - t) ** 2 * first + t * t * (3.0 - 2.0 * t) * self.moved - size * t * t * (1.0 - t) * last
-        )
+        moved = size * t * (1.0 - t) ** 2 * first + t * t * (3.0 - 2.0 * t) * self.moved
+        moved = moved - size * t * t * (1.0 - t) * last
         return Guess(moved, self.start.matrix + t * (self.matrix - self.start.matrix))
 
 
@@ -177,10 +176,7 @@ class Equations(ABC, Generic[A, S, R]):
         return None
 
     def corrected(self, anchor: A, guess: Guess, plane: Plane) -> Corrected[R]:
-        """Correct a guess to a solution.
-
-        Broyden's updates keep the matrix of the last point good enough for the whole step.
-        """
+        """Correct a guess to a solution, with Broyden's updates of the last point's matrix for the whole step."""
         parameters, widths = self.parameters(anchor)
         moved, matrix = np.array(guess.moved), np.array(guess.matrix)
         matrix[-1] = plane.row

@@ -6,6 +6,7 @@ import bisect
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -149,11 +150,8 @@ class Accounts:
             return crossings
         if len(crossings) == 1:
             return [replace(crossings[0], change=gap.change)]
-        a, b = gap.x, gap.y
-        near = [
-            (each, _outside_near(self._spectra, each, b) - _outside_near(self._spectra, each, a)) for each in crossings
-        ]
-        return [replace(each, change=change) for each, change in near]
+        beyond = partial(_outside_near, self._spectra)
+        return [replace(each, change=beyond(each, gap.y) - beyond(each, gap.x)) for each in crossings]
 
     def _mended(self, gap: _Gap) -> list[Root] | None:
         """Better roots for a gap whose roots do not explain its counts; None if they do, or without better ones."""
@@ -240,9 +238,8 @@ class Accounts:
                 near = [v for v in spectra.values if x <= v <= y and self.count(v) is not None]
                 left = max(v for v in near if v <= root.place and (margin(v) > 0) == (margin(x) > 0))
                 right = min(v for v in near if v >= root.place and (margin(v) > 0) == (margin(y) > 0))
-                self._remark(
-                    f"a multiplier jumps across the circle at {self._parameter(root.place):.9g}", (left, right)
-                )
+                at = self._parameter(root.place)
+                self._remark(f"a multiplier jumps across the circle at {at:.9g}", (left, right))
                 said = True
             elif all(abs(root.place - other.place) > 16.0 * _EPSILON * abs(root.place) for other in roots):
                 roots += [root] * self._is_critical(root)

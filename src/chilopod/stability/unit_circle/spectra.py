@@ -173,10 +173,8 @@ class Spectra:
         return any(low < value < high and nu is None for value, nu in self._known.items())
 
     def without_pair(self, low: float, high: float) -> bool:
-        """True if all complex multipliers are clear of the circle between two values, judged by known values.
-
-        The bialternate product also vanishes where two real multipliers have product 1.
-        """
+        """True if all complex multipliers are clear of the circle between two values, judged by known values: the
+        bialternate product also vanishes where two real multipliers have product 1."""
         values = self.values[bisect.bisect_left(self.values, low) : bisect.bisect_right(self.values, high)]
         if len(values) < 2:
             return False
@@ -347,10 +345,8 @@ def factors(nu: ComplexArray, event: Event) -> ComplexArray:
 
 
 def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
-    """Elementary symmetric polynomials of the rows of ``terms``, all but ``left_out`` of them at a time.
-
-    The rows are closed under conjugation; signs and logarithms, shapes (k,).
-    """
+    """Elementary symmetric polynomials of the rows of ``terms``, all but ``left_out`` of them at a time, as signs and
+    logarithms, shapes (k,). The rows are closed under conjugation."""
     sizes = np.abs(terms)
     small = np.zeros((terms.shape[0], left_out + 1), dtype=np.complex128)
     small[:, 0] = 1.0
