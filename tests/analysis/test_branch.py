@@ -18,7 +18,7 @@ from chilopod.show import write_branch
 from chilopod.show.figures.branch import panel
 from chilopod.stability.branches.branch_points import BranchPoint
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.problem.returns import whole_period
+from chilopod.stability.returns import whole_period
 
 ROBOT = load_robot("aoi2022-planar")
 

@@ -9,7 +9,7 @@ from chilopod.stability.crossing_description import kind_at_plus_one
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalFormStatus, normal_form
 from chilopod.stability.points import Criticality, criticality
-from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.returns import ReturnMap
 
 
 def at_origin(jacobian, multiplier, right=None, left=None, returns=1):

@@ -19,8 +19,8 @@ from chilopod.stability import (
     sweep,
 )
 from chilopod.stability.floquet import full_period
-from chilopod.stability.problem.capabilities import offers, spatial_symmetries
-from chilopod.stability.problem.returns import whole_period
+from chilopod.stability.interface import offers, spatial_symmetries
+from chilopod.stability.returns import whole_period
 from helpers.systems import duffing, linear
 
 

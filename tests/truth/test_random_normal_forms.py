@@ -12,7 +12,7 @@ import pytest
 
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalFormStatus, normal_form, quintic
-from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.returns import ReturnMap
 
 CASES = 60
 SHEARS = 3

@@ -20,7 +20,7 @@ from chilopod.planar.along import WalkMeans, walk_means
 from chilopod.robot import Robot
 from chilopod.robot.parameters import place_of
 from chilopod.stability import find_orbit
-from chilopod.stability.problem.returns import ReturnMap, return_map
+from chilopod.stability.returns import ReturnMap, return_map
 
 _ROUNDS = 12  # of the secant method for a critical value
 _SETTLED = 1e-11  # relative change at which it ends

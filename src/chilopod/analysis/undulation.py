@@ -24,7 +24,7 @@ from chilopod.planar.along import FollowedModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Criticality, Kind
-from chilopod.stability.problem.returns import return_map, whole_period
+from chilopod.stability.returns import return_map, whole_period
 from chilopod.stability.spectrum import spectrum
 
 DISTANCES = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)

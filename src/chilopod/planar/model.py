@@ -42,7 +42,7 @@ class PlanarModel(ReadOnlyArrays):
     """The paper's planar model (eq. 1) of one robot, period by period.
 
     The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). Of the
-    capabilities in :mod:`chilopod.stability.problem.capabilities` it has orbit, scale, symmetries, switch times, error
+    capabilities in :mod:`chilopod.stability.interface` it has orbit, scale, symmetries, switch times, error
     bound, and flows of many states or many robots at once; :class:`chilopod.planar.along.FollowedModel` adds flows of
     each state with its own robot. It has no tangents or frames, because its full derivative is small. A model is
     immutable: another robot needs another model.

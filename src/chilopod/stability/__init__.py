@@ -16,15 +16,15 @@ from chilopod.stability.codimension_two.two_parameters import follow2, switch2
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.hopf import locate_hopf
+from chilopod.stability.interface import Autonomous, Capabilities, SystemLike
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus
 from chilopod.stability.orbits.orbit import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.problem.capabilities import Autonomous, Capabilities, SystemLike
-from chilopod.stability.problem.returns import ReturnMap, Section
-from chilopod.stability.problem.system import PeriodicSystem, from_map, from_rhs
+from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.search.locate import Located, locate
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.isotypic import AxialBranch, SymmetricCrossing, SymmetricKind
+from chilopod.stability.system import PeriodicSystem, from_map, from_rhs
 from chilopod.stability.tracing.tracer import Ending
 from chilopod.stability.unit_circle.crossings import SearchStatus
 

@@ -12,12 +12,12 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.crossing_place import critical_multipliers
+from chilopod.stability.interface import SystemLike, is_autonomous, sizes
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, normal_form
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import WITHOUT_CRITICALITY, BifurcationPoint, Criticality, Kind, with_coefficients
-from chilopod.stability.problem.capabilities import SystemLike, is_autonomous, sizes
-from chilopod.stability.problem.returns import returned_states
+from chilopod.stability.returns import returned_states
 from chilopod.stability.spectrum import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.symmetry.isotypic import Block, SymmetricCrossing, SymmetricKind, symmetric_crossing

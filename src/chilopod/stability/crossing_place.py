@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.stability.interface import SystemLike, spatial_symmetries
 from chilopod.stability.orbits.orbit import Orbit
-from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
-from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum import Spectrum, disturbed, return_multipliers, spectrum
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, isotypic

@@ -16,20 +16,12 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import UserCode, finite_array, numbers
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.stability.interface import Autonomous, Family, SystemLike, check_system, is_autonomous, offers, system_of
 from chilopod.stability.normal_forms.manifold import radii, series
 from chilopod.stability.orbits.orbit import Orbit, near_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint, Criticality
-from chilopod.stability.problem.capabilities import (
-    Autonomous,
-    Family,
-    SystemLike,
-    check_system,
-    is_autonomous,
-    offers,
-    system_of,
-)
-from chilopod.stability.problem.returns import section_at
+from chilopod.stability.returns import section_at
 from chilopod.stability.spectrum import SAFETY, disturbed, eigenvalue_errors, phased
 
 _EPSILON = float(np.finfo(float).eps)

@@ -17,13 +17,13 @@ from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.stability.interface import SystemLike, check_system, is_autonomous, offers
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
-from chilopod.stability.problem.capabilities import SystemLike, check_system, is_autonomous, offers
-from chilopod.stability.problem.returns import return_maps
-from chilopod.stability.problem.system import PeriodicSystem
+from chilopod.stability.returns import return_maps
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
 from chilopod.stability.spectrum import VERDICTS, phased, spectrum, split_return, stable_within
+from chilopod.stability.system import PeriodicSystem
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -25,12 +25,12 @@ from chilopod.flows.deadline import Deadline, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
+from chilopod.stability.interface import Autonomous, Family, SystemLike, offers
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.problem.capabilities import Autonomous, Family, SystemLike, offers
-from chilopod.stability.problem.system import PeriodicSystem
 from chilopod.stability.search.locate import Found, Located, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
+from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Crossing, Event
 

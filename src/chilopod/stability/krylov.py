@@ -21,8 +21,8 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, shape_of
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.problem.capabilities import Capabilities, check_finite, is_autonomous, returns_per_period
-from chilopod.stability.problem.returns import (
+from chilopod.stability.interface import Capabilities, check_finite, is_autonomous, returns_per_period
+from chilopod.stability.returns import (
     CUTS,
     REPEATED,
     RETURN,
@@ -113,7 +113,7 @@ def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Arr
 
 @dataclass(frozen=True, eq=False)
 class TangentMap(ReadOnlyArrays):
-    """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`), its derivative H' as a product."""
+    """The return map H at a state (see :mod:`~chilopod.stability.returns`), its derivative H' as a product."""
 
     system: Capabilities
     point: Array  # state at time 0, shape (n,)
@@ -168,7 +168,7 @@ def tangent_map(system: Capabilities, x: Array, section: Section | None = None) 
 
 
 def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
-    """Sizes of the states, shape (n,), as :func:`.problem.capabilities.sizes`, without the matrix: the
+    """Sizes of the states, shape (n,), as :func:`.interface.sizes`, without the matrix: the
     largest value of a state during a return, or its change within a part of it when the others are disturbed at random
     by their own sizes (the one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 2000)."""
     given = getattr(system, "scale", None)

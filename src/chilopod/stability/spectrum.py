@@ -31,8 +31,8 @@ from scipy.linalg.lapack import dgeqrf, dorgqr
 from chilopod.errors import AnalysisError
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.problem.capabilities import Capabilities, SystemLike, is_autonomous, is_stiff, sizes
-from chilopod.stability.problem.returns import ReturnMap, flow_with_error
+from chilopod.stability.interface import Capabilities, SystemLike, is_autonomous, is_stiff, sizes
+from chilopod.stability.returns import ReturnMap, flow_with_error
 
 SAFETY, DRAWS = 10.0, 8  # factor on the largest change of a result under random changes, and their number
 

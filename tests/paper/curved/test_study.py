@@ -12,7 +12,7 @@ from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
 from chilopod.paper.printed import variant_robots
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
-from chilopod.stability.problem.returns import whole_period
+from chilopod.stability.returns import whole_period
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
 

@@ -27,7 +27,7 @@ from chilopod.paper.measures import SEEDS, Folder, by_spring, spring_walks
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.stability.problem.returns import whole_period
+from chilopod.stability.returns import whole_period
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import AVERAGED, Disturbance, mean_joint_angles
 

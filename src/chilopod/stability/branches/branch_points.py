@@ -11,9 +11,9 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.stability.interface import Family, SystemLike, returns_per_period, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.capabilities import Family, SystemLike, returns_per_period, system_of
-from chilopod.stability.problem.returns import (
+from chilopod.stability.returns import (
     ReturnMap,
     Section,
     in_parts,

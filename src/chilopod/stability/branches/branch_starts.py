@@ -16,18 +16,10 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
+from chilopod.stability.interface import Family, SystemLike, is_autonomous, offers, returns_per_period, sizes, system_of
 from chilopod.stability.orbits.orbit import Orbit, bounded, known_state, searched_orbit
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.capabilities import (
-    Family,
-    SystemLike,
-    is_autonomous,
-    offers,
-    returns_per_period,
-    sizes,
-    system_of,
-)
-from chilopod.stability.problem.returns import Section, carried, returned_states, whole_period
+from chilopod.stability.returns import Section, carried, returned_states, whole_period
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""

@@ -25,9 +25,9 @@ from chilopod.stability.branches.branch_points import (
     within_space,
 )
 from chilopod.stability.floquet import full_period
+from chilopod.stability.interface import checked_flow, is_autonomous, offers
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
-from chilopod.stability.problem.capabilities import checked_flow, is_autonomous, offers
-from chilopod.stability.problem.returns import ReturnMap, Section, on_section, return_duration, section_at
+from chilopod.stability.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN

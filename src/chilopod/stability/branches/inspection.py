@@ -27,8 +27,8 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, Within, special_point
 from chilopod.stability.crossing_description import ContinuumError
 from chilopod.stability.crossing_place import crossings_in
-from chilopod.stability.problem.capabilities import offers
-from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.interface import offers
+from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.equations import Step, predicted

@@ -18,7 +18,7 @@ from chilopod.stability.crossing_description import described
 from chilopod.stability.crossing_place import SAFETY, Course, Sample, orbit_blocks, past_singular, place_error
 from chilopod.stability.orbits.orbit import Orbit, bounded, searched_orbit
 from chilopod.stability.points import Kind
-from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.equations import Plane, Step
 from chilopod.stability.tracing.tolerances import AWAY

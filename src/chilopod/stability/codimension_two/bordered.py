@@ -25,9 +25,9 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.stability.interface import SystemLike, offers, returns_per_period, sizes, system_of
 from chilopod.stability.orbits.orbit import from_known, known_state
-from chilopod.stability.problem.capabilities import SystemLike, offers, returns_per_period, sizes, system_of
-from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
+from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.symmetry.groups import symmetric_states
 from chilopod.stability.tracing.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN

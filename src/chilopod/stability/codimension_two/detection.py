@@ -23,7 +23,7 @@ from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo
 from chilopod.stability.normal_forms.manifold import CriticalOrbit, ReturnedStates
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
-from chilopod.stability.problem.returns import returned_states
+from chilopod.stability.returns import returned_states
 from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.tracing.equations import Step

@@ -24,9 +24,9 @@ from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
+from chilopod.stability.interface import offers, sizes, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.problem.capabilities import offers, sizes, system_of
-from chilopod.stability.problem.returns import return_duration, whole_period
+from chilopod.stability.returns import return_duration, whole_period
 from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.tracing.equations import Step
 from chilopod.stability.tracing.tracer import Ending, trace

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.problem.returns import ReturnMap
+from chilopod.stability.returns import ReturnMap
 
 RADII = 8  # number of radii at which a function is sampled
 

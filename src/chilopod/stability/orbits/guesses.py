@@ -12,16 +12,9 @@ from scipy.interpolate import CubicSpline
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.frozen import Array
+from chilopod.stability.interface import Autonomous, SystemLike, checked_flow, is_autonomous, returns_per_period, sizes
 from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
-from chilopod.stability.problem.capabilities import (
-    Autonomous,
-    SystemLike,
-    checked_flow,
-    is_autonomous,
-    returns_per_period,
-    sizes,
-)
-from chilopod.stability.problem.returns import carried, return_duration, returned_states
+from chilopod.stability.returns import carried, return_duration, returned_states
 
 _OF_GUESS = 16  # nodes of a guess that is a whole orbit
 _FEWEST_ROWS = 5

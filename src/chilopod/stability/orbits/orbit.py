@@ -15,19 +15,11 @@ from chilopod.flows.arguments import check_arguments, finite_array
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
+from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, shot
-from chilopod.stability.problem.capabilities import (
-    Capabilities,
-    SystemLike,
-    check_system,
-    is_autonomous,
-    is_stiff,
-    offers,
-    sizes,
-)
-from chilopod.stability.problem.returns import (
+from chilopod.stability.returns import (
     REPEATED,
     ReturnMap,
     Section,

@@ -19,8 +19,8 @@ from scipy.linalg.lapack import dgesv
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.problem.capabilities import Autonomous, SystemLike, checked_flow, is_autonomous
-from chilopod.stability.problem.returns import NODES, RETURN, Section, carried, crossing, section_at
+from chilopod.stability.interface import Autonomous, SystemLike, checked_flow, is_autonomous
+from chilopod.stability.returns import NODES, RETURN, Section, carried, crossing, section_at
 
 _EVALUATIONS, FEW_ROUNDS = 60, 12  # largest numbers of damped corrections, and of those on a curve, with near points
 _LONGEST = 4.0  # longest return, relative to the guess

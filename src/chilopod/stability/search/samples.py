@@ -14,10 +14,10 @@ from chilopod.flows.arguments import UserCode
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_place import Sample, through
+from chilopod.stability.interface import CheckedFamily, Family, SystemLike, sizes
 from chilopod.stability.orbits.orbit import from_known, known_state, near_orbit, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.problem.capabilities import CheckedFamily, Family, SystemLike, sizes
-from chilopod.stability.problem.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
+from chilopod.stability.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02

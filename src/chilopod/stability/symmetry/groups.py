@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, read_only
-from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.interface import SystemLike, spatial_symmetries
 
 _PROBES = 3  # probe vectors: a single one may by chance lie close to a mirror plane
 _SAME = 1e-7  # two elements of a cyclic group of ten thousand are 6e-4 apart; round-off of as many products is 1e-11

@@ -21,7 +21,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
-from chilopod.stability.problem.capabilities import (
+from chilopod.stability.interface import (
     Autonomous,
     SystemLike,
     check_finite,

@@ -18,7 +18,7 @@ from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.rhs import TOLERANCE, Event, Method, RightHandSide
 from chilopod.flows.tracing.trace import Opaque, describe
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.problem.capabilities import compare, is_new, spatial_symmetries
+from chilopod.stability.interface import compare, is_new, spatial_symmetries
 
 Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
@@ -57,7 +57,7 @@ class PeriodicSystem(ReadOnlyArrays):
     guess_period
         Approximate period of such a system's orbits, or a multiple of it; an orbit gets its shortest period.
     flow_with_error, flow_states, flow_tangents, flow_volume, is_stiff, velocity_series
-        See :mod:`chilopod.stability.problem.capabilities`.
+        See :mod:`chilopod.stability.interface`.
     concurrent
         True if flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
     """
