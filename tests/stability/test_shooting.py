@@ -6,7 +6,7 @@ import xarray as xr
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Ending, begin, find_orbit, follow, from_rhs, locate, multipliers
-from chilopod.stability.orbits.shooting import Nodes, shot
+from chilopod.stability.orbits.shooting import Nodes, Problem, shot
 from helpers.systems import duffing, lorenz
 
 RATE, FREQUENCY = np.sqrt(1.0 + 2.0 * np.sqrt(7.0)), np.sqrt(2.0 * np.sqrt(7.0) - 1.0)
@@ -108,7 +108,7 @@ def test_what_explodes_between_two_nodes_is_named():
     system = from_rhs(lambda t, x: [x[0] ** 2 + np.cos(t)], 1, 2.0 * np.pi)
     nodes = Nodes(np.array([[0.0], [0.0], [50.0], [0.0]]), 2.0 * np.pi)
     with pytest.raises(AnalysisError, match="node 2 of 4"):
-        shot(lambda _: system, nodes, np.ones(1), None)
+        shot(Problem(lambda _: system), nodes, np.ones(1), None)
 
 
 @pytest.mark.parametrize(

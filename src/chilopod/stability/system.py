@@ -214,9 +214,9 @@ def from_rhs(
         If the derivative of such a function needs differences.
     """
     about: dict[str, Any] = {"switch_times": switch_times, "orbit": orbit, "method": method, "tolerance": tolerance}
-    symmetries: dict[str, Any] = {"symmetry": symmetry, "spatial_symmetry": spatial_symmetry, "scale": scale}
-    key = () if events else _key((dimension, period, guess_period, *about.values(), *symmetries.values()))
-    stated = _STATED.get(key) or _Stated(events, dimension, period, guess_period, about, symmetries)
+    more: dict[str, Any] = {"symmetry": symmetry, "spatial_symmetry": spatial_symmetry, "scale": scale}
+    key = () if events else _key((dimension, period, guess_period, *about.values(), *more.values()))
+    stated = _STATED.get(key) or _Stated(dimension, period, guess_period, about | {"events": events}, more)
     if key:
         if len(_STATED) >= _MOST_STATED:
             _STATED.clear()
@@ -238,21 +238,20 @@ class _Stated:
 
     def __init__(
         self,
-        events: Sequence[Event],
         dimension: int,
         period: float | None,
-        guess_period: float | None,
+        guess: float | None,
         about: dict[str, Any],
-        symmetries: dict[str, Any],
+        more: dict[str, Any],
     ) -> None:
         autonomous = period is None
-        if autonomous and guess_period is None:
+        if autonomous and guess is None:
             raise ParameterError("must be given where the period is None", field="guess_period", value=None)
-        length = positive("guess_period" if autonomous else "period", guess_period if autonomous else period)
-        given = RightHandSide(dimension, length, autonomous, events, **about)
+        length = positive("guess_period" if autonomous else "period", guess if autonomous else period)
+        given = RightHandSide(dimension, length, autonomous, **about)
         own: dict[str, Any] = {"velocity": _unknown, "guess_period": length} if autonomous else {}
         timed = None if autonomous else length
-        system = PeriodicSystem(given.dimension, timed, _unknown, orbit=given.start, **symmetries, **own)
+        system = PeriodicSystem(given.dimension, timed, _unknown, orbit=given.start, **more, **own)
         one, base = np.eye(given.dimension), given.base
         part, shift = (0.1234, 0.4444) if autonomous else (_TIMES, 1.0)
         field = "timeless" if autonomous else "period"

@@ -204,8 +204,6 @@ class FamilyReturns:
         """The return map and its derivative."""
         system = self.system(value)
         self.budget.take()
-        if section is None and system.period is None:
-            section = section_at(system, x, self.sizes)
         return return_map(system, x, with_error, section)
 
     def section_at(self, x: Array, value: float, period: float | None) -> Section | None:

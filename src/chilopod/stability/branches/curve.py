@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import Array, ComplexArray, read_only
+from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.branches.branch_points import (
     Anchor,
     BranchPoint,
@@ -26,7 +26,7 @@ from chilopod.stability.branches.branch_points import (
 )
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import checked_flow, is_autonomous, offers
-from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
+from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
 from chilopod.stability.returns import ReturnMap, Section, on_section, return_duration, section_at
 from chilopod.stability.spectrum import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
@@ -58,16 +58,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return np.block([[scaled, (derivative / sizes)[:, None]], [tangent[None]]])
 
     def matrix_at(
-        self,
-        x: Array,
-        value: float,
-        section: Section | None,
-        row: Array,
-        with_error: bool = False,
-        mapped: Array | None = None,
+        self, x: Array, value: float, section: Section | None, row: Array, bounded: bool, mapped: Array | None = None
     ) -> tuple[ReturnMap, Array]:
         """The return map at a state, and :meth:`matrix` there with its last row; from H there if it is known."""
-        image = self.image(x, value, section, with_error)
+        image = self.image(x, value, section, bounded)
         return image, self.matrix(image.jacobian, self.by_parameter(x, value, section, mapped), row)
 
     def moved(self, start: BranchPoint, x: Array, value: float) -> Array:
@@ -89,35 +83,30 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         matrix = self.matrix_at(x, last.value, section, last.tangent, True)[1]
         # The matrix of a branch point was computed ahead, so it gives no prediction.
         if before is None or before.special is not None:
-            return self.anchored(last, matrix, section, leaving=leaving)
+            return self.anchored(last, matrix, section, None, leaving)
         matrix_before = self.matrix_at(before.orbit, before.value, section, before.tangent, True)[1]
-        return self.anchored(last, matrix, section, before, read_only(matrix_before))
+        return self.anchored(last, matrix, section, Anchor(before, matrix_before))
 
     def anchored(
-        self,
-        last: BranchPoint,
-        matrix: Array,
-        section: Section | None,
-        before: BranchPoint | None = None,
-        matrix_before: Array | None = None,
-        leaving: bool = False,
+        self, last: BranchPoint, matrix: Array, section: Section | None, before: Anchor | None, leaving: bool = False
     ) -> Anchor:
-        """The anchor of a point with its matrix, and the previous point with its matrix."""
+        """The anchor of a point with its matrix, after the previous point with its matrix."""
         n = last.orbit.size
         mode = last.tangent[:n] if leaving else None
         space = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
         if before is None:
             return Anchor(last, matrix, None, section, space, leaving)
-        back, tangent, lengthening = self.moved(last, before.orbit, before.value), np.array(before.tangent), 0.0
+        earlier, tangent, lengthening = before.last, np.array(before.tangent), 0.0
+        back = self.moved(last, earlier.orbit, earlier.value)
         if section is not None:
             system = self.system(last.value)
             assert is_autonomous(system)
             assert last.period is not None
-            assert before.period is not None
-            lengthening = (last.period - before.period) / last.period / float(np.linalg.norm(back))
+            assert earlier.period is not None
+            lengthening = (last.period - earlier.period) / last.period / float(np.linalg.norm(back))
             along = self._projection(np.asarray(system.velocity(section.point)), section)
             back[:-1], tangent[:-1] = along @ back[:-1], along @ tangent[:-1]
-        return Anchor(last, matrix, Before(back, tangent, matrix_before), section, space, leaving, lengthening)
+        return Anchor(last, matrix, Before(back, tangent, before.matrix), section, space, leaving, lengthening)
 
     def parameters(self, anchor: Anchor) -> tuple[slice, Array]:
         n = anchor.last.orbit.size
@@ -154,7 +143,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """The matrix at an orbit near a branch point."""
         if not anchor.leaving:
             return None
-        matrix = self.matrix_at(found.x, found.value, anchor.section, row, mapped=found.mapped)[1]
+        matrix = self.matrix_at(found.x, found.value, anchor.section, row, False, found.mapped)[1]
         return within_space(anchor.space, matrix)
 
     def step(self, anchor: Anchor, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Anchor, OnCurve]:
@@ -216,7 +205,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         self.budget.take(2 * FEW_ROUNDS)  # each in parts
         nodes = nodes_along(system, last.orbit, duration, count, last.value)
         free = Free(plane.row, plane.target, start, self.scale)
-        found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], anchor.section, free)
+        problem = Problem(lambda value: self.system(self._inside(value)), free)
+        found = shot(problem, nodes, units[:-1], anchor.section)
         x, value = found.nodes.states[0], self._inside(found.nodes.value) if plane.edge is None else plane.edge[1]
         system = self.system(value)
         image = on_section(system, section, x, found.jacobian, found.nodes.duration)
@@ -267,8 +257,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             matrix[-1] = tangent
         about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": self.periods}
         point = BranchPoint(value, x, values, tangent, self.units(x.size), **about)
-        before = None if anchor.leaving or anchor.last.special is not None else anchor.last
-        return replace(step, end=self.anchored(point, matrix, section, before, anchor.matrix))
+        before = None if anchor.leaving or anchor.last.special is not None else anchor
+        return replace(step, end=self.anchored(point, matrix, section, before))
 
     def _check_moving(self, section: Section, velocity: Array, found: OnCurve) -> None:
         """Check that an orbit has not shrunk into an equilibrium, beyond which the same orbits come again half a period

@@ -18,7 +18,7 @@ from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
-from chilopod.stability.orbits.shooting import Nodes, shot
+from chilopod.stability.orbits.shooting import Nodes, Problem, shot
 from chilopod.stability.returns import (
     REPEATED,
     ReturnMap,
@@ -280,7 +280,7 @@ def near_orbit(
         shared = None if basis is None else size[:, None] * basis
         if basis is not None:  # no correction would remove what is left of asymmetry
             start = start._replace(states=start.states / size @ basis @ basis.T * size)
-        found = shot(lambda _: system, start, size, section, None, shared, budget, careful)
+        found = shot(Problem(lambda _: system, None, shared, budget, careful), start, size, section)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
     if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"

@@ -86,25 +86,40 @@ def nodes_along(system: SystemLike, x: Array, duration: float, count: int, value
     return Nodes(np.array(states), duration, value)
 
 
-def shot(
-    system_at: Callable[[float], SystemLike],
-    start: Nodes,
-    sizes: Array,
-    section: Section | None,
-    free: Free | None = None,
-    shared: Array | None = None,
-    budget: Budget | None = None,
-    careful: bool = False,
-) -> Closed:
+@dataclass(frozen=True)
+class Problem:
+    """What :func:`shot` solves: the systems by the parameter, with its equation ``free``, None for a given one.
+
+    ``shared`` is a basis of the space of the first state's corrections, shape (n, k). Every evaluation takes a return
+    of the budget. With ``careful`` steps are short, the return time is free and the section not needed until it nearly
+    closes.
+    """
+
+    system_at: Callable[[float], SystemLike]
+    free: Free | None = None
+    shared: Array | None = None
+    budget: Budget | None = None
+    careful: bool = False
+
+    def beside(self, value: float) -> tuple[SystemLike, float] | None:
+        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
+        if self.free is None:
+            return None
+        step = _DIFFERENCE * self.free.scale
+        try:
+            return self.system_at(value + step), step
+        except AnalysisError:  # the family ends here
+            return self.system_at(value - step), -step
+
+
+def shot(problem: Problem, start: Nodes, sizes: Array, section: Section | None) -> Closed:
     """The orbit near some nodes, by Newton's method, damped while the parameter is given.
 
     ``sizes`` of the states, shape (n,), grow with these while the parameter is given. The first state has a ``section``
-    if the system has no period of its own. ``free`` is the equation for the parameter, None for a given one. ``shared``
-    is a basis of the space of the first state's corrections, shape (n, k). Every evaluation takes a return of the
-    budget. With ``careful`` steps are short, the return time is free and the section not needed until it nearly closes.
+    if the system has no period of its own.
     """
-    problem = _Problem(system_at, free, shared, budget, careful)
-    equations = _Equations(problem, start, _Frame(sizes, sizes, section, careful))
+    free = problem.free
+    equations = _Equations(problem, start, _Frame(sizes, sizes, section, problem.careful))
     rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
     correction: Nodes | None = None
     whole, obstacle = True, ""
@@ -141,27 +156,6 @@ def shot(
     raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """Arguments of :func:`shot` for all corrections."""
-
-    system_at: Callable[[float], SystemLike]
-    free: Free | None
-    shared: Array | None
-    budget: Budget | None
-    careful: bool
-
-    def beside(self, value: float) -> tuple[SystemLike, float] | None:
-        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
-        if self.free is None:
-            return None
-        step = _DIFFERENCE * self.free.scale
-        try:
-            return self.system_at(value + step), step
-        except AnalysisError:  # the family ends here
-            return self.system_at(value - step), -step
-
-
 class _Frame(NamedTuple):
     """Sizes of the states before and after a correction, the first one's section, and if the motion misses it."""
 
@@ -174,7 +168,7 @@ class _Frame(NamedTuple):
 class _Equations:
     """The equations at some nodes and their derivatives."""
 
-    def __init__(self, problem: _Problem, nodes: Nodes, frame: _Frame) -> None:
+    def __init__(self, problem: Problem, nodes: Nodes, frame: _Frame) -> None:
         if problem.budget is not None:
             problem.budget.take()
         self._problem, self.nodes, free = problem, nodes, problem.free
