@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import Slopes, UserCode, numbers
-from chilopod.flows.carrying import TooManySteps, longest_step, state_beside, pieces
+from chilopod.flows.carrying import TooManySteps, longest_step, pieces, state_beside
 from chilopod.frozen import Array
 
 Parts = list[tuple[float, float]]
