@@ -3,9 +3,8 @@
 ``wishes`` are the user's requests. ``session`` owns the walk and grants them, ``state`` is the visible state of the
 walk, ``theory`` computes the pitchfork and the branch in another process, ``words`` describes the walk, and ``body``
 places the robot's parts; none of them uses a browser. ``server`` serves the page with viser, ``gate`` checks every
-request, ``controls``, ``scene``, ``pitchfork`` and ``plots`` are the parts of the page, and ``recordings`` are handed
-out. ``presets`` has robots to choose and settings in the address, ``challenges`` tasks with a check, ``pictures`` what
-a browser without WebGL shows.
+request, ``controls``, ``scene`` and ``plots`` are the parts of the page, and ``recordings`` are handed out. ``presets``
+has robots to choose and settings in the address, ``challenges`` tasks with a check.
 """
 
 from typing import TYPE_CHECKING

@@ -16,8 +16,7 @@ import viser
 
 from chilopod.live import wishes
 from chilopod.live.challenges import CHALLENGES, Challenge
-from chilopod.live.pitchfork import Pitchfork
-from chilopod.live.plots import Plots
+from chilopod.live.plots import Pitchfork, Plots
 from chilopod.live.presets import PRESETS
 from chilopod.live.recordings import Recordings
 from chilopod.live.scene import View

@@ -1,4 +1,4 @@
-"""Access to the page: viser's server behind a check of every request and message.
+"""Access to the page: viser's server behind a check of every request and message, and ways to reach its browsers.
 
 viser alone answers every request, and sets any attribute that a message names. It listens by ``websockets``; here it
 does so by ours, which asks a :class:`Gate` first. All that is used of viser beside its documented interface is in this
@@ -261,6 +261,29 @@ class _Guarded(ServerConnection):
             message = self._gate.message(self, raw)
             if message is not None:
                 return message
+
+
+def at_server(server: viser.ViserServer, do: Callable[[], None]) -> None:
+    """Let the thread of the server do something, and wait for it.
+
+    viser wakes those who send to browsers by an event of asyncio, which no other thread may touch: with two browsers it
+    fails now and then.
+    """
+
+    async def done() -> None:
+        do()
+
+    asyncio.run_coroutine_threadsafe(done(), server.get_event_loop()).result()
+
+
+def notify(server: viser.ViserServer, sentence: str, seconds: float | None = 8.0) -> None:
+    """Show a sentence to all browsers, for some seconds or until it is closed by hand (None)."""
+
+    def show() -> None:
+        for client in server.get_clients().values():
+            client.add_notification("chilopod", sentence, auto_close_seconds=seconds)
+
+    at_server(server, show)
 
 
 def _bounded(value: Any) -> bool:

@@ -10,7 +10,7 @@ import viser
 import xarray as xr
 
 from chilopod.errors import ChilopodError
-from chilopod.live.browsers import at_server, notify
+from chilopod.live.gate import at_server, notify
 from chilopod.netcdf import netcdf
 
 

@@ -18,7 +18,6 @@ from chilopod.extras import needs
 from chilopod.live import wishes
 from chilopod.live.body import Placed, flat_places
 from chilopod.live.challenges import CHALLENGES, Challenge
-from chilopod.live.pictures import from_above
 from chilopod.live.ports import free_port
 from chilopod.live.presets import OWN, PRESETS, preset_of, query, read
 from chilopod.live.session import Session
@@ -31,9 +30,9 @@ needs("viser", extra="live")
 
 import viser  # noqa: E402  (there, as has just been seen)
 
-from chilopod.live.browsers import at_server, notify  # noqa: E402
 from chilopod.live.controls import Controls  # noqa: E402
-from chilopod.live.gate import Gate  # noqa: E402
+from chilopod.live.gate import Gate, at_server, notify  # noqa: E402
+from chilopod.live.plots import from_above  # noqa: E402
 from chilopod.live.recordings import Recordings  # noqa: E402
 from chilopod.live.scene import View, floor_place  # noqa: E402
 
