@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import Array
 from chilopod.gym.episodes import Episodes, Moment
-from chilopod.show.scene.aims import Aim
 from chilopod.show.scene.film import PIXEL, FilmPanel
-from chilopod.show.scene.frames import BodyFrames, Floor, Outcome, Scene, bodies
+from chilopod.show.scene.frames import Aim, BodyFrames, Floor, Outcome, Scene, bodies
 from chilopod.steering import ARRIVAL_RADIUS
 
 SIZE: Final = 480

@@ -6,15 +6,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import xarray as xr
+from matplotlib.figure import Figure
 
 from chilopod.analysis import StabilityMap
+from chilopod.analysis.map_picture import draw, keys
 from chilopod.netcdf import netcdf, sealed, storable
 from chilopod.notebook import Summary
 from chilopod.output import Content, write_all
 from chilopod.show import style
-from chilopod.show.figures import branch, stability_map, undulation
+from chilopod.show.figures import branch, undulation
 from chilopod.show.panel import Panel
 
+_MAP, _KEYS_IN_ROW = (5.2, 4.6), 4  # inches, of one picture of a map; and entries of its legend
 _ALONE = style.Layout("A", 4.5), style.Layout("A", 4.5)
 
 
@@ -60,10 +63,21 @@ def write_map(found: StabilityMap, shown: Sequence[str], folder: str | Path, *, 
     table = about.drop_dims("point", errors="ignore")
     curves = about.drop_dims(["x", "y"])
     with style.house_style():
-        drawn = stability_map.draw(found, shown)
+        drawn = _draw_map(found, shown)
         pictures = style.svg(drawn, "map"), style.png(drawn)
     contents = netcdf(data), csv(table).encode(), csv(curves).encode(), *pictures
     return write_all(zip(files_of_map(folder), contents, strict=True), replace=replace)
+
+
+def _draw_map(found: StabilityMap, shown: Sequence[str]) -> Figure:
+    """Pictures of a map by their names, see :meth:`StabilityMap.plot`."""
+    figure = Figure(figsize=(_MAP[0] * len(shown), _MAP[1]), layout="constrained")
+    axes = figure.subplots(1, len(shown), squeeze=False)[0]
+    for each, name in zip(axes, shown, strict=True):
+        draw(found, each, name)
+    columns = _KEYS_IN_ROW if len(shown) > 1 else _KEYS_IN_ROW // 2
+    figure.legend(handles=keys(found, axes[0]), loc="outside lower center", ncols=columns)
+    return figure
 
 
 def panel_files(

@@ -22,9 +22,8 @@ from numpy.typing import ArrayLike
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.show import style
-from chilopod.show.scene.aims import places_of
 from chilopod.show.scene.film import APART, CALM, GAP, LARGEST, PIXEL, Film, FilmPanel, Stage
-from chilopod.show.scene.frames import Scene, scene
+from chilopod.show.scene.frames import Scene, places_of, scene
 from chilopod.show.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
 
