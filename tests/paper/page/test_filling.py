@@ -17,12 +17,13 @@ from chilopod.cli import main
 from chilopod.errors import OutputError
 from chilopod.paper import registry
 from chilopod.paper.duration import Plan
-from chilopod.paper.page import Report, write_report
+from chilopod.paper.page import Report
 from chilopod.paper.page.page import Drawings, Film, State, page
 from chilopod.paper.section import Context, Found, Section, reproduce
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.show.panel import Panel
 from helpers.html_page import Page as PAGE
+from helpers.reports import write_report
 
 RUNNING = 'data-state="running"'
 THERE = """new Promise((done) => {

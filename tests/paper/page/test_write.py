@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from chilopod import load_robot
 from chilopod.errors import OutputError
 from chilopod.output import write_all
-from chilopod.paper.page import write_report
 from chilopod.paper.printed import Said
 from chilopod.paper.registry import load_sections
 from chilopod.paper.robot.sections import WALKS
@@ -24,6 +23,7 @@ from chilopod.show.figures import identification
 from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
 from helpers.html_page import Page
+from helpers.reports import write_report
 
 
 def figures(found):

@@ -1,5 +1,5 @@
 """Page of the report: draws the results of the paper's sections, computes nothing."""
 
-from chilopod.paper.page.report import Report, check_report, write_report
+from chilopod.paper.page.report import Report, check_report
 
-__all__ = ["Report", "check_report", "write_report"]
+__all__ = ["Report", "check_report"]

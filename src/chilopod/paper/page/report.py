@@ -206,17 +206,6 @@ class Report:
         write_atomic(data / "robot-3d.toml", context.whole.to_toml())
 
 
-def write_report(found: Found, folder: str | Path) -> Path:
-    """Draw all results and write the page, see :class:`Report`; return the path of the page."""
-    sections = [*found.values, *found.failures]
-    with Report(sections, found.context, folder) as report:
-        report.add(found, sections)
-    for section, error in report.failures.items():
-        if section not in found.failures:
-            raise error
-    return report.page
-
-
 def _again(draw: Callable[[], T]) -> T:
     """Draw; draw again if the folder was deleted meanwhile."""
     try:
