@@ -98,7 +98,7 @@ def atlas_pictures() -> dict[str, bytes]:
     """Figures of the atlas by their names."""
     context = Context()
     curves = scaling.collapse(context)
-    panels = scaling.panel(curves), maps.panel(maps.atlas(context, silent, curves), curves)
+    panels = scaling.panel(curves), maps.panel(maps.atlas(context, silent), curves)
     with style.house_style():
         return {panel.name: _webp(panel.draw(False)) for panel in panels}
 

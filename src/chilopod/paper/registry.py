@@ -36,8 +36,8 @@ REGISTRY: dict[str, str] = {
     "courses-robust": "courses.sections.ROBUST",
     "robot-courses": "courses.sections.ROBOT_COURSES",
     "courses-movie": "courses.sections.COURSES_FILM",
-    "scaling": "atlas.sections.SCALING",
-    "atlas": "atlas.sections.ATLAS",
+    "scaling": "atlas.scaling.SCALING",
+    "atlas": "atlas.maps.ATLAS",
 }
 """Module and constant of each section, by its name: the paper's own experiments, then the studies beyond them."""
 

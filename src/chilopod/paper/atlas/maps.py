@@ -16,8 +16,8 @@ from chilopod.analysis import StabilityMap
 from chilopod.analysis.map_axes import Given, Plane
 from chilopod.analysis.map_picture import draw, keys
 from chilopod.analysis.parameters import K1, spring_scale
-from chilopod.paper.atlas.scaling import predicted
-from chilopod.paper.section import Context
+from chilopod.paper.atlas.scaling import CHAPTER, SCALING, predicted
+from chilopod.paper.section import Context, Section
 from chilopod.progress import Progress, part
 from chilopod.show import style
 from chilopod.show.panel import Panel
@@ -99,7 +99,7 @@ _LAW = 40  # values on an axis, for the line of the law
 _ROW, _ONE = 3.9, 3.6  # inches, height of a row of two maps, and of one
 
 
-def atlas(context: Context, progress: Progress, curves: xr.Dataset | None) -> dict[str, StabilityMap]:
+def atlas(context: Context, progress: Progress) -> dict[str, StabilityMap]:
     """The maps of :data:`CHARTS` by their letters; two of them if the report is tiny."""
     found, points, letters = {}, context.size.of(97, 49, 5), context.size.cut("ABCDEFGH", "BG")
     for row, letter in enumerate(letters):
@@ -171,3 +171,8 @@ def _law(axes: Axes, found: StabilityMap, curves: xr.Dataset) -> None:
         found.x.shown(x), found.y.shown(y), ratio, [1.0], colors=style.PURPLE, linestyles=[(0, (1, 3))], linewidths=2.5
     )
     axes.plot([], [], ":", color=style.PURPLE, linewidth=2.5, label="scaling law")
+
+
+ATLAS: Section[dict[str, StabilityMap]] = Section(
+    "atlas", CHAPTER, "eight maps of the straight walk", atlas, panels=panel, beside=(SCALING,), beyond=True
+)

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from chilopod.analysis.parameters import ALL, PAPER_UNIT, spring_scale, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
-from chilopod.paper.section import Context
+from chilopod.paper.section import Context, Section
 from chilopod.paper.shapes import DASHED, DOTTED, finish, legend_below
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -28,6 +28,7 @@ from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, number
 
+CHAPTER = "An atlas for designers"
 BUILT = "as built"
 ROBOTS = {
     BUILT: {},
@@ -173,3 +174,14 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     finish(axes["C"], title="C", ylim=(0.0, None), legend="upper left", **labels)
     legend_below(figure, axes["A"], 1 if narrow else 3)
     return figure
+
+
+SCALING: Section[xr.Dataset] = Section(
+    "scaling",
+    CHAPTER,
+    "the scaling law of critical springs",
+    collapse,
+    panels=panel,
+    beyond=True,
+    headline=True,
+)
