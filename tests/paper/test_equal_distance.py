@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
-from chilopod.paper.measures import onset, radius_at, shares
+from chilopod.paper.measures import change, law_ratio, onset, radius_at, radius_ratio, shares
 from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
 from chilopod.statistics import Estimate
 from helpers.made_up_robot import AMPLITUDE, series

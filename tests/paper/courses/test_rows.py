@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from chilopod.paper.courses.rows import compared_rows, robust_rows
-from chilopod.paper.courses.summary import summaries, verdicts
+from chilopod.paper.courses.rows import compared_rows, robust_rows, summaries, verdicts
 from chilopod.paper.table import Verdict
 from helpers.made_up_courses import compared, conditions
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from chilopod.engine import Observation
-from chilopod.paper.courses.robust import ablated, planar_conditions, under, whole_conditions
 from chilopod.paper.courses.steps import steps
-from chilopod.paper.courses.study import PLANAR, compared, prepared
+from chilopod.paper.courses.study import PLANAR, ablated, compared, planar_conditions, prepared, under, whole_conditions
 from chilopod.paper.section import Context, Size
 from chilopod.steering import ON_COURSES
 from chilopod.tasks.course import random_courses

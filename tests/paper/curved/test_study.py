@@ -8,7 +8,7 @@ from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.paper.curved import study as curved_findings
-from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
+from chilopod.paper.curved.study import curved_trials, off_branch, on_branch
 from chilopod.paper.printed import variant_robots
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
@@ -55,7 +55,7 @@ def test_stiff_springs_walk_straight(even):
 
 
 def test_walks_that_have_not_settled_are_told(monkeypatch):
-    monkeypatch.setattr("chilopod.paper.curved.trials._SHORTEST", 36.0)
+    monkeypatch.setattr("chilopod.paper.curved.study._SHORTEST", 36.0)
     short = curved_trials(ROBOT, (8.0, 10.0), 2, e_folds=1.0)
     assert short.duration.values == pytest.approx(36.0)
     assert not short.settled.any()

@@ -8,7 +8,7 @@ import xarray as xr
 
 from chilopod.paper import statements
 from chilopod.paper.fit_data import walking_speed
-from chilopod.paper.robot import numerics, why
+from chilopod.paper.robot import spread, why
 from chilopod.paper.robot.rows import duration_rows, turning_rows, walk_rows
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.robot.walks import BEND, SPRINGS, VARIANT_SPRINGS
@@ -310,7 +310,7 @@ def test_numerics_on_both_sides(moved, part, verdict):
         coords={"case": ["2 ms", "1 ms"], "spring": [15.0, 21.0]},
     )
     data[moved] = data[moved].where(data.case == "2 ms", part)
-    (row,) = robot_rows(numerics.rows(data), statements.ORDER)
+    (row,) = robot_rows(spread.numeric_rows(data), statements.ORDER)
     assert (row.quantity, row.verdict) == (statements.NUMERICS.quantity, verdict)
 
 

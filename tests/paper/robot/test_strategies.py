@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.paper.robot.strategies import INSTANTS, compared, verdict
+from chilopod.paper.robot.turning import INSTANTS, compared, verdict
 from chilopod.paper.turning.criteria import ratios
 from chilopod.paper.turning.trials import strategy_tasks
 from chilopod.steering import ARRIVAL_RADIUS, Target

@@ -12,9 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chilopod.frozen import Array
-from chilopod.paper.courses.robust import USUAL, Robust
-from chilopod.paper.courses.rows import decisions, percent
-from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, verdicts
+from chilopod.paper.courses.rows import (
+    Summary,
+    decisions,
+    percent,
+    share_of_courses,
+    share_of_targets,
+    summaries,
+    verdicts,
+)
+from chilopod.paper.courses.study import USUAL, Robust
 from chilopod.paper.shapes import finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel

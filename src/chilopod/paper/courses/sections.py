@@ -5,10 +5,9 @@ from __future__ import annotations
 import xarray as xr
 
 from chilopod.analysis.parameters import PAPER_UNIT
-from chilopod.paper.courses import figures, robust
-from chilopod.paper.courses.robust import Robust
+from chilopod.paper.courses import figures, study
 from chilopod.paper.courses.rows import compared_rows, condition_rows, robust_rows
-from chilopod.paper.courses.study import PLANAR, WHOLE, compared, prepared, without_setting
+from chilopod.paper.courses.study import PLANAR, WHOLE, Robust, compared, prepared, without_setting
 from chilopod.paper.section import Context, Movie, Section
 from chilopod.progress import Progress, part
 from chilopod.steering import COURSES as COURSES_NAMED
@@ -28,17 +27,17 @@ def _compared(context: Context, report: Progress) -> xr.Dataset:
 
 
 def _robust(context: Context, report: Progress, found: xr.Dataset | None) -> Robust:
-    variable, seeds = prepared(context), context.size.of(*robust.PLANAR_COURSES)
-    best, conditions = best_fixed(found, _BEST), robust.planar_conditions(context.robot)
-    steps = robust.ablated(context, variable, seeds, part(report, 0.0, 0.2, "steps"))
-    return Robust(steps, robust.under(context, variable, best, conditions, seeds, part(report, 0.2, 1.0)))
+    variable, seeds = prepared(context), context.size.of(*study.PLANAR_COURSES)
+    best, conditions = best_fixed(found, _BEST), study.planar_conditions(context.robot)
+    steps = study.ablated(context, variable, seeds, part(report, 0.0, 0.2, "steps"))
+    return Robust(steps, study.under(context, variable, best, conditions, seeds, part(report, 0.2, 1.0)))
 
 
 def _whole(context: Context, report: Progress) -> Robust:
-    variable, seeds = prepared(context, "twin"), context.size.of(*robust.WHOLE_COURSES)
+    variable, seeds = prepared(context, "twin"), context.size.of(*study.WHOLE_COURSES)
     data = compared(context, variable, WHOLE[context.size], part(report, 0.0, 0.7))
-    best, conditions = best_fixed(data, _WHOLE_BEST), robust.whole_conditions(context.whole)
-    return Robust(data, robust.under(context, variable, best, conditions, seeds, part(report, 0.7, 1.0)))
+    best, conditions = best_fixed(data, _WHOLE_BEST), study.whole_conditions(context.whole)
+    return Robust(data, study.under(context, variable, best, conditions, seeds, part(report, 0.7, 1.0)))
 
 
 def _film(context: Context, report: Progress, found: xr.Dataset | None) -> list[Movie]:

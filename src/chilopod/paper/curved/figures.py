@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 
 from chilopod.frozen import Array
 from chilopod.paper import printed, shapes
-from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, fluctuation
-from chilopod.paper.curved.trials import on_branch
+from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, fluctuation, on_branch
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, signed, spring, typeset

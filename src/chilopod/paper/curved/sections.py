@@ -11,7 +11,7 @@ from chilopod.analysis.undulation import DISTANCES, undulating_walks
 from chilopod.paper import printed, statements
 from chilopod.paper.curved import figures
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, curved_study, fluctuation
-from chilopod.paper.equal_distance import change, radius_ratio
+from chilopod.paper.measures import change, radius_ratio
 from chilopod.paper.section import Section
 from chilopod.paper.table import INCREASES, OfPlanar, Result, Row, Verdict, agreement, unprinted
 from chilopod.show.figures import branch, undulation

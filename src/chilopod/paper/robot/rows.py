@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
-from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
-from chilopod.paper.measures import onset_point, radius_at, shares, spring_for
+from chilopod.paper.measures import change, law_ratio, onset_point, radius_at, radius_ratio, shares, spring_for
 from chilopod.paper.printed import Band, Said, Task
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import UNDULATION, RobotWalks

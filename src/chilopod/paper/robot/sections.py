@@ -5,13 +5,12 @@ from __future__ import annotations
 import xarray as xr
 
 from chilopod.paper.movies import robot_movies
-from chilopod.paper.robot import numerics, why
+from chilopod.paper.robot import why
 from chilopod.paper.robot.figures import trust, turning, walks
 from chilopod.paper.robot.rows import turning_rows, walk_rows
-from chilopod.paper.robot.spread import twin_spread
-from chilopod.paper.robot.strategies import robot_strategies
+from chilopod.paper.robot.spread import numeric_rows, twin_numerics, twin_spread
 from chilopod.paper.robot.structures import structures
-from chilopod.paper.robot.turning import RobotTurning, robot_turning
+from chilopod.paper.robot.turning import RobotTurning, robot_strategies, robot_turning
 from chilopod.paper.robot.walks import RobotWalks, robot_walks
 from chilopod.paper.section import Movie, Section
 
@@ -51,7 +50,7 @@ SPREAD: Section[xr.Dataset] = Section(
     beyond=True,
 )
 NUMERICS: Section[xr.Dataset] = Section(
-    "robot-numerics", CHAPTER, "the whole robot in 3-D: finer steps", numerics.twin_numerics, numerics.rows, beyond=True
+    "robot-numerics", CHAPTER, "the whole robot in 3-D: finer steps", twin_numerics, numeric_rows, beyond=True
 )
 STRUCTURES: Section[xr.Dataset] = Section(
     "robot-structures",

@@ -1,8 +1,8 @@
-"""Predictions of the twin over the valley of constants that its data leave open.
+"""How far to trust the twin: its predictions over the valley of constants that its data leave open, and its numerics.
 
 Weighted samples of two valleys, results of ``chilopod identify twin``, are included: with joints without dry friction,
 and with any. Sets of constants that are drawn by these weights predict the printed results of other experiments, each
-with few undisturbed walks.
+with few undisturbed walks. The base series is repeated with finer steps and a tighter solver.
 """
 
 from __future__ import annotations
@@ -13,22 +13,25 @@ import numpy as np
 import xarray as xr
 
 from chilopod import trials
-from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.errors import ParameterError
 from chilopod.paper import printed
-from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
-from chilopod.paper.measures import Folder, onset_point, spring_walks
+from chilopod.paper.measures import Folder, fitted, onset_point, over_springs, point_of, radius_ratio, spring_walks
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.robot.walks import UNDULATION, lower_steps, uniform_modes, walk_ends
 from chilopod.paper.section import Context, Size
+from chilopod.paper.statements import NUMERICS
+from chilopod.paper.table import OfTwin, Result, of_twin
 from chilopod.paper.turning.trials import to_target
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
 from chilopod.tasks.identify.twin import known, samples_of
+from chilopod.tasks.identify.twin_series import DURATION, base_series
 from chilopod.trials import NONE
+from chilopod.twin.walk import TOLERANCE
 
 SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
 """k1 of the variants, N*mm/deg."""
@@ -46,6 +49,12 @@ LOWER = ", lower steps"
 
 _DURATION = 60.0  # s
 _BENT = 0.8  # rad in all, that walks begin with
+
+NUMERIC_SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
+"""k1 of the walks with other numerics, N*mm/deg."""
+
+CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, TOLERANCE), "tight": (2e-3, 1e-13)}
+"""Step (s) and tolerance of the contact solver; all studies use the first."""
 
 
 def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
@@ -149,3 +158,50 @@ def nearest_springs(robot: Robot, folder: Folder = None, size: Size = Size.FULL)
         found["best"][letter] = springs[int(np.argmin(nearest))]
         found["arrives"][letter] = bool(min(nearest) < ARRIVAL_RADIUS)
     return found
+
+
+def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
+    """Onset, radii and speeds with finer steps and a tighter solver; if not full, the first two cases only.
+
+    Returns
+    -------
+    Dataset over case and spring: ``axis_radius`` (m) and ``speed`` of module 1 (m/s); over case: ``onset`` by the
+    paper's method (N*mm/deg).
+    """
+    robot, size = context.whole, context.size
+    radii, speeds, onsets = [], [], []
+    cases = CASES if size is Size.FULL else dict(list(CASES.items())[:2])
+    springs, duration = size.cut((NUMERIC_SPRINGS, DURATION), (NUMERIC_SPRINGS[::2], 10.0))
+    for index, (name, (step, tolerance)) in enumerate(cases.items()):
+        progress(index / len(cases), name)
+        finer = robot.with_value("twin.timestep", step)
+        found = base_series(
+            finer, base_series_data(), [*map(stiffness, springs)], tolerance=tolerance, duration=duration
+        )
+        speeds.append(found.speeds)
+        radii.append(robot.axis_radius(found.bends))
+        onsets.append(point_of(fitted(1.0 / np.array(springs), np.abs(found.bends[:, 0]))).value)
+    return xr.Dataset(
+        {
+            "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
+            "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
+            "onset": ("case", np.array(onsets), {"units": PAPER_UNIT}),
+        },
+        coords={"case": list(cases), "spring": over_springs(springs)},
+        attrs={"robot": robot.name},
+    )
+
+
+def numeric_rows(data: xr.Dataset) -> list[OfTwin]:
+    """The line of the robot's table."""
+    moves = data[["onset", "axis_radius", "speed"]] / data.isel(case=0, drop=True) - 1.0
+    at_21 = 100.0 * moves.sel(spring=21.0)
+    said = "; ".join(
+        f"{name}: onset {float(at.onset):+.1f} %, radius at 21 {float(at.axis_radius):+.1f} %, "
+        f"speed {float(at.speed):+.1f} %"
+        for name, at in ((str(name), at_21.sel(case=name)) for name in data.case.values[1:])
+    )
+    # NaN if a walk failed.
+    move = float(max(np.abs(each.values).max() for each in moves.data_vars.values()))
+    words = f"{said}; largest move of onset, and radii and speeds at 15 to 28 N*mm/deg, {100.0 * move:.1f} %"
+    return [of_twin(NUMERICS, Result(f"{words} (one walk each, without an error)", move, 0.0))]

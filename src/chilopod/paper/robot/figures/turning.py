@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from chilopod.paper import printed
 from chilopod.paper.measures import spring_for
 from chilopod.paper.printed import CRITERION_NAMES
-from chilopod.paper.robot.strategies import INSTANTS, verdict
-from chilopod.paper.robot.turning import RobotTurning
+from chilopod.paper.robot.turning import INSTANTS, RobotTurning, verdict
 from chilopod.paper.robot.walks import RobotWalks
 from chilopod.paper.shapes import DASHED, finish, legend_below
 from chilopod.paper.statements import listed

@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chilopod.paper import printed, shapes, statements
-from chilopod.paper.equal_distance import onset_of_bend
-from chilopod.paper.measures import onset_point, radius_at
+from chilopod.paper.measures import onset_of_bend, onset_point, radius_at
 from chilopod.paper.robot.rows import duration_rows
 from chilopod.paper.robot.walks import RobotWalks
 from chilopod.show import style
