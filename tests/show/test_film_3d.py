@@ -133,13 +133,13 @@ def test_the_poster_is_as_large_as_the_film(drawn, record):
 
 
 def test_stills(drawn, record):
-    picture = read(stills(record, [0.0, 0.5, 1.0], titles=["a", "b"], size=(160, 120)))
-    one = read(stills(record.isel(robot=[0]), [0.0, 1.0], heading="h", size=(160, 120)))
-    assert picture.shape[1] > 3 * 160
-    assert picture.shape[0] > 2 * 120
-    assert one.shape[1] < 3 * 160
-    assert near(255.0 * one, style.BLUE)[:, :172].any()
-    assert near(255.0 * one, style.BLUE)[:, 172:].any()
+    picture = read(stills(record, [0.0, 0.5, 1.0], titles=["a", "b"]))
+    one = read(stills(record.isel(robot=[0]), [0.0, 1.0], titles=["a"]))
+    assert picture.shape[1] > 3 * 640
+    assert picture.shape[0] > 2 * 400
+    assert one.shape[1] < 3 * 640
+    assert near(255.0 * one, style.BLUE)[:, :652].any()
+    assert near(255.0 * one, style.BLUE)[:, 652:].any()
 
 
 def test_what_cannot_be_drawn(monkeypatch, record):
@@ -151,14 +151,12 @@ def test_what_cannot_be_drawn(monkeypatch, record):
         Film3D(record.drop_vars("pose"), **names).mp4()
     for times in ([], [-1.0], [2.0], [float("nan")], [0.5] * 40):
         with pytest.raises(ParameterError, match="times"):
-            stills(record, times)
-    with pytest.raises(ParameterError, match="size"):
-        stills(record, [0.0], size=(10, 10))
+            stills(record, times, titles=["a", "b"])
     monkeypatch.setattr(gl, "find", lambda: gl.Found(None, missing="no OpenGL works", mend="plug one in"))
     with pytest.raises(OutputError, match="no OpenGL works; to mend it: plug one in"):
         Film3D(record, **names).mp4()
     with pytest.raises(OutputError, match="plug one in"):
-        stills(record, [0.0])
+        stills(record, [0.0], titles=["a", "b"])
     monkeypatch.setattr("chilopod.show.scene.film.has_encoder", lambda: False)
     with pytest.raises(OutputError, match="encoder"):
         Film3D(record, **names).mp4()

@@ -11,7 +11,7 @@ from chilopod.frozen import Array
 from chilopod.live.body import Placed
 from chilopod.live.state import Seen
 from chilopod.robot import Robot
-from chilopod.show.scene.outline_3d import drawn, yaw_joint
+from chilopod.show.scene.replay_3d import drawn, yaw_joint
 from chilopod.twin.model import compiled, without_springs
 
 _KINDS = {"box": "box", "capsule": "rod", "cylinder": "rod", "sphere": "ball"}

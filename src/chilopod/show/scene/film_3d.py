@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
@@ -22,7 +23,7 @@ from numpy.typing import ArrayLike
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.show import style
-from chilopod.show.scene.film import APART, CALM, GAP, LARGEST, PIXEL, Film, FilmPanel, Stage
+from chilopod.show.scene.film import APART, CALM, GAP, PIXEL, Film, FilmPanel, Stage
 from chilopod.show.scene.frames import Scene, places_of, scene
 from chilopod.show.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
@@ -51,16 +52,9 @@ class Film3D(Film):
                 yield stage
 
 
-def stills(
-    record: xr.Dataset,
-    times: ArrayLike,
-    *,
-    titles: Mapping[Any, str] | Sequence[str] | None = None,
-    heading: str = "",
-    size: tuple[int, int] = _PICTURE,
-) -> bytes:
-    """Moments of walks (s, shape (T,)) as pictures of a size (pixels) in one PNG, all of the same piece of floor; a row
-    for every robot. The nearest samples are shown.
+def stills(record: xr.Dataset, times: ArrayLike, *, titles: Mapping[Any, str] | Sequence[str]) -> bytes:
+    """Moments of walks (s, shape (T,)) as pictures in one PNG, all of the same piece of floor; a row for every robot.
+    The nearest samples are shown.
 
     Raises a ParameterError if a time is not in the record, there are too many, or the record is refused by
     :class:`Film3D`, and an OutputError if there is no OpenGL.
@@ -75,13 +69,10 @@ def stills(
         allowed = f"{recorded[0]:g} to {recorded[-1]:g} s"
         value = float(wanted[outside][0])
         raise ParameterError("must be a time of the record", field="times", value=value, allowed=allowed)
-    if any(not _NARROWEST <= side <= LARGEST for side in size):
-        allowed = f"{_NARROWEST} to {LARGEST} pixels"
-        raise ParameterError("must be the size of a picture", field="size", value=size, allowed=allowed)
-    walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
-    robot, view = walks.shown.frames.robot, walks.view(size)
-    with gl.context(*size), style.house_style(), closing(Studio(robot, size, view, fine=True)) as studio:
-        return style.png(_arranged(walks, studio, heading, size), dpi=PIXEL)
+    walks = _Walks(record, titles, wanted)
+    robot, view = walks.shown.frames.robot, walks.view(_PICTURE)
+    with gl.context(*_PICTURE), style.house_style(), closing(Studio(robot, _PICTURE, view, fine=True)) as studio:
+        return style.png(_arranged(walks, studio, view), dpi=PIXEL)
 
 
 class _Walks:
@@ -156,8 +147,9 @@ class _Stage3D(Stage):
 
     def _layout(self, width: float, height: float, longest: float) -> tuple[float, float, int, int]:
         count, robot = len(self.shown.titles), self.shown.frames.robot
-        columns = _columns(count)
-        rows = math.ceil(count / columns)
+        # Side by side as long as panels are not too narrow, then in rows that are as full as can be.
+        rows = math.ceil(count / 3)
+        columns = math.ceil(count / rows)
         across = max(_NARROWEST, int((width - APART * (columns - 1)) / columns))
         lines = 1 if longest <= across else 2
         tall = max(_LOWEST, int((height - GAP * (rows - 1)) / rows - self._tall(lines)))
@@ -196,29 +188,18 @@ class _Panel3D(FilmPanel):
         frame[:] = picture[: frame.shape[0], : frame.shape[1]]
 
 
-def _columns(count: int) -> int:
-    """Side by side as long as panels are not too narrow, then in rows that are as full as can be."""
-    rows = math.ceil(count / 3)
-    return math.ceil(count / rows)
-
-
-def _arranged(walks: _Walks, studio: Studio, heading: str, size: tuple[int, int]) -> Figure:
+def _arranged(walks: _Walks, studio: Studio, view: View) -> Figure:
     """Pictures in rows under their captions."""
-    shown, view = walks.shown, walks.view(size)
+    shown, size = walks.shown, _PICTURE
     count, robots = len(walks.samples), len(shown.titles)
-    columns = count if robots > 1 else _columns(count)
-    rows = robots if robots > 1 else math.ceil(count / columns)
     font = max(12.0, size[0] / 32.0)
-    caption, above = 1.7 * font, 2.2 * font if heading else 0.5 * GAP
-    width = columns * (size[0] + GAP) + GAP
-    height = rows * (size[1] + caption) + above + GAP
+    caption, above = 1.7 * font, 0.5 * GAP
+    width = count * (size[0] + GAP) + GAP
+    height = robots * (size[1] + caption) + above + GAP
     figure = Figure(figsize=(width / PIXEL, height / PIXEL), dpi=PIXEL)
-    if heading:
-        figure.text(GAP / width, 1.0 - 0.5 * font / height, heading, fontsize=1.2 * font, weight="bold", va="top")
-    for number in range(count * robots):
-        index, robot = number % count, number // count
-        x = GAP + (number % columns) * (size[0] + GAP)
-        y = height - above - (number // columns) * (size[1] + caption)
+    for robot, index in product(range(robots), range(count)):
+        x = GAP + index * (size[0] + GAP)
+        y = height - above - robot * (size[1] + caption)
         says = f"{shown.frames.time[index]:.1f} s"
         title = shown.titles[robot] if index == 0 else ""
         figure.text(x / width, (y - 0.3 * font) / height, title, fontsize=font, weight="bold", va="top")

@@ -10,6 +10,7 @@ values are NaN. The attribute ``robot`` is the text of the robot file.
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -26,6 +27,10 @@ from chilopod.robot import Robot
 from chilopod.show.words import round_down
 from chilopod.steering import ARRIVAL_RADIUS, Verdict, arrivals
 
+LARGEST: Final = 32767
+"""Largest whole number that stands for a position on a page; the smallest is minus that."""
+
+_NOWHERE: Final = -32768  # stands for NaN
 # Phases such as 0.62/0.31 miss their integer by round-off; a foot nearer than this (in cycles) to a switch has made it.
 _SAME_PHASE: Final = 1e-9
 _MARGIN: Final = 0.06
@@ -326,3 +331,15 @@ def close(frames: BodyFrames) -> Floor:
 def _grid(extent: float) -> float:
     """1 m where that makes a readable grid, otherwise 1, 2 or 5 times the power of ten that does."""
     return 1.0 if 2.0 <= extent <= 14.0 else round_down(extent / 3.0)
+
+
+def packed(values: NDArray[np.float64], origin: NDArray[np.float64], step: NDArray[np.float64] | float) -> NDArray[Any]:
+    """Whole numbers of steps from an origin, clipped to their range."""
+    with np.errstate(over="ignore"):
+        steps = np.round((values - origin) / step).clip(-LARGEST, LARGEST)
+    return np.where(np.isnan(steps), _NOWHERE, steps).astype("<i2")
+
+
+def encoded(values: NDArray[Any]) -> str:
+    """An array, which should be little-endian, in base64."""
+    return b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

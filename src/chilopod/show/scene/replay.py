@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.frozen import Array
 from chilopod.output import write_atomic
-from chilopod.show.scene.frames import Scene, robot_of, scene
+from chilopod.show.scene.frames import LARGEST, Scene, encoded, packed, robot_of, scene
 from chilopod.show.scene.outline import SLIMNESS
-from chilopod.show.scene.packing import LARGEST, encoded, packed
 from chilopod.show.style import SCENE, THIN
 from chilopod.show.templates import template
 

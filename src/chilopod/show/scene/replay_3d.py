@@ -1,4 +1,4 @@
-"""Data of a page that plays walks of the three-dimensional robot from any point of view."""
+"""Shapes of the three-dimensional robot, and data of a page that plays its walks from any point of view."""
 
 from __future__ import annotations
 
@@ -11,15 +11,32 @@ import xarray as xr
 
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
-from chilopod.show.scene.frames import Scene
-from chilopod.show.scene.outline_3d import drawn, yaw_joint
-from chilopod.show.scene.packing import LARGEST, encoded, packed
-from chilopod.twin.model import TwinModel, compiled
+from chilopod.show.scene.frames import LARGEST, Scene, encoded, packed
+from chilopod.twin.model import POLE_GROUP, TwinModel, compiled
 
 FINE: Final = 10
 """Thin grid lines from one grid line to the next."""
 
+_SHAPES: Final = {
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+}
+_PIN: Final = (0.16, 1.06)  # radius of a drawn yaw joint over the width of a module, its height over the module's
 _WILDEST: Final = 10.0  # m and rad: what diverges is drawn no further than that
+
+
+def drawn(model: mujoco.MjModel) -> dict[int, str]:
+    """Geoms of a robot and their kinds: box, capsule, cylinder or sphere; without the pole it walks to."""
+    kinds = {geom: _SHAPES.get(int(model.geom_type[geom])) for geom in range(model.ngeom)}
+    return {geom: kind for geom, kind in kinds.items() if kind and model.geom_group[geom] != POLE_GROUP}
+
+
+def yaw_joint(model: mujoco.MjModel) -> tuple[float, float]:
+    """Radius and half height of the upright cylinder that represents a yaw joint, m."""
+    _, half_width, half_height = model.geom("module1_box").size
+    return float(_PIN[0] * 2.0 * half_width), float(_PIN[1] * half_height)
 
 
 def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
