@@ -15,8 +15,8 @@ from dataclasses import replace
 from chilopod.robot import load_robot
 from chilopod.steering import LegYawController, Target
 from chilopod.trials import Cluster, Here, Trial, run
-from chilopod.trials.file import content_of
 from chilopod.trials.on_worker import packed, unpacked
+from chilopod.trials.store import content_of
 
 from _timing import duration, machine, median_seconds, table, write_section
 

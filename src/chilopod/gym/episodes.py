@@ -26,7 +26,7 @@ from chilopod.record import LONGEST
 from chilopod.robot import Robot
 from chilopod.steering import CourseReferee, Judged, Verdict
 from chilopod.tasks.course import patience_of
-from chilopod.trials.disturbance import Disturbance, Drawn, conditions, draw
+from chilopod.trials.trial import Disturbance, Drawn, conditions, draw
 
 _MOST = 1 << 20  # robots
 _A_LOOK = 2.0 * (8.0 + 1.0)  # bytes of a look's error and its miss, drawn and in one array

@@ -12,24 +12,22 @@ from chilopod.lazy import exports
 if TYPE_CHECKING:
     from chilopod.trials.batch import batches, walked
     from chilopod.trials.cluster import Cluster
-    from chilopod.trials.disturbance import NONE, Disturbance, Drawn, draw
     from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import as_now, check_fits, run, run_each, together
     from chilopod.trials.store import Store
     from chilopod.trials.summary import AVERAGED, WalkSummary, mean_joint_angles, straight, summaries
-    from chilopod.trials.trial import Trial
+    from chilopod.trials.trial import NONE, Disturbance, Drawn, Trial, draw
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
             "batch": ("batches", "walked"),
             "cluster": ("Cluster",),
-            "disturbance": ("NONE", "Disturbance", "Drawn", "draw"),
             "executors": ("Executor", "Here", "using"),
             "run": ("as_now", "check_fits", "run", "run_each", "together"),
             "store": ("Store",),
             "summary": ("AVERAGED", "WalkSummary", "mean_joint_angles", "straight", "summaries"),
-            "trial": ("Trial",),
+            "trial": ("NONE", "Disturbance", "Drawn", "Trial", "draw"),
         },
     )
 

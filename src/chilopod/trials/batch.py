@@ -19,9 +19,8 @@ from chilopod.progress import Progress, silent
 from chilopod.steering import CourseReferee, Target, add_measures
 from chilopod.steering.measures import lengths
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
-from chilopod.trials.disturbance import Drawn, conditions, draw
 from chilopod.trials.record_check import check_record
-from chilopod.trials.trial import Trial
+from chilopod.trials.trial import Drawn, Trial, conditions, draw
 
 NOT_KEPT = "not kept"
 """Attribute with the reason why a record must not be kept; files never have it."""

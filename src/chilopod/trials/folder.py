@@ -18,7 +18,7 @@ from chilopod.errors import OutputError, ParameterError
 from chilopod.netcdf import UnsoundError
 from chilopod.progress import Progress, silent
 from chilopod.trials.claims import nobody_in
-from chilopod.trials.file import Header, read_header
+from chilopod.trials.store import Header, read_header
 from chilopod.trials.trial import digest_of, versions_of
 
 _TRIAL = re.compile(r".+-[0-9a-f]{20}\.nc")

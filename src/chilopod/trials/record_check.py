@@ -16,8 +16,7 @@ from chilopod.errors import AnalysisError, in_words
 from chilopod.record import LARGEST, MOTION, QUANTITIES
 from chilopod.steering import Target
 from chilopod.trials.description import file_text
-from chilopod.trials.disturbance import Drawn
-from chilopod.trials.trial import Trial
+from chilopod.trials.trial import Drawn, Trial
 
 _NEAR = 1e-6  # rad, m, of stiffness relative
 _SAME_INSTANT = 1e-9  # s
