@@ -8,7 +8,7 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.cli import main
-from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.printed import base_series_data
 from chilopod.tasks.identify import twin
 from chilopod.tasks.identify.twin_series import Series
 from helpers.command_line import printed

@@ -39,7 +39,7 @@ def test_what_walks_loads_the_twin_only_where_it_walks():
 
 
 def test_the_live_page_and_the_environments_know_no_paper():
-    code = "import chilopod.live.server, chilopod.gym.envs, chilopod.show.walk_files, chilopod.show.files"
+    code = "import chilopod.live.server, chilopod.gym.envs, chilopod.show.files"
     paper = [f"chilopod.paper{part}" for part in ("", ".printed", ".scatter", ".section", ".registry", ".table")]
     assert loaded(code, *paper) == set()
 

@@ -18,7 +18,7 @@ class KnownConstants:
 
     def attack(self, chance: Random, place: Place) -> Outcome:
         """One robot."""
-        from chilopod.paper.fit_data import critical_mode_data
+        from chilopod.paper.printed import critical_mode_data
         from chilopod.robot import load_robot
         from chilopod.tasks.identify import self_test
 

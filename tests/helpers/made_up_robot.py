@@ -78,7 +78,7 @@ def _walks():
         attrs={"amplitude": np.deg2rad(5.0)},
     )
     lower = {"stride 1.8 cm": series(VARIANT_SPRINGS, 25.0)}
-    return RobotWalks(ROBOT, series(SPRINGS, 34.0), durations((34.0,) * 5), variants, lower, examples, uniform)
+    return RobotWalks(series(SPRINGS, 34.0), durations((34.0,) * 5), variants, lower, examples, uniform)
 
 
 def walks(**changes):

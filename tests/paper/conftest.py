@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.paper.fit_data import critical_mode_data
+from chilopod.paper.printed import critical_mode_data
 from chilopod.paper.registry import chosen
 from chilopod.paper.section import Context, Found, Movie, Size, reproduce
 from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES

@@ -9,7 +9,7 @@ import pytest
 from chilopod.errors import OutputError
 from chilopod.show import style
 from chilopod.show.figures.course import draw
-from chilopod.show.walk_files import files_of_walks, write_walks
+from chilopod.show.files import files_of_walks, write_walks
 from chilopod.steering import STRATEGIES
 from helpers.html_page import Page
 from helpers.walks import on_course, walk

@@ -106,7 +106,7 @@ def planar(options: _PlanarOptions) -> None:
 
     if options.printed("planar"):
         return
-    from chilopod.paper.fit_data import critical_mode_data, variant_settings
+    from chilopod.paper.printed import critical_mode_data, variant_settings
 
     robot, given, variants = options.described, options.data, variant_settings() if options.data is None else {}
     data: identify.CriticalMode | identify.RecordedWalks = (
@@ -160,7 +160,7 @@ def twin(options: _TwinOptions) -> None:
 
     if options.printed("twin"):
         return
-    from chilopod.paper.fit_data import base_series_data
+    from chilopod.paper.printed import base_series_data
 
     robot, given, counts = options.described, options.data, (options.evaluations, options.samples, options.seed)
     data = identify.load_data(given, identify.BaseSeries) if given else base_series_data()

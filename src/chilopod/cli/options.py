@@ -226,14 +226,14 @@ class WalkOptions(RobotOptions):
     def walk_into(self, out: Path | None, what: str, walk: Callable[[Callable[[str], Progress]], Found]) -> None:
         """Walk a ``turn`` or a ``course``, write its files into the folder, if there is one, and print it."""
         if out:
-            from chilopod.show.walk_files import files_of_walks
+            from chilopod.show.files import files_of_walks
 
             free(files_of_walks(what, out), self.force)
         with self.walking(what) as progress:
             done = walk(progress)
 
         def write() -> Iterable[Path]:
-            from chilopod.show.walk_files import write_walks
+            from chilopod.show.files import write_walks
 
             return write_walks(what, done, out or "", replace=self.force)
 

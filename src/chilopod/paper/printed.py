@@ -1,4 +1,4 @@
-"""Printed numbers of the paper, and the condition on a number that agrees with each.
+"""Printed numbers of the paper, the condition on a number that agrees with each, and tables to fit constants to.
 
 S. Aoi et al., "Advanced turning maneuver of a many-legged robot using pitchfork bifurcation", IEEE Transactions on
 Robotics, 2022. The numbers are those of its planar model and of its robot; springs are in N*mm/deg, as printed.
@@ -6,12 +6,14 @@ Robotics, 2022. The numbers are those of its planar model and of its robot; spri
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.robot import Robot
-from chilopod.steering import Outcome, Target
+from chilopod.steering import ARRIVAL_RADIUS, Outcome, Target
+from chilopod.tasks.identify import BaseSeries, CriticalMode
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,9 @@ class Task:
     source: str
 
 
+FIT_TOLERANCE = 0.05
+"""Standard error of the base series' numbers in fits, relative: half of the tolerances in the report's verdicts."""
+
 ONSETS = 0.10
 """Relative tolerance of every spring at which straight walks of the robot end."""
 
@@ -148,7 +153,7 @@ ARRIVAL = Number(23.0, "s", 0.15 * 23.0)
 """Earliest arrival of the robot in task A."""
 
 SPEED = 0.10
-"""Relative tolerance of the walking speed, which follows from the earliest arrival (:mod:`chilopod.paper.fit_data`)."""
+"""Relative tolerance of the walking speed, which follows from the earliest arrival (:func:`walking_speed`)."""
 
 REPEATS, WITHOUT_LEG_YAW = 5, 9
 """Walks to the target with each spring, and without leg yaw."""
@@ -187,3 +192,52 @@ def mode_shape(robot: Robot) -> tuple[float, ...]:
 def onset(variant: str) -> Number:
     """Onset of curved walks of the robot as built, or of a variant."""
     return ONSET if variant == AS_BUILT else VARIANTS[variant].onset
+
+
+def critical_mode_data() -> CriticalMode:
+    """Critical mode and spring of the planar model: six numbers, each exact to half of its last digit."""
+    return CriticalMode(
+        k1=stiffness(CRITICAL_K1.value),
+        components=tuple(each.value for each in MODE),
+        k1_tolerance=stiffness(CRITICAL_K1.tolerance),
+        component_tolerance=MODE[0].tolerance,
+        between=(stiffness(4.0), stiffness(40.0)),
+    )
+
+
+def variant_settings() -> Mapping[str, Sequence[str]]:
+    """Settings of the paper's variants of its robot, by name."""
+    return {name: each.overrides for name, each in VARIANTS.items()}
+
+
+def base_series_data() -> BaseSeries:
+    """Base series of the robot: walks with k2 to k5 = 41 N*mm/deg and a stride of 3 cm.
+
+    They are straight at k1 = 75 and 41, curved at 28, 21, 17 and 15; curves set in at 34, with a radius
+    of 1.2 m at 26 and 0.88 m at 21, at a speed of 0.056 m/s (:func:`walking_speed`).
+    """
+
+    def within(number: float) -> tuple[float, float]:
+        return number, FIT_TOLERANCE * number
+
+    return BaseSeries(
+        curved=[stiffness(spring) for spring in CURVED],
+        straight=[stiffness(spring) for spring in STRAIGHT],
+        onset=within(stiffness(ONSET.value)),
+        radii={stiffness(spring): within(radius.value) for spring, radius in RADII.items()},
+        speeds={stiffness(TASKS["A"].k_hat.value): within(walking_speed())},
+        law=(9.7 * math.sqrt(stiffness(1.0)), 0.030 / stiffness(1.0)),  # meets both printed radii
+        shape=[each.value / 2.10 for each in MODE],
+    )
+
+
+def walking_speed() -> float:
+    """Speed of the robot, m/s, from its arrival time, as the paper prints no speed.
+
+    In task A the target is R = 1.3 m away, psi = 45 deg to the side. The circle to it has the radius R / (2 sin psi)
+    and turns by 2 psi on the way, 1.444 m in all. The robot was within 0.15 m of the target after 23 s at the earliest:
+    1.294 m, 0.056 m/s. It walked at k1 = 21 N*mm/deg, on about that circle.
+    """
+    target = TASKS["A"].target
+    way = 2.0 * abs(target.bearing) * target.radius - ARRIVAL_RADIUS
+    return way / ARRIVAL.value

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
-from chilopod.paper.fit_data import walking_speed
-from chilopod.paper.printed import CRITERION_NAMES, Band, Number, Said
+from chilopod.paper.printed import CRITERION_NAMES, Band, Number, Said, walking_speed
 from chilopod.paper.table import Kind, Statement
 from chilopod.show.words import listing
 from chilopod.steering import Outcome

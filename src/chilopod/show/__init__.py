@@ -12,20 +12,23 @@ if TYPE_CHECKING:
     from chilopod.show.files import (
         files_of,
         files_of_map,
+        files_of_walks,
         write_branch,
         write_map,
         write_result,
         write_undulation,
+        write_walks,
     )
     from chilopod.show.scene.replay import Replay, replay
-    from chilopod.show.walk_files import files_of_walks, write_walks
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "files": ("files_of", "files_of_map", "write_branch", "write_map", "write_result", "write_undulation"),
+            "files": (
+                *("files_of", "files_of_map", "files_of_walks"),
+                *("write_branch", "write_map", "write_result", "write_undulation", "write_walks"),
+            ),
             "scene.replay": ("Replay", "replay"),
-            "walk_files": ("files_of_walks", "write_walks"),
         },
     )
 

@@ -13,7 +13,7 @@ from chilopod.netcdf import netcdf
 from chilopod.paper import statements
 from chilopod.paper.curved import figures as curved_figures
 from chilopod.paper.curved.sections import CURVED
-from chilopod.paper.fit_data import critical_mode_data, variant_settings
+from chilopod.paper.printed import critical_mode_data, variant_settings
 from chilopod.paper.registry import load_sections
 from chilopod.paper.straight.sections import IDENTIFICATION
 from chilopod.paper.table import OfPlanar, Row

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from chilopod.paper import statements
-from chilopod.paper.fit_data import walking_speed
+from chilopod.paper.printed import walking_speed
 from chilopod.paper.robot import spread, why
 from chilopod.paper.robot.rows import duration_rows, turning_rows, walk_rows
 from chilopod.paper.robot.sections import WALKS

@@ -55,7 +55,7 @@ def walks(base, records, folder):
     names = list(printed.variant_robots(ROBOT))[1:]
     durations = by_duration(records, ROBOT, robot_walks.SPRINGS)
     lower = {"stride 1.8 cm": base}
-    return RobotWalks(ROBOT, base, durations, dict.fromkeys(names, base), lower, examples, uniform)
+    return RobotWalks(base, durations, dict.fromkeys(names, base), lower, examples, uniform)
 
 
 @pytest.fixture(scope="module")

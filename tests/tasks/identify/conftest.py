@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chilopod.paper.fit_data import critical_mode_data
+from chilopod.paper.printed import critical_mode_data
 from chilopod.robot import load_robot
 from chilopod.tasks.identify import Identification, planar_fit
 

@@ -8,7 +8,7 @@ import pytest
 
 from chilopod.cli import main
 from chilopod.errors import AnalysisError
-from chilopod.paper.fit_data import critical_mode_data
+from chilopod.paper.printed import critical_mode_data
 from chilopod.robot import load_robot
 from chilopod.tasks import identify
 from chilopod.tasks.identify import (

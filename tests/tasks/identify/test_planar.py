@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitError
-from chilopod.paper.fit_data import critical_mode_data
+from chilopod.paper.printed import critical_mode_data
 from chilopod.robot import load_robot
 from chilopod.show.figures import identification
 from chilopod.tasks.identify import TEMPLATES, CriticalMode, RecordedWalks, critical, load_data, planar, planar_fit

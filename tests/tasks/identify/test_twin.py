@@ -7,7 +7,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.analysis.parameters import stiffness
 from chilopod.errors import ChilopodError
-from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.printed import base_series_data
 from chilopod.tasks.identify import TEMPLATES, BaseSeries, load_data, twin, twin_series
 from chilopod.tasks.identify.twin import FITTED, TwinIdentification, known, search
 from chilopod.tasks.identify.twin_series import Series, base_series, residuals

@@ -3,7 +3,7 @@ robustness of the variable spring."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -52,10 +52,9 @@ _STEP_TITLES = (
 )
 
 
-def panels(data: xr.Dataset) -> Iterator[Panel]:
+def panels(data: xr.Dataset) -> list[Panel]:
     """All figures of the planar comparison."""
-    yield strategies(data)
-    yield where(data)
+    return [strategies(data), where(data)]
 
 
 def strategies(data: xr.Dataset) -> Panel:

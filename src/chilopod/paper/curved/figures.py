@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -28,12 +27,9 @@ _MARKED = (41.0, 15.0, 11.0, 9.0, 7.0)  # springs on a short scale
 _SIDES = {"right": (style.BLACK, "o", "trials"), "left": (style.BLACK, "o", ""), "straight": (style.BLACK, "o", "")}
 
 
-def panels(study: CurvedStudy) -> Iterator[Panel]:
+def panels(study: CurvedStudy) -> list[Panel]:
     """All figures."""
-    yield walks(study)
-    yield joints(study)
-    yield onset(study)
-    yield variants(study)
+    return [walks(study), joints(study), onset(study), variants(study)]
 
 
 def walks(study: CurvedStudy) -> Panel:

@@ -273,11 +273,11 @@ def fluctuation(trials: xr.Dataset) -> tuple[str, float, float]:
     return wider, float(curved.spring[0]), float(curved.spring[-1])
 
 
-def fitted(trials: xr.Dataset, joint: int = 1) -> SquareRootFit:
+def fitted(trials: xr.Dataset) -> SquareRootFit:
     """The square-root law through the trials that settled on a curved walk."""
     here = is_curved(trials)
     inverse = np.broadcast_to(1.0 / trials.spring.values[:, None], here.shape)
-    return square_root_fit(inverse[here], trials.mean_angle.sel(joint=joint).values[here])
+    return square_root_fit(inverse[here], trials.mean_angle.sel(joint=1).values[here])
 
 
 def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
@@ -308,7 +308,7 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     )
 
 
-def law_along_branch(branch: xr.Dataset, count: int = 25) -> xr.Dataset:
+def law_along_branch(branch: xr.Dataset) -> xr.Dataset:
     """Error of the square-root law itself: fits to exact walks, evenly spread in 1/k, from the pitchfork to a softest
     spring.
 
@@ -318,7 +318,7 @@ def law_along_branch(branch: xr.Dataset, count: int = 25) -> xr.Dataset:
     slope of its logarithm over that of 1/k - 1/kc: one half where the law holds.
     """
     exact = float(branch.parameter.values[0])
-    softest = exact * (1.0 - np.geomspace(_NARROWEST, _WIDEST, count))
+    softest = exact * (1.0 - np.geomspace(_NARROWEST, _WIDEST, 25))
     found = []
     for low in softest:
         inverse = np.linspace(1.0 / exact, 1.0 / low, 21)[1:]

@@ -16,8 +16,8 @@ from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.errors import ParameterError
 from chilopod.paper import printed
-from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.measures import Folder, fitted, onset_point, over_springs, point_of, radius_ratio, spring_walks
+from chilopod.paper.printed import base_series_data
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.robot.walks import UNDULATION, lower_steps, uniform_modes, walk_ends
 from chilopod.paper.section import Context, Size

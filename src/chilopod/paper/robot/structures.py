@@ -20,9 +20,8 @@ from chilopod import twin
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.frozen import Array
 from chilopod.paper import printed
-from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.measures import Folder
-from chilopod.paper.printed import CRITERION_NAMES
+from chilopod.paper.printed import CRITERION_NAMES, base_series_data
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.section import Context, Size

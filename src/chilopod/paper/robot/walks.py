@@ -59,8 +59,7 @@ _LOST = 0.1  # error of a modulus, beyond which the straight walk is lost
 class RobotWalks:
     """Results of the walks."""
 
-    robot: Robot  # as built
-    base: xr.Dataset  # its walks, see :func:`walk_ends`
+    base: xr.Dataset  # walks of the robot as built, see :func:`walk_ends`
     durations: xr.Dataset  # see :func:`by_duration`
     variants: Mapping[str, xr.Dataset]  # as ``base``, of the paper's three, by name
     lower_steps: Mapping[str, xr.Dataset]  # of those that change the stride, see :func:`lower_steps`
@@ -86,7 +85,7 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
     examples = measures.example_walks(robot, _EXAMPLES, duration, measures.spring_seeds(_EXAMPLES), "twin", folder)
     if quick:
-        return RobotWalks(robot, base, durations, {}, {}, examples, None)
+        return RobotWalks(base, durations, {}, {}, examples, None)
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}
     strides = [name for name, each in robots.items() if each.gait.stride != robot.gait.stride]
     asked = [*robots.items(), *((name, lower_steps(robot, robots[name])) for name in strides)]
@@ -101,7 +100,7 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     uniform = uniform_modes(
         robot, uniform_springs, folder=folder, progress=part(progress, 0.91, 1.0, "uniform springs")
     )
-    return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
+    return RobotWalks(base, durations, variants, lower, examples, uniform)
 
 
 def lower_steps(robot: Robot, variant: Robot) -> Robot:
@@ -175,7 +174,6 @@ def uniform_modes(
     robot: Robot,
     springs: Sequence[float] = UNIFORM_SPRINGS,
     *,
-    amplitude: float = AMPLITUDE,
     engine: str = "twin",
     folder: measures.Folder = None,
     progress: Progress = silent,
@@ -185,7 +183,7 @@ def uniform_modes(
 
     Returns
     -------
-    Dataset over mode and spring (N*mm/deg): ``modulus`` of the multiplier of bends of an amplitude (rad), half its
+    Dataset over mode and spring (N*mm/deg): ``modulus`` of the multiplier of bends of :data:`AMPLITUDE`, half its
     interval of 95 % ``modulus_error``, and ``period`` of the mode (s, infinite for a real multiplier), NaN where the
     mode does not lead or the straight walk is lost; over mode ``end``, at which the modulus passes 1, and its standard
     error ``end_error`` (N*mm/deg), NaN if it does not.
@@ -198,7 +196,7 @@ def uniform_modes(
             progress(index / len(springs), f"{spring:g} {PAPER_UNIT}")
             cycle, standing = walker.walk_cycle(robot.with_value(ALL, stiffness(spring)))
             start, basis = known[-1] if known else (standing, None)
-            modes, settled, own = finite_modes(cycle, start, yaw, amplitude, _CYCLES, basis)
+            modes, settled, own = finite_modes(cycle, start, yaw, AMPLITUDE, _CYCLES, basis)
             if abs(modes[0].multiplier) < 1.0:
                 known.append((settled, own))
             lead = {mode.shape: mode for mode in reversed(modes) if mode.error < _LOST}
@@ -207,7 +205,7 @@ def uniform_modes(
 
     walker: Any = engine_named(engine)
     yaw = [f"yaw{i}" for i in range(1, robot.body.modules)]
-    how = ("uniform", *springs, amplitude, _CYCLES, engine)
+    how = ("uniform", *springs, AMPLITUDE, _CYCLES, engine)
     modulus, error, turn = np.moveaxis(np.array(measures.kept(folder, robot, how, compute)), 2, 0).swapaxes(1, 2)
     ends = np.array([_passes_one(springs, *each) for each in zip(modulus, error, strict=True)]).T
     with np.errstate(divide="ignore"):
@@ -221,7 +219,7 @@ def uniform_modes(
             "end_error": ("mode", ends[1], {"units": PAPER_UNIT}),
         },
         coords={"mode": [UNDULATION, BEND], "spring": measures.over_springs(springs)},
-        attrs={"robot": robot.name, "amplitude": amplitude},
+        attrs={"robot": robot.name, "amplitude": AMPLITUDE},
     )
 
 

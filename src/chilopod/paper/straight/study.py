@@ -18,7 +18,7 @@ from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import WalkBifurcation, first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.paper import printed
-from chilopod.paper.fit_data import critical_mode_data, variant_settings
+from chilopod.paper.printed import critical_mode_data, variant_settings
 from chilopod.paper.section import Context
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent

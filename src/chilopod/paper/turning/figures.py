@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,14 +47,10 @@ _STRATEGIES = ((style.BLUE, "o"), (style.ORANGE, "s"))
 _TOP, _TOP_HOPF = (41, 15, 10, 7, 5), (41, 10, 5, 3, 2)  # N*mm/deg, on the upper axis
 
 
-def panels(found: Turning) -> Iterator[Panel]:
+def panels(found: Turning) -> list[Panel]:
     """All figures, in the paper's order."""
-    yield turning(found)
-    yield criteria(found, "A")
-    yield criteria(found, "B")
-    yield without(found)
-    yield comparison(found)
-    yield why(found)
+    both = (criteria(found, letter) for letter in "AB")
+    return [turning(found), *both, without(found), comparison(found), why(found)]
 
 
 def turning(found: Turning) -> Panel:

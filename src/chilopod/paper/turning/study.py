@@ -82,7 +82,7 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
     without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=share)
     settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
     distances = FARTHER[:2] if quick else FARTHER
-    farther = farther_targets(robot, laws, task.target.bearing, distances, folder=folder)
+    farther = farther_targets(robot, laws, task.target.bearing, distances, folder)
     progress(1.0, "turning tasks")
     point = first_loss(robot, ALL, None, Kind.NEIMARK_SACKER, normal_form=False)
     return Turning(robot, laws, tasks, hopf, rough, point.value, without, settled, farther)
@@ -134,9 +134,8 @@ def farther_targets(
     robot: Robot,
     laws: RadiusLaws,
     bearing: float,
-    distances: Sequence[float] = FARTHER,
-    springs: Sequence[float] = FARTHER_SPRINGS,
-    folder: Folder = None,
+    distances: Sequence[float],
+    folder: Folder,
 ) -> xr.Dataset:
     """Results for targets in one direction at growing distances, with the effect of the time that a bend needs to grow.
 
@@ -151,7 +150,7 @@ def farther_targets(
     limit, both, found = LegYawController().limit, ("spring",), []
     for away in distances:
         target, duration = Target(bearing, away), DURATION * away / distances[0]
-        asked = [to_target(robot, target, spring, duration=duration, disturbance=NONE) for spring in springs]
+        asked = [to_target(robot, target, spring, duration=duration, disturbance=NONE) for spring in FARTHER_SPRINGS]
         record = trials.together(trials.run(asked, folder))
         earliest = earliest_arrival(record)
         result = evaluate(record, earliest)
@@ -164,7 +163,7 @@ def farther_targets(
                     "earliest": ((), earliest, {"units": "s"}),
                     "k_hat": ((), laws.k_hat(target.radius)[0], {"units": PAPER_UNIT}),
                 },
-                coords={"away": ((), away, {"units": "m"}), "spring": over_springs(springs)},
+                coords={"away": ((), away, {"units": "m"}), "spring": over_springs(FARTHER_SPRINGS)},
                 attrs={"robot": robot.name, "bearing_deg": math.degrees(bearing)},
             )
         )

@@ -14,7 +14,6 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from chilopod import units
 from chilopod.paper import printed
-from chilopod.paper.fit_data import TOLERANCE as ERROR
 from chilopod.paper.robot.spread import VALLEYS, printed_number
 from chilopod.paper.robot.structures import TOLERANCE
 from chilopod.paper.robot.walks import SPRINGS
@@ -22,7 +21,7 @@ from chilopod.paper.robot.why import ORDERS, SEARCHED, cause
 from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
-from chilopod.show.words import SPRING_UNIT, listing, number, typeset
+from chilopod.show.words import SPRING_UNIT, listing, number, spring, typeset
 from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
 from chilopod.tasks.identify.estimates import CONFIDENCE
 from chilopod.tasks.identify.valley import LEAST, Samples
@@ -56,13 +55,13 @@ def why(data: xr.Dataset) -> Panel:
         "B: that spring in the planar limit with one assumption less, and of the twin with one more.",
         text=(
             "With stiff legs that lift their feet high and a floor that holds feet as a viscous one does, the twin is "
-            f"the planar model in another engine: its straight walk ends at {_spring(data.attrs['vouched'], 4)}, that "
-            f"of the planar model at {_spring(data.attrs['exact'], 4)}.",
+            f"the planar model in another engine: its straight walk ends at {spring(data.attrs['vouched'])}, that "
+            f"of the planar model at {spring(data.attrs['exact'])}.",
             f"{cause(data)}. Multipliers of bends of 1° tell where the straight walk ends, in the planar limit at "
-            f"{_spring(float(data.end[0]))}, in the twin at {_spring(float(data.end[-1]))}. "
+            f"{spring(float(data.end[0]), 3)}, in the twin at {spring(float(data.end[-1]), 3)}. "
             f"{data.sizes['subset']} subsets of {data.sizes['factor']} assumptions were removed; {inside} of them end "
-            f"between {SEARCHED[0]:g} and {_spring(SEARCHED[1])}, the others count as the end that they are beyond. A "
-            f"is the mean over all orders in which assumptions are removed, with what {100.0 * ORDERS:.0f} % of the "
+            f"between {SEARCHED[0]:g} and {spring(SEARCHED[1], 3)}, the others count as the end that they are beyond. "
+            f"A is the mean over all orders in which assumptions are removed, with what {100.0 * ORDERS:.0f} % of the "
             f"orders give (and the error by the multipliers): {listing(parts)}.",
             f"The viscous coefficient of the planar model's feet is {number(data.attrs['viscous'], 4)}\u00a0N·s/m. A "
             f"foot of the twin that does not slide creeps like one of {number(data.attrs['grip'], 2)}\u00a0N·s/m: it "
@@ -70,10 +69,6 @@ def why(data: xr.Dataset) -> Panel:
         ),
         data=data,
     )
-
-
-def _spring(value: float, digits: int = 3) -> str:
-    return f"{number(value, digits)}\u00a0{SPRING_UNIT}"
 
 
 def _times(value: float) -> str:
@@ -121,7 +116,7 @@ def why_sets(data: xr.Dataset) -> Panel:
         for about, own, rest in zip(data.about.values, data.share.values[0], others.values.T, strict=True)
     ]
     always = [str(about) for about, least in zip(data.about.values, data.share.min("set"), strict=True) if least > 1.0]
-    ends = [f"{_spring(end)}{' or more' * (end == SEARCHED[1])}" for end in data.end.values[:, -1].tolist()]
+    ends = [f"{spring(end, 3)}{' or more' * (end == SEARCHED[1])}" for end in data.end.values[:, -1].tolist()]
     return Panel(
         name="robot-why-sets",
         title="The reasons, by other constants that fit as well",
@@ -235,10 +230,10 @@ def _refitted(found: xr.Dataset) -> str:
     name = next(iter(printed.VARIANTS))
     paper = printed.VARIANTS[name].onset.value
     off = found.onset.sel(variant=name).values / paper - 1.0
-    weights = np.where(np.isfinite(off), np.exp(-0.5 * (np.nan_to_num(off) / ERROR) ** 2), 0.0)
+    weights = np.where(np.isfinite(off), np.exp(-0.5 * (np.nan_to_num(off) / printed.FIT_TOLERANCE) ** 2), 0.0)
     same = np.unique(found.constants.values, axis=0, return_inverse=True)[1].ravel()  # a set may be drawn twice
     effective = float(weights.sum() ** 2 / max(np.sum(np.bincount(same, weights) ** 2), 1e-300))
-    said = f"With the onset for {name}, {number(paper, 2)} ± {100.0 * ERROR:g} %, as one more datum"
+    said = f"With the onset for {name}, {number(paper, 2)} ± {100.0 * printed.FIT_TOLERANCE:g} %, as one more datum"
     if effective < _TOLD:
         return f"{said} fewer than two of these sets would be left."
     parts = weights / weights.sum()
