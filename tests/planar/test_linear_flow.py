@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chilopod import load_robot
-from chilopod.paper.straight.study import with_modules
+from chilopod.analysis.map_axes import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.planar.linear import joint_bound, mass_matrix
 from helpers.planar_reference import EXTENDED, LD, coordinates, fine_flow

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chilopod import load_robot
+from chilopod.analysis.map_axes import with_modules
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.stability import PeriodicSystem, SystemLike
 from helpers.planar_strategies import robots, state_of

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chilopod import load_robot
-from chilopod.paper.straight.study import with_modules
+from chilopod.analysis.map_axes import with_modules
 from chilopod.planar import PlanarModel
 from helpers.free_bodies import FreeBodies
 from helpers.planar_strategies import mid_interval, robots, state_of

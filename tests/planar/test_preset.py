@@ -8,8 +8,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from chilopod import Robot, load_robot
+from chilopod.analysis.map_axes import with_modules
 from chilopod.paper.printed import critical_mode_data
-from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.stability import Criticality, Kind, exponents, locate, multipliers
 from chilopod.units import parse

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.analysis.map_axes import with_modules
 from chilopod.errors import ParameterError
-from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.twin import TwinModel
 from chilopod.twin.legs import joint_angles

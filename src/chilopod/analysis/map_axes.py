@@ -29,9 +29,10 @@ def _at_speed(robot: Robot, value: float) -> Robot:
     return robot
 
 
-def _of_modules(robot: Robot, value: float) -> Robot:
-    longer = value / robot.body.modules
-    grown = robot.with_value("body.modules", value)
+def with_modules(robot: Robot, modules: float) -> Robot:
+    """The robot with another number of modules of the same size and mass, the last spring repeated."""
+    longer = modules / robot.body.modules
+    grown = robot.with_value("body.modules", modules)
     for path in ("body.length", "body.mass"):
         grown = grown.with_value(path, robot.get(path) * longer)
     return grown
@@ -39,7 +40,7 @@ def _of_modules(robot: Robot, value: float) -> Robot:
 
 DERIVED: dict[str, tuple[str, tuple[str, ...], Callable[[Robot, float], Robot]]] = {
     "speed": ("m/s", ("gait.stance", "gait.swing"), _at_speed),
-    "modules": ("", ("body.modules", "body.length", "body.mass"), _of_modules),
+    "modules": ("", ("body.modules", "body.length", "body.mass"), with_modules),
 }
 """Unit of each derived axis, numbers that it changes, and how. ``speed`` is that of the straight walk: stance and swing
 change together, stride and duty factor stay. ``modules`` adds whole modules: length and mass of a module stay."""

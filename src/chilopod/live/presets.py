@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
+from chilopod.analysis.map_axes import with_modules
 from chilopod.analysis.parameters import ALL
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.live import wishes
@@ -32,12 +33,7 @@ class Preset:
     def load(self) -> Robot:
         """The robot."""
         robot = load_robot(self.robot)
-        if not self.modules:
-            return robot
-        share = self.modules / robot.body.modules
-        for name in ("length", "mass"):
-            robot = robot.override(f"body.{name}", share * robot.get(f"body.{name}"))
-        return robot.with_value("body.modules", self.modules)
+        return with_modules(robot, self.modules) if self.modules else robot
 
 
 OWN: Final = "as started"

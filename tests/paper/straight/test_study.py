@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from chilopod.analysis.map_axes import with_modules
 from chilopod.paper.section import Context, Size
 from chilopod.paper.straight import study as floquet
 
@@ -36,6 +37,6 @@ def test_variants_go_the_way_the_paper_says():
 def test_more_modules_of_the_same_size_change_little():
     data = floquet.module_counts(QUICK).sel(modules=range(6, 11))
     assert data.critical_k1.values == pytest.approx([11.99, 11.99, 11.91, 12.18, 12.40], abs=0.01)
-    longer = floquet.with_modules(ROBOT, 9)
+    longer = with_modules(ROBOT, 9)
     assert longer.module_length == pytest.approx(ROBOT.module_length, rel=1e-15)
     assert longer.module_mass == pytest.approx(ROBOT.module_mass, rel=1e-15)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from chilopod import stability
+from chilopod.analysis.map_axes import with_modules
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import WalkBifurcation, first_loss, pitchfork
 from chilopod.errors import AnalysisError
@@ -107,13 +108,6 @@ def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
         coords={"variant": np.array(list(robots), dtype=object)},
         attrs={"robot": context.robot.name},
     )
-
-
-def with_modules(robot: Robot, modules: int) -> Robot:
-    """The robot with another number of modules of the same size and mass, the last spring repeated."""
-    factor = modules / robot.body.modules
-    sized = robot.with_value("body.length", robot.body.length * factor)
-    return sized.with_value("body.mass", robot.body.mass * factor).with_value("body.modules", modules)
 
 
 def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
