@@ -91,7 +91,7 @@ def _draw(axes: Axes, record: xr.Dataset) -> None:
     axes.plot(0.0, 0.0, ">", color=style.BLACK, markersize=7)
     axes.set_aspect("equal", adjustable="box")
     axes.set(xlabel="x (m)", ylabel="y (m)")
-    style.grid(axes)
+    axes.grid(True)
 
 
 def atlas_pictures() -> dict[str, bytes]:

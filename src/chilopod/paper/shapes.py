@@ -33,7 +33,7 @@ JOINTS: Final = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 def finish(axes: Axes, grid: Literal["both", "x", "y"] = "both", legend: Any = None, **look: Any) -> None:
     """Labels, title and limits of axes, lines to read values by, and a legend if a place for it is given."""
     axes.set(**look)
-    style.grid(axes, grid)
+    axes.grid(True, axis=grid)
     if legend:
         axes.legend(loc=legend)
 

@@ -6,7 +6,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
@@ -159,8 +159,3 @@ def joint_styles(count: int) -> list[tuple[Any, str]]:
     if count > len(colors):
         colors = [mpl.colormaps["viridis"](index / count) for index in range(count)]
     return [(color, "os^vD"[index % 5]) for index, color in enumerate(colors[:count])]
-
-
-def grid(axes: Axes, which: Literal["both", "x", "y"] = "both") -> None:
-    """Thin lines to read values by."""
-    axes.grid(True, axis=which)

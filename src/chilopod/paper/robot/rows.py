@@ -30,13 +30,14 @@ PAPER_SPRING = printed.TASKS["A"].k_hat.value
 def walk_rows(found: RobotWalks) -> list[OfTwin]:
     """Onset, radius and speed of curved walks, and their dependence on the duration."""
     base = found.base
+    (straight, most), rising = _most(base, "straight", printed.STRAIGHT), increases(_curved_angles(base).values())
     rows = [
-        _straight(base),
+        OfTwin(statements.STRAIGHT, Result(straight), within(most)),
         _curved(base),
         _spring(statements.ONSET, onset_point(base)),
         *(_radius(base, spring, statement) for spring, statement in statements.RADII.items()),
         estimated(statements.SPEED, mean(base.speed.sel(spring=PAPER_SPRING).values), "m/s", 4),
-        _rising(base),
+        compared(statements.RISING, Result(INCREASES[rising.answer]), rising),
         _fluctuation(base),
     ]
     if found.uniform is not None:
@@ -61,11 +62,6 @@ def _uniform(mode: xr.Dataset) -> OfTwin:
     point = Estimate(float(mode.end), float(mode.end_error), reciprocal=True)
     reading = f"by {mode.mode.item()}s of {np.rad2deg(mode.amplitude):.0f} deg"
     return replace(_spring(statements.UNIFORM, point, reading), comparison=None)
-
-
-def _straight(base: xr.Dataset) -> OfTwin:
-    words, most = _most(base, "straight", printed.STRAIGHT)
-    return OfTwin(statements.STRAIGHT, Result(words), within(most))
 
 
 def _curved(base: xr.Dataset) -> OfTwin:
@@ -95,11 +91,6 @@ def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
     angles = np.where(in_settled_curve(ordered), np.abs(ordered.mean_angle.sel(joint=1).values), np.nan)
     pairs = zip(ordered.spring.values, angles, strict=True)
     return {float(spring): row[np.isfinite(row)] for spring, row in pairs if np.isfinite(row).any()}
-
-
-def _rising(base: xr.Dataset) -> OfTwin:
-    rising = increases(_curved_angles(base).values())
-    return compared(statements.RISING, Result(INCREASES[rising.answer]), rising)
 
 
 def _fluctuation(base: xr.Dataset) -> OfTwin:

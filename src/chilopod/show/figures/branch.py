@@ -69,7 +69,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
 
     for axes_ in axes.values():
         axes_.set_xlabel(label)
-        style.grid(axes_)
+        axes_.grid(True)
     _mark(axes["A"], data)
     bottom, top = axes["A"].get_ylim()
     axes["A"].set_ylim(top=top + 0.4 * (top - bottom))  # room for the legend

@@ -52,7 +52,7 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
     for name in "BC":
         _turns(axes[name], record.isel(robot=0), numbered=name == "B")
         axes[name].set_xlabel("time (s)")
-        style.grid(axes[name], "y")
+        axes[name].grid(True, axis="y")
     return figure
 
 
@@ -110,7 +110,7 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
     moments = np.unique(np.clip([0.0, *ends[np.isfinite(ends)]], walked[0], walked[-1]))
     draw_spines(axes, body_frames(first, moments).spine[:, 0])
     axes.set(xlabel="x (m)", ylabel="y (m)")
-    style.grid(axes)
+    axes.grid(True)
 
 
 def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:

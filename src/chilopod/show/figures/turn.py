@@ -48,7 +48,7 @@ def draw(done: Turn, narrow: bool = False) -> Figure:
     axes["C"].set_ylabel("target angle (deg)")
     for name in "BC":
         axes[name].set_xlabel("time (s)")
-        style.grid(axes[name])
+        axes[name].grid(True)
     return figure
 
 
@@ -89,4 +89,4 @@ def _floor(axes: Axes, done: Turn, walks: Sequence[xr.Dataset]) -> None:
     )
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.legend(loc="best")
-    style.grid(axes)
+    axes.grid(True)

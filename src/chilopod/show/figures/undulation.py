@@ -70,7 +70,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         axes[letter].plot(data.attrs["value"], value, "D", **look)
     for letter, each in axes.items():
         each.set_xlabel("distance below the point (%)" if letter == "C" else label)
-        style.grid(each)
+        each.grid(True)
     axes["A"].legend(loc="lower left")
     axes["B"].legend(loc="best")
     axes["C"].legend(loc="upper left")
