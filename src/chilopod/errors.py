@@ -7,7 +7,7 @@ nearest valid name. The command line prints that line and exits with code 2.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 _LONGEST_VALUE = 60
 _LONGEST_NAME = 200
@@ -97,6 +97,20 @@ def nearest_name(name: str, valid: Iterable[str]) -> str | None:
         folded.setdefault(candidate.casefold(), candidate)
     alike = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
     return folded[alike[0]] if alike else None
+
+
+def known_names(
+    names: Collection[str], known: Iterable[str], field: str, problem: str = "is not known"
+) -> tuple[str, ...]:
+    """Names without repetitions; ParameterError if there are none, and with the problem if one is not known."""
+    known = tuple(known)
+    if isinstance(names, str) or not names:
+        raise ParameterError("must be names", field=field, value=names, allowed=", ".join(known))
+    for name in names:
+        if name not in known:
+            near = nearest_name(name, known)
+            raise ParameterError(problem, field=field, value=name, allowed=", ".join(known), nearest=near)
+    return tuple(dict.fromkeys(names))
 
 
 def one_line(text: str) -> str:

@@ -17,8 +17,8 @@ import numpy as np
 
 from chilopod import units
 from chilopod.analysis.parameters import numbers_read
-from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, known_names, unit_of
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, unit_of
+from chilopod.errors import ChilopodError, ParameterError, known_names
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, finite, tornado
 from chilopod.progress import Progress, part, silent

@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
 from chilopod.engine import Engine, engine_named
 from chilopod.engine.arguments import as_array
-from chilopod.errors import AnalysisError, ParameterError, nearest_name
+from chilopod.errors import AnalysisError, ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
@@ -141,11 +141,7 @@ def _indices(cycle: CycleMap, bends: Sequence[str]) -> NDArray[np.intp]:
     """Indices of coordinates with these names."""
     if isinstance(bends, str) or not len(bends):
         raise ParameterError("must be a list of names", field="bends", value=bends, allowed=", ".join(cycle.names))
-    for each in bends:
-        if each not in cycle.names:
-            near = nearest_name(str(each), cycle.names)
-            allowed = ", ".join(cycle.names)
-            raise ParameterError("must be a coordinate", field="bends", value=each, allowed=allowed, nearest=near)
+    known_names(bends, cycle.names, "bends", "must be a coordinate")
     return np.array([cycle.names.index(each) for each in bends])
 
 

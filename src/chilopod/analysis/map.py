@@ -18,7 +18,7 @@ from chilopod.analysis.map_curves import MapCurve, Search
 from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
 from chilopod.analysis.map_radii import check_radius, radii
 from chilopod.analysis.map_result import StabilityMap
-from chilopod.errors import ParameterError, nearest_name
+from chilopod.errors import ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
 from chilopod.output import write_atomic
@@ -83,10 +83,8 @@ def map(
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:
         raise ParameterError("must be a number of values", field="points", value=points, allowed=f"2 to {_MOST_POINTS}")
-    for name in also:
-        if name not in _ALSO:
-            allowed, nearest = ", ".join(_ALSO), nearest_name(name, _ALSO)
-            raise ParameterError("must be a part of maps", field="also", value=name, allowed=allowed, nearest=nearest)
+    if also:
+        known_names(also, _ALSO, "also", "must be a part of maps")
     if "radius" in also:
         check_radius(plane)
     file = None if kept is None else Path(kept)

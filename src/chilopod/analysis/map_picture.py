@@ -8,7 +8,7 @@ import numpy as np
 
 from chilopod import units
 from chilopod.analysis.growth import FATES, Fate
-from chilopod.errors import ParameterError, nearest_name
+from chilopod.errors import known_names
 from chilopod.frozen import Array
 from chilopod.notebook import axes_for
 from chilopod.stability import Kind
@@ -43,9 +43,7 @@ _MARK = "#d55e00"
 
 def draw(found: Any, axes: Axes | None, show: str) -> Axes:
     """Draw a :class:`StabilityMap` on axes of matplotlib or on new ones, see its ``plot``; without a legend."""
-    if show not in SHOWN:
-        allowed, nearest = ", ".join(SHOWN), nearest_name(show, SHOWN)
-        raise ParameterError("must be a picture", field="show", value=show, allowed=allowed, nearest=nearest)
+    known_names([show], SHOWN, "show", "must be a picture")
     axes = axes_for(axes)
     x, y = found.x.shown(found.x_values), found.y.shown(found.y_values)
     if show in ("kind", "criticality"):

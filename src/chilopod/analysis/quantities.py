@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from chilopod import units
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import ALL, K1, searched_springs
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, first_loss, interval_text
-from chilopod.errors import AnalysisError, ParameterError, nearest_name
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.planar import PlanarModel
 from chilopod.planar.along import WalkMeans, walk_means
@@ -287,15 +287,3 @@ def _corrected(model: PlanarModel, state: Array, inverse: Array) -> tuple[Array,
 def unit_of(quantity: str, robot: Robot, onset: Onset) -> str:
     """Unit in which a quantity is shown."""
     return robot.unit_of(onset.parameter) if quantity == "onset" else QUANTITIES[quantity]
-
-
-def known_names(names: Sequence[str], known: Iterable[str], field: str) -> tuple[str, ...]:
-    """Names without repetitions; ParameterError with the nearest one if there is none, or one is not known."""
-    known = tuple(known)
-    if isinstance(names, str) or not names:
-        raise ParameterError("must be names", field=field, value=names, allowed=", ".join(known))
-    for name in names:
-        if name not in known:
-            near = nearest_name(name, known)
-            raise ParameterError("is not known", field=field, value=name, allowed=", ".join(known), nearest=near)
-    return tuple(dict.fromkeys(names))

@@ -20,17 +20,8 @@ import numpy as np
 from chilopod import units
 from chilopod.analysis.derivatives import ROUND_OFF, derivative
 from chilopod.analysis.parameters import numbers_read
-from chilopod.analysis.quantities import (
-    QUANTITIES,
-    Measured,
-    Mode,
-    Onset,
-    known_names,
-    leading_mode,
-    straight_return,
-    unit_of,
-)
-from chilopod.errors import AnalysisError, ParameterError, nearest_name
+from chilopod.analysis.quantities import QUANTITIES, Measured, Mode, Onset, leading_mode, straight_return, unit_of
+from chilopod.errors import AnalysisError, ParameterError, known_names, nearest_name
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, tornado
 from chilopod.progress import Progress, silent
@@ -86,10 +77,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
         return dict(zip(self.paths, changes.tolist(), strict=True))
 
     def _row(self, quantity: str) -> int:
-        if quantity not in self.quantities:
-            near = nearest_name(quantity, self.quantities)
-            allowed = ", ".join(self.quantities)
-            raise ParameterError("is not computed", field="quantity", value=quantity, allowed=allowed, nearest=near)
+        known_names([quantity], self.quantities, "quantity", "is not computed")
         return self.quantities.index(quantity)
 
     def _unit(self, quantity: str) -> str:

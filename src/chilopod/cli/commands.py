@@ -10,7 +10,10 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from chilopod.errors import ChilopodError, ParameterError
 
-_TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1", "twin": "engine", "body.modules": "modules"}
+_TYPED_AS = {
+    **{"joint_angles": "initial_joints", "spring": "k1", "twin": "engine", "body.modules": "modules"},
+    "quantities": "show",
+}
 """Options that are called otherwise than the argument of the function that they are for."""
 
 _IN_WORDS = {"Input should be": "must be", "greater than or equal to": "at least", "less than or equal to": "at most"}

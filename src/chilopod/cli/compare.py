@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    OnsetBetweenOption,
-    OutOption,
-    ParameterOption,
-    RobotOptions,
-    deliver_result,
-    free_result,
-    onset_of,
-    read_robot,
-    reading,
-    with_options,
-)
-from chilopod.cli.progress import progress_bar
-from chilopod.cli.sensitivity import AtOption
+from chilopod.cli.options import AtOption, OnsetOptions, read_robot, with_options
 
 
 @with_options
 def compare(
-    options: RobotOptions,
+    options: OnsetOptions,
     other: Annotated[str, typer.Argument(metavar="OTHER", help="Robot to compare with; --set changes both.")],
-    parameter: ParameterOption = "springs.stiffness[0]",
-    between: OnsetBetweenOption = None,
     at: AtOption = None,
     show: Annotated[
         str,
@@ -39,7 +23,6 @@ def compare(
         ),
     ] = "onset,growth,speed",
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of orders, for more than 8 differences.")] = 0,
-    out: OutOption = None,
 ) -> None:
     """Differing numbers of two robots, and the part of each in the difference of where they bend.
 
@@ -49,13 +32,8 @@ def compare(
     Example: chilopod compare aoi2022-planar aoi2022
     """
     first, second = options.described, read_robot(other, options.overrides)
-    onset = onset_of(first, parameter, between, at)
-    free_result("comparison", out, options.force)
+    onset = options.number(at)
     from chilopod import analysis
-    from chilopod.analysis.quantities import QUANTITIES, known_names
 
-    with reading("show"):
-        names = known_names(show.split(","), QUANTITIES, "show")
-    with progress_bar("comparison") as bar:
-        found = analysis.compare(first, second, onset, names, seed, partial(bar, "comparison"))
-    deliver_result(found, "comparison", options, out)
+    names = show.split(",")
+    options.study("comparison", lambda progress: analysis.compare(first, second, onset, names, seed, progress))

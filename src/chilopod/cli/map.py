@@ -10,7 +10,7 @@ import typer
 
 from chilopod.cli.options import OutOption, RobotOptions, deliver, free, with_options
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import ParameterError, nearest_name
+from chilopod.errors import known_names
 
 _RANGE = "PATH LOW HIGH"
 
@@ -58,10 +58,7 @@ def stability_map(
     from chilopod.analysis.map_picture import SHOWN
 
     shown = [name.strip() for name in show.split(",")]
-    for name in shown:
-        if name not in SHOWN:
-            allowed, nearest = ", ".join(SHOWN), nearest_name(name, SHOWN)
-            raise ParameterError("must name pictures", field="show", value=name, allowed=allowed, nearest=nearest)
+    known_names(shown, SHOWN, "show", "must name pictures")
     also = [name for name, wanted in (("folds", folds), ("radius", "radius" in shown)) if wanted]
     result = options.free_in(out, "map.json")
     if out:

@@ -75,6 +75,13 @@ OnsetBetweenOption = Annotated[
         "0.04 to 1.6 times friction x speed x duty factor x module length.",
     ),
 ]
+AtOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="VALUE",
+        help="Value of this number at which growth, frequency and radius are taken; by default that of the robot.",
+    ),
+]
 OutOption = Annotated[
     Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for the results, besides the text.")
 ]
@@ -188,6 +195,34 @@ class RobotOptions:
             lambda: write_all(texts, replace=self.force),
             lambda: print_json(result) if self.as_json else typer.echo("\n".join(lines)),
         )
+
+
+@dataclass(frozen=True)
+class OnsetOptions(RobotOptions):
+    """Argument and options of commands that study where a robot bends, as they were typed."""
+
+    parameter: ParameterOption = "springs.stiffness[0]"
+    between: OnsetBetweenOption = None
+    out: OutOption = None
+
+    def number(self, at: str | None = None) -> Onset:
+        """The number that bends the robot, its interval, and the value at which walks are studied."""
+        return onset_of(self.described, self.parameter, self.between, at)
+
+    def study(self, name: str, compute: Callable[[Progress], Any]) -> Any:
+        """Compute a result, write it into the folder, if there is one, as JSON and as its plot, and print it."""
+        free([self.out / f"{name}.{kind}" for kind in ("json", "svg", "png")] if self.out else [], self.force)
+        with progress_bar(name) as bar:
+            found = compute(partial(bar, name))
+        result = found.as_json()
+
+        def write() -> list[Path]:
+            from chilopod.show import write_result
+
+            return write_result(found, json_text(result) + "\n", name, self.out, replace=self.force) if self.out else []
+
+        deliver(write, lambda: print_json(result) if self.as_json else typer.echo("\n".join(found.lines())))
+        return found
 
 
 @dataclass(frozen=True)
@@ -335,24 +370,6 @@ def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> No
     finally:
         if failure is not None:
             raise failure
-
-
-def free_result(name: str, out: Path | None, force: bool) -> None:
-    """Make sure that the files of :func:`deliver_result` can be written."""
-    if out:
-        free([out / f"{name}.{kind}" for kind in ("json", "svg", "png")], force)
-
-
-def deliver_result(found: Any, name: str, options: RobotOptions, out: Path | None) -> None:
-    """Write a result into a folder, if there is one, as JSON and as its plot, and print it."""
-    result = found.as_json()
-
-    def write() -> list[Path]:
-        from chilopod.show import write_result
-
-        return write_result(found, json_text(result) + "\n", name, out, replace=options.force) if out else []
-
-    deliver(write, lambda: print_json(result) if options.as_json else typer.echo("\n".join(found.lines())))
 
 
 def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:

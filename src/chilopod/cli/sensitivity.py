@@ -2,43 +2,20 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    OnsetBetweenOption,
-    OutOption,
-    ParameterOption,
-    RobotOptions,
-    deliver_result,
-    free_result,
-    onset_of,
-    reading,
-    with_options,
-)
-from chilopod.cli.progress import progress_bar
+from chilopod.cli.options import AtOption, OnsetOptions, reading, with_options
 from chilopod.errors import ParameterError
 
 if TYPE_CHECKING:
-    from chilopod.notebook import Summary
     from chilopod.robot import Robot
-
-AtOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="VALUE",
-        help="Value of this number at which growth, frequency and radius are taken; by default that of the robot.",
-    ),
-]
 
 
 @with_options
 def sensitivity(
-    options: RobotOptions,
-    parameter: ParameterOption = "springs.stiffness[0]",
-    between: OnsetBetweenOption = None,
+    options: OnsetOptions,
     at: AtOption = None,
     show: Annotated[
         str | None,
@@ -58,7 +35,6 @@ def sensitivity(
     ] = None,
     samples: Annotated[int, typer.Option(metavar="N", min=16, help="Samples with --uncertain, a power of two.")] = 128,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the samples.")] = 0,
-    out: OutOption = None,
 ) -> None:
     """Effect of each number of a robot on where it bends: derivatives with respect to every number of its file.
 
@@ -69,27 +45,22 @@ def sensitivity(
     Example: chilopod sensitivity aoi2022-planar --uncertain 10%
     """
     described = options.described
-    onset = onset_of(described, parameter, between, at)
-    tolerances = _tolerances(described, parameter, uncertain or [])
+    onset = options.number(at)
+    tolerances = _tolerances(described, options.parameter, uncertain or [])
     for option, given in (("show", show), ("at", at)):
         if tolerances and given:
             raise ParameterError("goes without --uncertain only", field=option, value=given, allowed="the onset alone")
-    name = "uncertainty" if tolerances else "sensitivity"
-    free_result(name, out, options.force)
     from chilopod import analysis
-    from chilopod.analysis.quantities import QUANTITIES, known_names
     from chilopod.analysis.sensitivity import DEFAULT
 
-    with reading("show"):
-        names = known_names(show.split(",") if show else DEFAULT, QUANTITIES, "show")
-    found: Summary
-    with progress_bar(name) as bar:
-        progress = partial(bar, name)
-        if tolerances:
-            found = analysis.uncertainty(described, tolerances, onset, samples, seed, progress)
-        else:
-            found = analysis.sensitivity(described, onset, names, progress=progress)
-    deliver_result(found, name, options, out)
+    if tolerances:
+        options.study(
+            "uncertainty",
+            lambda progress: analysis.uncertainty(described, tolerances, onset, samples, seed, progress),
+        )
+    else:
+        names = show.split(",") if show else DEFAULT
+        options.study("sensitivity", lambda progress: analysis.sensitivity(described, onset, names, progress=progress))
 
 
 def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, float]:

@@ -3,22 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import partial
 from typing import Annotated, Any
 
 import typer
 
-from chilopod.cli.options import (
-    OnsetBetweenOption,
-    OutOption,
-    ParameterOption,
-    RobotOptions,
-    deliver_result,
-    free_result,
-    onset_of,
-    with_options,
-)
-from chilopod.cli.progress import progress_bar
+from chilopod.cli.options import OnsetOptions, with_options
 from chilopod.errors import ParameterError
 
 
@@ -27,7 +16,7 @@ def _wish(quantity: str) -> Any:
 
 
 @dataclass(frozen=True)
-class _SizeOptions(RobotOptions):
+class _SizeOptions(OnsetOptions):
     """Argument, options and wishes, as they were typed."""
 
     radius: _wish("radius of the curved walk, by the paper's measure") = None  # type: ignore[valid-type]
@@ -40,7 +29,7 @@ class _SizeOptions(RobotOptions):
     work: _wish("work of an actuator that stiffens the spring of the curved walk to its onset") = None  # type: ignore[valid-type]
 
 
-_WISHES = tuple(each.name for each in fields(_SizeOptions) if each not in fields(RobotOptions))
+_WISHES = tuple(each.name for each in fields(_SizeOptions) if each not in fields(OnsetOptions))
 
 
 @with_options
@@ -54,12 +43,9 @@ def size(
             "speed (of the straight walk, at the same stride and duty factor); may be repeated.",
         ),
     ],
-    parameter: ParameterOption = "springs.stiffness[0]",
-    between: OnsetBetweenOption = None,
     twin: Annotated[bool, typer.Option("--twin", help="Let the robot walk in three dimensions too.")] = False,
     budget: Annotated[int, typer.Option(metavar="N", min=1, help="Most robots that are evaluated.")] = 600,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the scattered starts.")] = 0,
-    out: OutOption = None,
 ) -> None:
     """Numbers of a robot at which it does what is wished, checked in walks.
 
@@ -72,20 +58,17 @@ def size(
     Example: chilopod size aoi2022-planar --radius "0.8 m" --free "springs.stiffness[0]=5..60 N*mm/deg" --out sized
     """
     robot = options.described
-    onset = onset_of(robot, parameter, between)
+    onset = options.number()
     wishes = {name: text for name in _WISHES if (text := getattr(options, name)) is not None}
     if not wishes:
         raise ParameterError("must be given", field=" or ".join(f"--{name}" for name in _WISHES))
     ranges = [_range(text) for text in free]
-    free_result("size", out, options.force)
-    file = options.free_in(out, "sized.toml")
+    file = options.free_in(options.out, "sized.toml")
     from chilopod import tasks
     from chilopod.output import write_atomic
 
-    with progress_bar("size") as bar:
-        progress = partial(bar, "size")
-        found = tasks.size(robot, wishes, ranges, onset, twin=twin, budget=budget, seed=seed, progress=progress)
-    deliver_result(found, "size", options, out)
+    how: dict[str, Any] = {"twin": twin, "budget": budget, "seed": seed}
+    found = options.study("size", lambda progress: tasks.size(robot, wishes, ranges, onset, **how, progress=progress))
     for each in file:
         write_atomic(each, found.robot.to_toml(), replace=options.force)
         typer.echo(f"wrote {each}", err=True)

@@ -9,8 +9,8 @@ import xarray as xr
 
 from chilopod import units
 from chilopod.analysis.map_axes import Axis, Given, axis
-from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, known_names, leading_mode, unit_of
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mode, unit_of
+from chilopod.errors import ChilopodError, ParameterError, known_names
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import DURATION, bent, end_of_walk, is_curved
