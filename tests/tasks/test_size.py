@@ -12,8 +12,7 @@ from chilopod.analysis.quantities import Measured, leading_mode
 from chilopod.errors import ChilopodError
 from chilopod.robot import Robot, load_robot
 from chilopod.tasks import size
-from chilopod.tasks.sizing.result import Outcome
-from chilopod.tasks.sizing.wishes import Wish
+from chilopod.tasks.sizing.search import Outcome, Wish
 from chilopod.trials import NONE, Trial, run, summaries
 
 ROBOT = load_robot("aoi2022-planar")

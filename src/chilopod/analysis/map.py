@@ -7,18 +7,20 @@ import hashlib
 import io
 import time
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from chilopod.analysis.growth import FATES, Fate, growth_rates
-from chilopod.analysis.map_axes import Given, Plane
+from chilopod.analysis.map_axes import DERIVED, Given, Plane
 from chilopod.analysis.map_curves import MapCurve, Search
 from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
-from chilopod.analysis.map_radii import check_radius, radii
 from chilopod.analysis.map_result import StabilityMap
-from chilopod.errors import ParameterError, known_names
+from chilopod.analysis.parameters import ALL
+from chilopod.analysis.quantities import Measured, Onset
+from chilopod.errors import ChilopodError, ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
 from chilopod.output import write_atomic
@@ -35,6 +37,8 @@ _ALSO = ("folds", "radius")
 _MOST_POINTS = 4097
 _LONG = 600.0  # s: a map that takes longer is announced
 _CURVE_RATES = 5e3  # growth rates that take as long as a curve
+_LATTICE = 24  # radii along an axis
+_BRANCHES = 12  # that are followed from the onset, a few seconds each, before other radii are left out
 
 
 def map(
@@ -85,8 +89,7 @@ def map(
         raise ParameterError("must be a number of values", field="points", value=points, allowed=f"2 to {_MOST_POINTS}")
     if also:
         known_names(also, _ALSO, "also", "must be a part of maps")
-    if "radius" in also:
-        check_radius(plane)
+    bending = _bending(plane) if "radius" in also else None
     file = None if kept is None else Path(kept)
     grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
     if file is not None:
@@ -102,8 +105,8 @@ def map(
         search.run()
     bent: Array = np.full(grid.computed.shape, np.nan)
     lost: list[str] = []
-    if "radius" in also:
-        bent, lost = radii(plane, grid, part(progress, 0.5, 1.0))
+    if bending is not None:
+        bent, lost = _radii(grid, bending, part(progress, 0.5, 1.0))
     return _result(grid, search.curves, bent, [*dict.fromkeys(search.remarks), *_invalid(grid), *lost])
 
 
@@ -138,6 +141,39 @@ def _announce(grid: Grid, remark: Callable[[str], None]) -> None:
         hours = each * rates / 3600.0
         said = f"{hours:.2g} hours" if hours > 1.0 else f"{60.0 * hours:.2g} minutes"
         remark(f"the map takes about {said}: {each:.2g} s a growth rate; fewer points or modules take less")
+
+
+# -- radii of the curved walks
+# -------------------------------------------------------------------------------------------------------------------
+
+
+def _bending(plane: Plane) -> Onset:
+    """Number of an axis along which a robot bends; ParameterError if there is none."""
+    for axis in (plane.x, plane.y):
+        if axis.path not in DERIVED and not axis.whole:
+            return Onset(axis.path, None if axis.path.startswith(ALL) else (axis.low, axis.high))
+    said, allowed = "must be left out of this map", "maps with a number of the robot on an axis"
+    raise ParameterError(said, field="radius", allowed=allowed)
+
+
+def _radii(grid: Grid, bending: Onset, progress: Progress) -> tuple[Array, list[str]]:
+    """Radius of the curved walk that leaves the straight one, m, shape (rows, columns): NaN off a coarse lattice, where
+    the robot does not bend, and where no curved walk is found, with a sentence on how many these are."""
+    bends = grid.values[FATE] == FATES.index(Fate.BENDS)
+    found, measured = np.full(bends.shape, np.nan), Measured(bending)
+    rows, columns = (np.unique(np.linspace(0, size - 1, min(size, _LATTICE)).astype(int)) for size in bends.shape)
+    nodes = []
+    for j in rows.tolist():
+        own = columns[bends[j, columns]].tolist()
+        # From the onset on, so that each walk is near the last.
+        nodes += [(j, i) for i in (own if bends[j, -1] else own[::-1])]
+    for done, (j, i) in enumerate(nodes):
+        progress(done / len(nodes), f"{done} radii")
+        with suppress(ChilopodError):
+            if measured.branches < _BRANCHES:
+                found[j, i] = measured.radius(grid.plane.at(float(grid.x[i]), float(grid.y[j])))
+    lost = len(nodes) - int(np.isfinite(found).sum())
+    return found, [f"{lost} of {len(nodes)} radii are not found"] if lost else []
 
 
 # -- growth rates that are kept

@@ -74,6 +74,10 @@ class Edge:
     i: int
     across: bool
 
+    def ordered(self, along: Any, other: Any) -> tuple[Any, Any]:
+        """What belongs to the number that changes along it, and to the other, in the order of the map's axes."""
+        return (along, other) if self.across else (other, along)
+
 
 @dataclass
 class Search:
@@ -124,11 +128,9 @@ class Search:
         for edge in self._edges():
             if edge.across is self.plane.y.whole:  # along the other axis the number of modules changes
                 for point in self._located(edge):
-                    place, error = self._place(point, edge), np.array([point.error_bound, 0.0])
-                    coefficient = self._coefficient(point, place)
-                    by_kind.setdefault(point.kind, []).append(
-                        (place, error if edge.across else error[::-1], coefficient)
-                    )
+                    place = np.array(edge.ordered(point.value, self._beside(edge)))
+                    error = np.array(edge.ordered(point.error_bound, 0.0))
+                    by_kind.setdefault(point.kind, []).append((place, error, self._coefficient(point, place)))
         for kind, found in by_kind.items():
             values, errors, coefficients = (np.array(column) for column in zip(*found, strict=True))
             self.curves.append(MapCurve(kind, values, errors, coefficients, line=False))
@@ -160,19 +162,16 @@ class Search:
         sizes = np.array([self.grid.x.size - 1, self.grid.y.size - 1])
         return np.asarray((values - ends[:, 0]) / (ends[:, 1] - ends[:, 0]) * sizes)
 
-    def _place(self, point: BifurcationPoint, edge: Edge) -> Array:
-        x, y = self.grid.x[edge.i], self.grid.y[edge.j]
-        return np.array([point.value, y] if edge.across else [x, point.value])
+    def _beside(self, edge: Edge) -> float:
+        """Value of the number that does not change along an edge, SI."""
+        return float(self.grid.y[edge.j] if edge.across else self.grid.x[edge.i])
 
     def _located(self, edge: Edge) -> list[BifurcationPoint]:
-        values, first, fixed = (
-            (self.grid.x, edge.i, float(self.grid.y[edge.j]))
-            if edge.across
-            else (self.grid.y, edge.j, float(self.grid.x[edge.i]))
-        )
+        values, first = (self.grid.x, edge.i) if edge.across else (self.grid.y, edge.j)
+        beside = self._beside(edge)
 
         def family(value: float) -> PlanarModel:
-            return self.plane.model(value, fixed) if edge.across else self.plane.model(fixed, value)
+            return self.plane.model(*edge.ordered(value, beside))
 
         try:
             ends = float(values[first]), float(values[first + 1])
@@ -183,30 +182,29 @@ class Search:
 
     def _follow(self, point: BifurcationPoint, edge: Edge) -> None:
         """Continue a curve through a located point, and the folds that begin on it."""
-        box, turned = self._box(), not edge.across
-        second = float(self.grid.x[edge.i] if turned else self.grid.y[edge.j])
-        how: dict[str, Any] = {"between": box[::-1] if turned else box, "longest": _LONGEST, "progress": self._told}
+        between = edge.ordered(*self._box())
+        how: dict[str, Any] = {"between": between, "longest": _LONGEST, "progress": self._told}
 
         def family(p: float, q: float) -> PlanarModel:
-            return self.plane.model(q, p) if turned else self.plane.model(p, q)
+            return self.plane.model(*edge.ordered(p, q))
 
         def loose(p: float, q: float) -> PlanarModel:
             return FollowedModel(family(p, q).robot, _FOLD_TOLERANCE)
 
         try:
-            curve = follow2(family, point, second=second, points=400, **how)
-            self._add(curve, turned)
+            curve = follow2(family, point, second=self._beside(edge), points=400, **how)
+            self._add(curve, edge)
             for special in curve.special if self.with_folds else ():
                 if special.kind is CodimensionTwo.DEGENERATE_PITCHFORK:
                     # Both starts are mirror images of one curve.
-                    start, *_ = switch2(family, special, how["between"])
-                    self._add(follow2(loose, start, points=_FOLD_POINTS, coefficients=False, **how), turned)
+                    start, *_ = switch2(family, special, between)
+                    self._add(follow2(loose, start, points=_FOLD_POINTS, coefficients=False, **how), edge)
         except ChilopodError as error:
             self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
 
-    def _add(self, curve: Curve2, turned: bool) -> None:
+    def _add(self, curve: Curve2, edge: Edge) -> None:
         """Keep a curve in the order of the map's axes, and say where it ends before it should."""
-        order = [1, 0] if turned else [0, 1]
+        order = [*edge.ordered(0, 1)]
         special = tuple(MapPoint(each.kind, each.values[order], each.error_bound[order]) for each in curve.special)
         coefficients = [self._coefficient(each, each.values[order]) for each in curve.points]
         errors = np.array([each.error_bound for each in curve.points])[:, order]

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chilopod import units
 from chilopod.analysis.growth import FATES, Fate
 from chilopod.errors import known_names
 from chilopod.frozen import Array
@@ -60,7 +59,7 @@ def draw(found: Any, axes: Axes | None, show: str) -> Axes:
     if show == "criticality":
         _coefficients(axes, found)
     for point in found.special:
-        at = units.from_si(point.values[0], found.x.unit), units.from_si(point.values[1], found.y.unit)
+        at = (axis.shown(value) for axis, value in zip((found.x, found.y), point.values, strict=True))
         axes.plot(*at, "D", color=_MARK, markeredgecolor="white", markersize=7, zorder=6, label="codimension two")
     half = [np.array([-0.5, 0.5]) * axis.whole for axis in (found.x, found.y)]
     axes.set(xlabel=found.x.label, ylabel=found.y.label, title=SHOWN[show])

@@ -11,12 +11,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
 from chilopod.analysis.growth import FATES, Fate
 from chilopod.analysis.map_axes import Axis
 from chilopod.analysis.map_curves import MapCurve, MapPoint
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
-from chilopod.notebook import Summary
+from chilopod.notebook import Summary, finite
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.stability.shown import bounded
@@ -117,9 +116,9 @@ class StabilityMap(Summary, ReadOnlyArrays):
         above.append(f"curves: {', '.join(counts) or 'none'}")
         table: list[Sequence[str]] = [("on them", self.x.label, self.y.label)]
         for point in self.special:
-            axes = zip((self.x, self.y), point.values, point.error_bound, strict=True)
-            shown = (bounded(units.from_si(value, axis.unit), _size(axis, error)) for axis, value, error in axes)
-            table.append((point.kind.label, *shown))
+            numbers = zip((self.x, self.y), np.column_stack([point.values, point.error_bound]), strict=True)
+            pairs = (axis.shown(both).tolist() for axis, both in numbers)
+            table.append((point.kind.label, *(bounded(value, abs(error)) for value, error in pairs)))
         return above, table if self.special else [], list(self.remarks)
 
     def plot(self, axes: Axes | None = None, show: str = "kind") -> Axes:
@@ -146,9 +145,6 @@ class StabilityMap(Summary, ReadOnlyArrays):
             errors = found.error_bound.tolist()
             return {"kind": found.kind.label, "values_si": found.values.tolist(), "error_bounds_si": errors}
 
-        def coefficients(curve: MapCurve) -> dict[str, Any]:
-            return {"coefficients": [None if np.isnan(each) else each for each in curve.coefficient.tolist()]}
-
         return {
             "robot": self.robot.name,
             "x": asdict(self.x),
@@ -157,7 +153,10 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "computed": int(self.computed.sum()),
             "shares": {fate.label: share for fate, share in self.shares.items()},
             "folded_share": float(self.folded.mean()),
-            "curves": [{**plain(curve), **coefficients(curve), "line": curve.line} for curve in self.curves],
+            "curves": [
+                {**plain(curve), "coefficients": [*map(finite, curve.coefficient.tolist())], "line": curve.line}
+                for curve in self.curves
+            ],
             "special": [plain(point) for point in self.special],
             "remarks": list(self.remarks),
         }
@@ -180,25 +179,20 @@ class StabilityMap(Summary, ReadOnlyArrays):
         none = np.empty((0, 2))
         values = np.concatenate([none, *(curve.values for curve in self.curves)])
         errors = np.concatenate([none, *(curve.error_bound for curve in self.curves)])
-        for column, (name, axis) in enumerate((("x", self.x), ("y", self.y))):
-            bounds = np.array([_size(axis, each) for each in errors[:, column]])
-            found[f"curve_{name}"] = (("point",), axis.shown(values[:, column]), {"units": axis.unit})
-            found[f"curve_{name}_error"] = (("point",), bounds, {"units": axis.unit})
+        coords = {}
+        for column, (name, axis, own) in enumerate((("x", self.x, self.x_values), ("y", self.y, self.y_values))):
+            unit = {"units": axis.unit}
+            coords[name] = (name, axis.shown(own), {**unit, "long_name": axis.path})
+            found[f"curve_{name}"] = ("point", axis.shown(values[:, column]), unit)
+            found[f"curve_{name}_error"] = ("point", np.abs(axis.shown(errors[:, column])), unit)
         sizes = [len(curve.values) for curve in self.curves]
         kinds = np.array([curve.kind.label for curve in self.curves], dtype=object)
         coefficients = np.concatenate([none[:, 0], *(curve.coefficient for curve in self.curves)])
-        found["curve_coefficient"] = (("point",), coefficients, {"units": "1/rad^2"})
-        found["curve"] = (("point",), np.repeat(np.arange(len(sizes)), sizes))
-        found["curve_kind"] = (("point",), np.repeat(kinds, sizes))
-        coords = {
-            name: (name, axis.shown(values), {"units": axis.unit, "long_name": axis.path})
-            for name, axis, values in (("x", self.x, self.x_values), ("y", self.y, self.y_values))
-        }
-        attrs = {
-            "robot": self.robot.name,
-            "varied": f"{self.x.path}, {self.y.path}",
-            "robot_toml": self.robot.to_toml(),
-        }
+        found["curve_coefficient"] = ("point", coefficients, {"units": "1/rad^2"})
+        found["curve"] = ("point", np.repeat(np.arange(len(sizes)), sizes))
+        found["curve_kind"] = ("point", np.repeat(kinds, sizes))
+        varied = f"{self.x.path}, {self.y.path}"
+        attrs = {"robot": self.robot.name, "varied": varied, "robot_toml": self.robot.to_toml()}
         return xr.Dataset(found, coords=coords, attrs=attrs)
 
 
@@ -214,8 +208,3 @@ def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) ->
             part = (value - across[:-1][meets]) / np.diff(across)[meets]
             places.append(along[:-1][meets] + part * np.diff(along)[meets])
     return np.concatenate(places)
-
-
-def _size(axis: Axis, error: float) -> float:
-    """An error in the unit of an axis."""
-    return abs(units.from_si(float(error), axis.unit))

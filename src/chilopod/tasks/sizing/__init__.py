@@ -14,9 +14,8 @@ from chilopod.errors import ChilopodError, ParameterError, known_names
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import DURATION, bent, end_of_walk, is_curved
-from chilopod.tasks.sizing.result import Outcome, Sizing
-from chilopod.tasks.sizing.search import Search
-from chilopod.tasks.sizing.wishes import Wish, parsed_wish
+from chilopod.tasks.sizing.result import Sizing
+from chilopod.tasks.sizing.search import Outcome, Search, Wish, parsed_wish
 from chilopod.trials import run
 
 WALKED = 0.02
@@ -71,10 +70,10 @@ def size(
         raise ParameterError("must be positive", field="budget", value=budget)
     search = Search(robot, given, axes, onset, budget, seed, progress)
     outcome = search.run()
-    reasons, front = search.reasons() if outcome in (Outcome.UNMET, Outcome.BUDGET) else (search.remarks(), [])
+    reasons, front = search.reasons(outcome)
     found = search.at(search.best)
     again = Measured(onset)
-    values = np.array([search.quantity(again, wish, found) for wish in given])
+    values = np.array([wish.of(again, found) for wish in given])
     single = len(axes) == len(given) == 1 and not given[0].sense
     bound = search.bound(again) if outcome is Outcome.MET and single else np.nan
     search.progress(1.0, "walks")
@@ -83,7 +82,7 @@ def size(
     walks = {name: end_of_walk(record, found) for name, record in records.items()}
     if outcome is Outcome.MET and not _as_computed(walks["planar"], found, again):
         outcome = Outcome.SLOW if _duration(found, again) == _LONGEST else Outcome.OTHERWISE
-    rows = np.array([[*search.numbers(u), *(search.quantity(again, w, search.at(u)) for w in given)] for u in front])
+    rows = np.array([[*search.numbers(u), *(wish.of(again, search.at(u)) for wish in given)] for u in front])
     return Sizing(
         _documented(robot, found, given, axes, onset, outcome), robot.name, given, onset, values, axes,
         search.numbers(search.best), bound, outcome, tuple(reasons), rows.reshape(-1, len(axes) + len(given)), walks,

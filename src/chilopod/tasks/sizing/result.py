@@ -13,25 +13,14 @@ from chilopod import units
 from chilopod.analysis.map_axes import Axis
 from chilopod.analysis.quantities import QUANTITIES, Onset, unit_of
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.labels import Labelled
 from chilopod.notebook import Summary, axes_for, finite
 from chilopod.robot import Robot
 from chilopod.stability.shown import bounded
 from chilopod.tasks.radius_law import is_curved
-from chilopod.tasks.sizing.wishes import Wish
+from chilopod.tasks.sizing.search import Outcome, Wish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-class Outcome(Labelled):
-    """Outcome of a search for a robot; each member's ``sentence`` describes it in words."""
-
-    MET = "met", "every wish is met"
-    OTHERWISE = "walks otherwise", "the wishes are met in theory, but a walk that starts bent does something else"
-    SLOW = "not settled", "the wishes are met in theory; a walk of 15 minutes that starts bent has not settled"
-    UNMET = "unmet", "no robot that was tried meets every wish; this one comes nearest"
-    BUDGET = "budget", "the evaluations were spent before every wish was met; this robot came nearest"
 
 
 @dataclass(frozen=True, eq=False)

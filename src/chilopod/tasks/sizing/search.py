@@ -3,12 +3,16 @@
 One wish on one free number is a root, bracketed on a scan of the range and solved by Brent's method. More are a problem
 of least squares within the ranges (scipy's trust region), from the robot itself and from scattered starts. Where wishes
 conflict, weighted sums of the squares of two of them give points of their Pareto front.
+
+A radius enters as its squared curvature, which falls to zero at the onset in proportion to the growth rate, and goes on
+with that where the robot walks straight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.linalg import norm
@@ -17,15 +21,17 @@ from scipy.stats.qmc import Sobol
 
 from chilopod import units
 from chilopod.analysis.map_axes import Axis
-from chilopod.analysis.quantities import Measured, Onset
-from chilopod.errors import ChilopodError
+from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mode
+from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
+from chilopod.labels import Labelled
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress
 from chilopod.robot import Robot
 from chilopod.stability import Criticality, find_orbit
-from chilopod.tasks.sizing.result import Outcome
-from chilopod.tasks.sizing.wishes import FAILED, Wish
+
+FAILED = 10.0
+"""Deviation of a robot without the quantity."""
 
 _MET = 1e-6  # largest relative deviation from a wish that is met
 _SCANNED = 12  # intervals of a range in which a root is looked for
@@ -37,6 +43,73 @@ _SHARES = 0.1, 0.3, 0.5, 0.7, 0.9  # of the second of two conflicting wishes in 
 _FAR = 100.0  # relative deviation of a point that is left out of a front
 _OTHERS = 10.0  # weight of wishes beside those two
 _ROUNDS = 40  # evaluations of least squares for each free number
+
+
+class Outcome(Labelled):
+    """Outcome of a search for a robot; each member's ``sentence`` describes it in words."""
+
+    MET = "met", "every wish is met"
+    OTHERWISE = "walks otherwise", "the wishes are met in theory, but a walk that starts bent does something else"
+    SLOW = "not settled", "the wishes are met in theory; a walk of 15 minutes that starts bent has not settled"
+    UNMET = "unmet", "no robot that was tried meets every wish; this one comes nearest"
+    BUDGET = "budget", "the evaluations were spent before every wish was met; this robot came nearest"
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A quantity, see :data:`chilopod.analysis.quantities.QUANTITIES`, and its value, SI, to be met (``sense`` 0), not
+    to be exceeded (-1), or at least to be reached (1)."""
+
+    quantity: str
+    value: float
+    sense: int = 0
+
+    def deviation(self, value: float) -> float:
+        """Relative deviation of a value from the wish, zero if it is met; absolute for a wish of 0."""
+        if self.quantity in ("speed", "settling"):  # which spread over decades
+            return self._one_sided(float(np.log(value / self.value)))
+        return self._one_sided((value - self.value) / (abs(self.value) or 1.0))
+
+    def searched(self, measured: Measured, robot: Robot) -> float:
+        """Smooth measure of that deviation of a robot, zero and signed alike; :data:`FAILED` without the quantity."""
+        try:
+            if self.quantity != "radius":
+                return self.deviation(getattr(measured, self.quantity)(robot))
+            growth = leading_mode(robot).growth
+            curvature = self.value / measured.radius(robot) if growth > 0.0 else 0.0
+            return self._one_sided(1.0 - curvature**2 - min(growth, 0.0))
+        except ChilopodError:
+            return FAILED
+
+    def missed(self, searched: float) -> float:
+        """Size of the deviation that :meth:`searched` measures; infinite for the radius of a robot that walks
+        straight."""
+        if self.quantity != "radius":
+            return abs(searched)
+        return abs(1.0 / np.sqrt(1.0 - searched) - 1.0) if searched < 1.0 else np.inf
+
+    def of(self, measured: Measured, robot: Robot) -> float:
+        """The quantity of a robot, SI; NaN without it."""
+        with suppress(ChilopodError):
+            return float(getattr(measured, self.quantity)(robot))
+        return np.nan
+
+    def _one_sided(self, deviation: float) -> float:
+        return max(0.0, deviation * -self.sense) * -self.sense if self.sense else deviation
+
+
+def parsed_wish(robot: Robot, onset: Onset, name: str, given: float | str) -> Wish:
+    """A wish from its value, SI or text; ParameterError names the fault."""
+    try:
+        sense = {"<": -1, ">": 1}.get(given[:1], 0) if isinstance(given, str) else 0
+        unit = robot.si_unit_of(onset.parameter) if name == "onset" else QUANTITIES[name]
+        value = units.parse(given[abs(sense) :].removeprefix("="), unit) if isinstance(given, str) else float(given)
+        if not np.isfinite(value) or (name in ("radius", "speed", "settling") and value <= 0.0):
+            raise ParameterError("must be finite, and positive for a radius, a speed or a time", value=given)
+    except ChilopodError as error:
+        error.field = name
+        raise
+    return Wish(name, value, sense)
 
 
 class _SpentError(Exception):
@@ -85,13 +158,6 @@ class Search:
         if each.low > 0.0:
             return float(np.log(max(own, each.low) / each.low) / np.log(each.high / each.low))
         return (own - each.low) / (each.high - each.low)
-
-    def quantity(self, measured: Measured, wish: Wish, robot: Robot) -> float:
-        """A wished quantity of a robot; NaN without it."""
-        try:
-            return float(getattr(measured, wish.quantity)(robot))
-        except ChilopodError:
-            return np.nan
 
     def deviations(self, place: Array) -> Array:
         """Deviations of a robot from all wishes, see :meth:`Wish.searched`; keeps the best place."""
@@ -175,8 +241,10 @@ class Search:
         wide = np.ptp([self.numbers(end)[0] for end in ends]) / (ends[1] - ends[0])[0]
         return float(2.0 * off / max(rise, 1e-300) * wide)
 
-    def reasons(self) -> tuple[list[str], list[Array]]:
+    def reasons(self, outcome: Outcome) -> tuple[list[str], list[Array]]:
         """Sentences about what stands in the way, and places on the Pareto front of two wishes that conflict."""
+        if outcome is Outcome.MET:
+            return [] if self._changed else [_unchanged(self.wishes[0])], []
         self._limit = self.evaluations + self._budget
         said, best, least = [], self.best, self._least
         for each, part, value in zip(self.axes, best.tolist(), self.numbers(best).tolist(), strict=True):
@@ -186,7 +254,7 @@ class Search:
         seen = np.array([found for found in self._seen if FAILED not in found]).reshape(-1, len(self.wishes))
         for wish, values in zip(self.wishes, seen.T, strict=True):
             if values.size and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
-                said.append(self.unchanged(wish))
+                said.append(_unchanged(wish))
             if wish.quantity == "radius" and self._subcritical(self.at(best)):
                 said.append("the onset is subcritical, and curved walks beside a stable straight one are not searched")
         front: list[Array] = []
@@ -201,14 +269,6 @@ class Search:
             said.append("the evaluations were spent before it was known which wishes conflict")
         self.best, self._least = best, least
         return said or ["no end of a range and no other wish stands in the way: the search saw none nearer"], front
-
-    def unchanged(self, wish: Wish) -> str:
-        """Sentence about a wish that no free number changes."""
-        return f"no free number changes the {wish.quantity}"
-
-    def remarks(self) -> list[str]:
-        """Sentences about wishes that are met."""
-        return [] if self._changed else [self.unchanged(self.wishes[0])]
 
     def _subcritical(self, robot: Robot) -> bool:
         with suppress(ChilopodError):
@@ -240,3 +300,7 @@ class Search:
         ordered = sorted(kept, key=lambda place: tuple(place.tolist()))
         pairs = zip([None, *ordered], ordered, strict=False)
         return [place for last, place in pairs if last is None or np.abs(place - last).max() > _AT_END]
+
+
+def _unchanged(wish: Wish) -> str:
+    return f"no free number changes the {wish.quantity}"
