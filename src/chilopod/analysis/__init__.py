@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
-    from chilopod.analysis.bend_onset import bend_onset
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
     from chilopod.analysis.compare import RobotComparison, compare
     from chilopod.analysis.cycle_modes import CycleMultipliers
-    from chilopod.analysis.cycle_multipliers import cycle_multipliers, walk_multipliers
+    from chilopod.analysis.cycle_multipliers import bend_onset, cycle_multipliers, walk_multipliers
     from chilopod.analysis.map import map
     from chilopod.analysis.map_result import StabilityMap
     from chilopod.analysis.parameters import spring_scale
@@ -31,11 +30,10 @@ else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "bend_onset": ("bend_onset",),
             "branch": ("curved_walks", "read_walks", "resumed"),
             "compare": ("RobotComparison", "compare"),
             "cycle_modes": ("CycleMultipliers",),
-            "cycle_multipliers": ("cycle_multipliers", "walk_multipliers"),
+            "cycle_multipliers": ("bend_onset", "cycle_multipliers", "walk_multipliers"),
             "parameters": ("spring_scale",),
             "quantities": ("Onset",),
             "map": ("map",),

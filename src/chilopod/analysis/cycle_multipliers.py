@@ -9,7 +9,7 @@ of that size, with an interval from its scatter. The same matrix of tiny bends r
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from chilopod import units
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
 from chilopod.engine import Engine, engine_named
 from chilopod.engine.arguments import as_array
@@ -25,7 +26,7 @@ from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
 from chilopod.stability.spectrum import eigensystem
-from chilopod.statistics import LEVEL
+from chilopod.statistics import LEVEL, Interval
 
 if TYPE_CHECKING:
     from chilopod.twin import CycleMap
@@ -42,6 +43,7 @@ _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
 _FORGOTTEN, _BLOCK = 2, 4  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
 _NOT_BENT = 1e-9  # part of a mode
+_MOST = 8  # multipliers between the ends of an interval that has an onset
 _DRIFT, _EVEN = 0.2, 2.0  # m, rad, per second, in all cycles that are followed; largest change over the least
 
 
@@ -240,3 +242,47 @@ def _reach(cycle: CycleMap, x: Array, basis: Array, low: float) -> tuple[float, 
         else:
             low = size
     return low, cycle.changing(differ)
+
+
+def bend_onset(
+    multipliers: Callable[[Robot], CycleMultipliers], robot: Robot, parameter: str, between: tuple[float, float]
+) -> Interval:
+    """Value of a parameter at which the multiplier of a bend of finite size passes 1, in SI units, by regula falsi
+    until 1 lies in the multiplier's interval; that interval over the slope is the interval of the value."""
+
+    def shown(value: float) -> str:
+        return units.format(value, robot.unit_of(parameter), digits=6)
+
+    def excess(value: float) -> tuple[float, float]:
+        bends = [mode for mode in multipliers(robot.with_value(parameter, value)).finite if mode.shape == "bend"]
+        if not bends:
+            raise AnalysisError("has no bend among its leading modes", field=parameter, value=shown(value))
+        return bends[0].multiplier.real - 1.0, bends[0].error
+
+    (a, b), (at_a, at_b) = between, [excess(end)[0] for end in between]
+    if at_a * at_b > 0.0:
+        said = f"must hold an onset; the multiplier is {1.0 + at_a:.4f} and {1.0 + at_b:.4f} at its ends"
+        raise ParameterError(
+            said, field="onset", value=f"{shown(a)} to {shown(b)}", allowed="values on both sides of 1"
+        )
+    return crossing(excess, (a, at_a), (b, at_b))
+
+
+def crossing(
+    excess: Callable[[float], tuple[float, float]],
+    one: tuple[float, float],
+    other: tuple[float, float],
+    tolerance: float = 0.0,
+) -> Interval:
+    """Value at which an excess passes 0, between two values with excesses of different signs, by regula falsi until the
+    excess is below its error or the tolerance; its error over the slope is the interval. ``excess`` returns both."""
+    (a, at_a), (b, at_b) = one, other
+    for _ in range(_MOST):
+        slope = (at_b - at_a) / (b - a)
+        value = a - at_a / slope
+        at, error = excess(value)
+        if abs(at) <= max(error, tolerance):
+            break
+        a, at_a, b, at_b = (value, at, b, at_b) if at * at_a > 0.0 else (a, at_a, value, at)
+    value -= at / slope
+    return Interval(value, value - error / abs(slope), value + error / abs(slope))

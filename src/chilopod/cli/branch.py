@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chilopod.cli import options as shared
-from chilopod.cli.options import OutOption, ParameterOption, RobotOptions, print_json, with_options
+from chilopod.cli.options import OutOption, ParameterOption, RobotOptions, print_result, with_options
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def branch(
 
         return write_branch(data, folder, replace=replace) if folder else []
 
-    shared.deliver(write, lambda: print_json(plain(data)) if options.as_json else typer.echo("\n".join(_lines(data))))
+    shared.deliver(write, lambda: print_result(plain(data), _lines(data), options.as_json))
 
 
 def _around(robot: Robot, parameter: str) -> tuple[float, float]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, WalkOptions, choices, reading, with_options
+from chilopod.cli.options import OutOption, choices, reading, with_options
+from chilopod.cli.walking import WalkOptions
 
 if TYPE_CHECKING:
     from chilopod.progress import Progress

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import typer
 
-from chilopod.cli.options import JsonOption, print_json
+from chilopod.cli.options import JsonOption, print_result
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import OutputError, briefly
 
@@ -59,14 +59,11 @@ def doctor(as_json: JsonOption = False) -> None:
     with progress_bar("doctor"):
         found = [*_versions(), *(_guarded(name, look) for name, look in _LOOKS.items())]
     broken = any(each.mend and each.essential for each in found)
-    if as_json:
-        print_json({"healthy": not broken, "findings": [each.as_json() for each in found]})
-    else:
-        width = max(len(each.name) for each in found)
-        for each in found:
-            typer.echo(f"{each.mark} {each.name:<{width}}  {each.says}")
-            if each.mend:
-                typer.echo(f"  {'':<{width}}  to mend it: {each.mend}")
+    lines, width = [], max(len(each.name) for each in found)
+    for each in found:
+        lines.append(f"{each.mark} {each.name:<{width}}  {each.says}")
+        lines += [f"  {'':<{width}}  to mend it: {each.mend}"] * bool(each.mend)
+    print_result({"healthy": not broken, "findings": [each.as_json() for each in found]}, lines, as_json)
     if broken:
         raise typer.Exit(BROKEN)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.commands import new_app
-from chilopod.cli.options import RobotOptions, deliver, free, json_text, print_json, with_options
+from chilopod.cli.options import RobotOptions, deliver, free, json_text, print_result, with_options
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import ParameterError
 
@@ -72,8 +72,7 @@ class _Options(RobotOptions):
         texts = json_text(result) + "\n", found.estimates.identified(source).to_toml()
         figure = panel_files(identification.panel(found), self.out, self.out)
         files: Iterable[tuple[Path, Content]] = chain(zip(written, texts, strict=True), figure)
-        show = partial(print_json, result) if self.as_json else partial(typer.echo, "\n".join(lines))
-        deliver(lambda: write_all(files, replace=self.force), show)
+        deliver(lambda: write_all(files, replace=self.force), lambda: print_result(result, lines, self.as_json))
 
 
 @dataclass(frozen=True)

@@ -9,22 +9,17 @@ from dataclasses import MISSING, dataclass, fields
 from functools import cached_property, partial
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 from chilopod.cli.progress import progress_bar
-from chilopod.cli.user_code import own_code, own_controller
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
 
 if TYPE_CHECKING:
-    from chilopod import tasks
     from chilopod.analysis import Onset
     from chilopod.progress import Progress
     from chilopod.robot import Robot
-    from chilopod.tasks.runs import Runs
-
-Found = TypeVar("Found", bound="Runs")
 
 
 def _engines() -> list[str]:
@@ -86,15 +81,6 @@ OutOption = Annotated[
     Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for the results, besides the text.")
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace files that are already there.")]
-SeedOption = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        min=0,
-        help="Seed of small random disturbances of start, feet and sensor; the same seed gives the same walk. Without "
-        "it nothing is disturbed.",
-    ),
-]
 EngineOption = Annotated[
     str,
     typer.Option(
@@ -102,30 +88,6 @@ EngineOption = Annotated[
         help="Engine that computes the walk. planar: the paper's model; twin: the whole robot in three dimensions, by "
         "MuJoCo (needs a [twin] section, as in aoi2022); or an engine of your own.",
         autocompletion=_engines,
-    ),
-]
-StrategyOption = Annotated[str, typer.Option(help="Strategy of turning.", autocompletion=lambda: choices("STRATEGIES"))]
-ControllerOption = Annotated[
-    str | None,
-    typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
-]
-TrialsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--trials",
-        metavar="FOLDER",
-        help="Folder that keeps all trials; a trial that is there already is not walked again.",
-    ),
-]
-RepeatsOption = Annotated[
-    int, typer.Option(metavar="N", min=1, max=100_000, help="Number of walks; their seeds count up from --seed.")
-]
-ClusterOption = Annotated[
-    str | None,
-    typer.Option(
-        "--cluster",
-        metavar="ADDRESS|N",
-        help="Dask cluster on which trials walk: address of its scheduler, or number of worker processes here.",
     ),
 ]
 
@@ -139,19 +101,6 @@ def reading(option: str, *words: str) -> Iterator[None]:
         error.field, error.nearest = option, error.nearest or nearest_name(str(error.value), words)
         error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
         raise
-
-
-@contextmanager
-def walking_on(cluster: str | None) -> Iterator[None]:
-    """Let trials of this block walk where ``--cluster`` says."""
-    if cluster is None:
-        yield
-        return
-    from chilopod.trials import Cluster, using
-
-    is_number = cluster.lstrip("-").isdecimal()
-    with Cluster(int(cluster[:9]) if is_number else cluster) as there, using(there):
-        yield
 
 
 def read_robot(robot: str | Robot, overrides: Sequence[str] | None) -> Robot:
@@ -191,10 +140,7 @@ class RobotOptions:
         from chilopod.output import write_all
 
         texts = [(file, json_text(result) + "\n") for file in files]
-        deliver(
-            lambda: write_all(texts, replace=self.force),
-            lambda: print_json(result) if self.as_json else typer.echo("\n".join(lines)),
-        )
+        deliver(lambda: write_all(texts, replace=self.force), lambda: print_result(result, lines, self.as_json))
 
 
 @dataclass(frozen=True)
@@ -221,76 +167,8 @@ class OnsetOptions(RobotOptions):
 
             return write_result(found, json_text(result) + "\n", name, self.out, replace=self.force) if self.out else []
 
-        deliver(write, lambda: print_json(result) if self.as_json else typer.echo("\n".join(found.lines())))
+        deliver(write, lambda: print_result(result, found.lines(), self.as_json))
         return found
-
-
-@dataclass(frozen=True)
-class WalkOptions(RobotOptions):
-    """Argument and options that walk, turn and course share, as they were typed."""
-
-    seed: SeedOption = None
-    repeats: RepeatsOption = 1
-    engine: EngineOption = "planar"
-    controller: ControllerOption = None
-    trials: TrialsOption = None
-    cluster: ClusterOption = None
-
-    @property
-    def steering(self) -> dict[str, Any]:
-        """Engine and controller, arguments of every task and of a trial."""
-        return {"engine": self.engine, "controller": own_controller(self.controller)}
-
-    def runs(self, progress: Progress) -> tasks.RunOptions:
-        """Options of every task, with the function that shows its progress."""
-        return {"seed": self.seed, "repeats": self.repeats, "folder": self.trials, "progress": progress}
-
-    def spring(self, path: str | None, k1: str, *words: str) -> float:
-        """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad; errors name words that it may be."""
-        with reading("k1", *words):
-            path = path or "springs.stiffness"
-            return self.described.override(path, k1).get(path)
-
-    @contextmanager
-    def walking(self, what: str) -> Iterator[Callable[[str], Progress]]:
-        """Find the user's modules, walk on the cluster that was named, and show progress under titles, in this
-        block."""
-        with progress_bar(what) as show, own_code(show), walking_on(self.cluster):
-            yield lambda title: partial(show, title)
-
-    def walk_into(self, out: Path | None, what: str, walk: Callable[[Callable[[str], Progress]], Found]) -> None:
-        """Walk a ``turn`` or a ``course``, write its files into the folder, if there is one, and print it."""
-        if out:
-            from chilopod.show.files import files_of_walks
-
-            free(files_of_walks(what, out), self.force)
-        with self.walking(what) as progress:
-            done = walk(progress)
-
-        def write() -> Iterable[Path]:
-            from chilopod.show.files import write_walks
-
-            return write_walks(what, done, out or "", replace=self.force)
-
-        self.deliver(write if out else list, done)
-
-    def deliver(self, write: Callable[[], Iterable[Path]], done: Found, hint: str = "--seed 1") -> None:
-        """Write the files of walks, and print what they came to, as JSON where that was asked for; of walks that
-        nothing bends the hint says which options do."""
-
-        def printed() -> None:
-            with progress_bar("creep of the feet"):  # may take as long as the walk
-                creeps = done.foot_creep
-            if self.as_json:
-                print_json(done.as_json())
-                return
-            typer.echo("\n".join(done.lines()))
-            if getattr(done, "straight", False):
-                typer.echo(f"  nothing disturbed it, so nothing bends it, even where it is unstable: try {hint}")
-            if creeps is not None:
-                typer.echo(f"  standing feet creep like viscous ones of {creeps:.0f} N*s/m")
-
-        deliver(write, printed)
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -321,13 +199,13 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def print_json(result: dict[str, Any]) -> None:
-    """Print a result as one JSON object; NaN and infinity have no place in JSON and are a fault here."""
-    typer.echo(json_text(result))
+def print_result(result: dict[str, Any], lines: Iterable[str], as_json: bool) -> None:
+    """Print a result as one JSON object, or as lines of text."""
+    typer.echo(json_text(result) if as_json else "\n".join(lines))
 
 
 def json_text(result: dict[str, Any]) -> str:
-    """A result as :func:`print_json` prints it."""
+    """A result as one JSON object; NaN and infinity have no place in JSON and are a fault here."""
     return json.dumps(result, indent=2, allow_nan=False)
 
 
@@ -349,10 +227,8 @@ def save(file: Path, text: str, robot: Robot, *, force: bool, as_json: bool, end
 
     free([file], force, ending)
     write_atomic(file, text, replace=force)
-    if as_json:
-        print_json({"robot": robot.name, "file": str(file), **more})
-    else:
-        typer.echo(": ".join([f"wrote {file}", *more.values()]))
+    said = ": ".join([f"wrote {file}", *more.values()])
+    print_result({"robot": robot.name, "file": str(file), **more}, [said], as_json)
 
 
 def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:

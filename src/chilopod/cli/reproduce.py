@@ -9,16 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import (
-    ClusterOption,
-    ForceOption,
-    JsonOption,
-    print_json,
-    read_robot,
-    walking_on,
-    with_options,
-)
+from chilopod.cli.options import ForceOption, JsonOption, print_result, read_robot, with_options
 from chilopod.cli.progress import progress_bar
+from chilopod.cli.walking import ClusterOption, walking_on
 from chilopod.errors import ParameterError
 from chilopod.paper.registry import REGISTRY, chosen
 
@@ -44,6 +37,13 @@ TinyOption = Annotated[
 AllOption = Annotated[bool, typer.Option("--all", help="Every study beyond the paper, with all trials: an hour.")]
 QuickOption = Annotated[bool, typer.Option("--quick", help="The paper's main experiments: three minutes.")]
 PaperOption = Annotated[bool, typer.Option("--paper", help="The paper's own experiments, not what goes beyond them.")]
+
+_NEXT = (
+    "  chilopod stability aoi2022-planar",
+    '  chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]" --between "2 N*mm/deg" "75 N*mm/deg"',
+    '  chilopod turn aoi2022-planar --target "30 deg, 2 m" --out turn',
+    "  chilopod robot new my.toml --modules 8",
+)
 
 
 @dataclass(frozen=True)
@@ -138,37 +138,24 @@ def _print(options: ReportOptions, found: Found, report: Report) -> None:
     from chilopod.errors import in_words
 
     rows, robot_rows = [row for part in found.planar_rows().values() for row in part], found.robot_rows()
-    if options.as_json:
-        print_json(
-            {
-                "robot": found.context.robot.name,
-                "whole_robot": found.context.whole.name,
-                "report": str(report.page),
-                "rows": [row.data() for row in rows],
-                "robot_rows": [row.data() for row in robot_rows],
-                "seconds": {section.name: value for section, value in found.seconds.items()},
-                "failures": {section.name: in_words(failure) for section, failure in report.failures.items()},
-            }
-        )
-        return
+    result = {
+        "robot": found.context.robot.name,
+        "whole_robot": found.context.whole.name,
+        "report": str(report.page),
+        "rows": [row.data() for row in rows],
+        "robot_rows": [row.data() for row in robot_rows],
+        "seconds": {section.name: value for section, value in found.seconds.items()},
+        "failures": {section.name: in_words(failure) for section, failure in report.failures.items()},
+    }
+    lines: list[str] = []
     for row in rows:
-        _print_row(row.verdict, row.quantity, {"paper": row.paper, "here": row.computed.words})
+        lines += _of_row(row.verdict, row.quantity, {"paper": row.paper, "here": row.computed.words})
     for line in robot_rows:
         said = {name: line.data()[name] for name in ("robot", "twin", "planar")}
-        _print_row(line.verdict, f"{line.quantity} ({line.kind})", said)
-    typer.echo(f"\nThe report is {report.page}\nNext, try:")
-    for command in (
-        "chilopod stability aoi2022-planar",
-        'chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]" --between "2 N*mm/deg" "75 N*mm/deg"',
-        'chilopod turn aoi2022-planar --target "30 deg, 2 m" --out turn',
-        "chilopod robot new my.toml --modules 8",
-    ):
-        typer.echo(f"  {command}")
+        lines += _of_row(line.verdict, f"{line.quantity} ({line.kind})", said)
+    print_result(result, [*lines, f"\nThe report is {report.page}\nNext, try:", *_NEXT], options.as_json)
 
 
-def _print_row(verdict: str, quantity: str, said: dict[str, str]) -> None:
-    typer.echo(f"{verdict:<12} {quantity}")
+def _of_row(verdict: str, quantity: str, said: dict[str, str]) -> list[str]:
     width = max(map(len, said)) + 1
-    for who, words in said.items():
-        if words:
-            typer.echo(f"{'':<12}   {who + ':':<{width}} {words}")
+    return [f"{verdict:<12} {quantity}", *(f"{'':<12}   {who + ':':<{width}} {x}" for who, x in said.items() if x)]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.commands import new_app
-from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, print_json, read_robot, reading, save
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, print_result, read_robot, reading, save
 from chilopod.errors import ChilopodError, ParameterError
 
 if TYPE_CHECKING:
@@ -106,28 +106,21 @@ def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fal
         "duty": (described.gait.duty, ""),
         "speed": (described.gait.speed, "m/s"),
     }
-    if as_json:
-        parameters = {}
-        for path in described.parameters():
-            value, unit = described.get(path), described.unit_of(path)
-            parameters[path] = {
-                "value": units.from_si(value, unit),
-                "unit": unit,
-                "value_si": value,
-                "si_unit": described.si_unit_of(path),
-                "provenance": described.provenance_of(path),
-            }
-        print_json(
-            {
-                "robot": described.name,
-                "parameters": parameters,
-                "derived": {name: {"value_si": value, "si_unit": unit} for name, (value, unit) in derived.items()},
-            }
-        )
-        return
+    parameters = {}
+    for path in described.parameters():
+        value, unit = described.get(path), described.unit_of(path)
+        parameters[path] = {
+            "value": units.from_si(value, unit),
+            "unit": unit,
+            "value_si": value,
+            "si_unit": described.si_unit_of(path),
+            "provenance": described.provenance_of(path),
+        }
+    found = {"robot": described.name, "parameters": parameters}
+    found["derived"] = {name: {"value_si": value, "si_unit": unit} for name, (value, unit) in derived.items()}
     rows = described.listed()
     rows += [(name, units.format(value, unit, digits=6), "derived") for name, (value, unit) in derived.items()]
-    typer.echo("\n  ".join([described.name, *aligned(rows)]))
+    print_result(found, [described.name, *(f"  {line}" for line in aligned(rows))], as_json)
 
 
 @app.command()
@@ -140,12 +133,8 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
 
     described = read_robot(robot, overrides)
     found = [*remarks(described), *_out_of_reach(described)]
-    if as_json:
-        print_json({"robot": described.name, "valid": True, "remarks": found})
-        return
-    typer.echo(f"{described.name}: valid, {described.body.modules} modules")
-    for remark in found:
-        typer.echo(f"  {remark}")
+    lines = [f"{described.name}: valid, {described.body.modules} modules", *(f"  {remark}" for remark in found)]
+    print_result({"robot": described.name, "valid": True, "remarks": found}, lines, as_json)
 
 
 def _out_of_reach(robot: Robot) -> Iterator[str]:

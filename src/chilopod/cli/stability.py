@@ -19,7 +19,7 @@ from chilopod.cli.options import (
     with_options,
 )
 from chilopod.cli.progress import progress_bar
-from chilopod.cli.user_code import own_code
+from chilopod.cli.walking import own_code
 from chilopod.errors import ParameterError
 
 if TYPE_CHECKING:

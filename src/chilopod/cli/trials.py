@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chilopod.cli.commands import new_app
-from chilopod.cli.options import JsonOption, print_json
+from chilopod.cli.options import JsonOption, print_result
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -46,33 +46,22 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
         trials, wrong = kept(there.trials, lambda part, words: show("list", part, words))
     rows, size = groups(trials), sum(each.size for each in trials)
     others = sum(not each.current for each in trials)
-    if as_json:
-        found = {"trials": len(trials), "bytes": size, "of_other_versions": others}
-        files = {
-            "unreadable": [path.name for path, _ in wrong],
-            "set_aside": [path.name for path in there.aside],
-            "unfinished": [path.name for path in there.unfinished],
-            "foreign": [path.name for path in there.foreign],
-        }
-        print_json({"folder": str(folder), **found, **files, "groups": [_as_json(row) for row in rows]})
-        return
-    if rows:
-        head = ("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")
-        typer.echo("\n".join(aligned([head, *map(_cells, rows)])))
-    typer.echo(f"{_trials(len(trials))}, {in_words(size)}")
+    found: dict[str, Any] = {"folder": str(folder), "trials": len(trials), "bytes": size, "of_other_versions": others}
+    head = ("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")
+    lines = [*(aligned([head, *map(_cells, rows)]) if rows else []), f"{_trials(len(trials))}, {in_words(size)}"]
     if others:
-        typer.echo(f"{_trials(others)} of another version: this one does not find them (clean --old removes them)")
-    for paths, words in (
-        ([path for path, _ in wrong], "that cannot be read (chilopod trials check says why)"),
-        (there.aside, "set aside, because they were not what they should be (chilopod trials clean removes them)"),
-        (
-            there.unfinished,
-            "being written, or left over by a killed process (chilopod trials clean removes the latter)",
-        ),
-        (there.foreign, "not written by chilopod"),
+        lines.append(f"{_trials(others)} of another version: this one does not find them (clean --old removes them)")
+    aside = "set aside, because they were not what they should be (chilopod trials clean removes them)"
+    left = "being written, or left over by a killed process (chilopod trials clean removes the latter)"
+    for key, paths, words in (
+        ("unreadable", [path for path, _ in wrong], "that cannot be read (chilopod trials check says why)"),
+        ("set_aside", there.aside, aside),
+        ("unfinished", there.unfinished, left),
+        ("foreign", there.foreign, "not written by chilopod"),
     ):
-        if paths:
-            typer.echo(f"{len(paths)} file{'s' * (len(paths) > 1)} {words}")
+        found[key] = [path.name for path in paths]
+        lines += [f"{len(paths)} file{'s' * (len(paths) > 1)} {words}"] * bool(paths)
+    print_result({**found, "groups": [_as_json(row) for row in rows]}, lines, as_json)
 
 
 def _as_json(row: Group) -> dict[str, Any]:
@@ -122,20 +111,11 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
     with progress_bar("trials") as show:
         whole, wrong = checked(contents(folder).trials, lambda part, words: show("check", part, words))
     others = sum(not each.current for each in whole)
-    if as_json:
-        print_json(
-            {
-                "folder": str(folder),
-                "whole": len(whole),
-                "of_other_versions": others,
-                "wrong": [{"file": path.name, "what": words} for path, words in wrong],
-            }
-        )
-    else:
-        for path, words in wrong:
-            typer.echo(f"{path} {words}")
-        found = f"{_trials(len(whole))} whole, {len(wrong)} not"
-        typer.echo(f"{found}; {others} of another version, which this one does not find" if others else found)
+    found = {"folder": str(folder), "whole": len(whole), "of_other_versions": others}
+    said = f"{_trials(len(whole))} whole, {len(wrong)} not"
+    said += f"; {others} of another version, which this one does not find" if others else ""
+    names = [{"file": path.name, "what": words} for path, words in wrong]
+    print_result({**found, "wrong": names}, [*(f"{path} {words}" for path, words in wrong), said], as_json)
     if wrong:
         raise typer.Exit(BROKEN)
 
@@ -156,21 +136,16 @@ def clean(
     from chilopod.trials.folder import clean as cleaned
 
     removed, left = cleaned(folder, old=old, dry=dry)
-    if as_json:
-        print_json(
-            {
-                "folder": str(folder),
-                "dry_run": dry,
-                "removed": [path.name for path in removed],
-                "left": [{"file": path.name, "why": why} for path, why in left],
-            }
-        )
-        return
-    for path in removed:
-        typer.echo(f"{'would remove' if dry else 'removed'} {path}")
-    for path, why in left:
-        typer.echo(f"left {path}: {why}")
-    typer.echo(f"{len(removed)} {'to be removed' if dry else 'removed'}, {len(left)} left")
+    found = {
+        "folder": str(folder),
+        "dry_run": dry,
+        "removed": [path.name for path in removed],
+        "left": [{"file": path.name, "why": why} for path, why in left],
+    }
+    lines = [f"{'would remove' if dry else 'removed'} {path}" for path in removed]
+    lines += [f"left {path}: {why}" for path, why in left]
+    lines.append(f"{len(removed)} {'to be removed' if dry else 'removed'}, {len(left)} left")
+    print_result(found, lines, as_json)
 
 
 def _ranges(numbers: Sequence[int]) -> str:

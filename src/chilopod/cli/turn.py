@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, StrategyOption, WalkOptions, reading, with_options
+from chilopod.cli.options import OutOption, choices, reading, with_options
+from chilopod.cli.walking import WalkOptions
 
 if TYPE_CHECKING:
     from chilopod.progress import Progress
@@ -33,7 +34,9 @@ def turn(
             '"10 N*mm/deg".',
         ),
     ] = "auto",
-    strategy: StrategyOption = "pitchfork",
+    strategy: Annotated[
+        str, typer.Option(help="Strategy of turning.", autocompletion=lambda: choices("STRATEGIES"))
+    ] = "pitchfork",
     duration: Annotated[
         str | None,
         typer.Option(

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import WalkOptions, free, reading, with_options
+from chilopod.cli.options import free, reading, with_options
+from chilopod.cli.walking import WalkOptions
 
 if TYPE_CHECKING:
     from chilopod.record_file import RecordFile

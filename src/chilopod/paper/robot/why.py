@@ -24,8 +24,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from chilopod.analysis.bend_onset import crossing
-from chilopod.analysis.cycle_multipliers import finite_modes
+from chilopod.analysis.cycle_multipliers import crossing, finite_modes
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.frozen import Array
