@@ -25,7 +25,7 @@ from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.stretch import MOST_BENT
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, switch
+from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, Start, follow, switch
 from chilopod.stability.branches.branch import LONGEST
 from chilopod.stability.spectrum import VERDICTS
 
@@ -35,23 +35,14 @@ TOLERANCE = 1e-10
 VERSION = 3
 """Version of the file of a branch, increased whenever the meaning of its data or their continuation changes."""
 
-_SUFFIX = {
-    "axis_radius": "m",
-    "path_radius": "m",
-    "heading_rate": "rad_s",
-    "speed": "m_s",
-    "cost_of_transport": "",
-    "multiplier": "",
+_KEYS = {
+    **{"axis_radius": "axis_radius_m", "path_radius": "path_radius_m", "heading_rate": "heading_rate_rad_s"},
+    **{"speed": "speed_m_s", "cost_of_transport": "cost_of_transport", "multiplier": "multiplier"},
 }
 _STABLE = {VERDICTS[stable]: stable for stable in VERDICTS}
-
-_SAME = (
-    "body",
-    "springs",
-    "legs",
-    "gait",
-    "ground",
-)  # properties that must agree to continue a branch; names may differ
+# Properties that must agree to continue a branch; names may differ.
+_SAME = "body", "springs", "legs", "gait", "ground"
+_VERDICT = "criticality", "coefficient", "direction", "direction_confirms"
 
 
 def curved_walks(
@@ -105,19 +96,14 @@ def curved_walks(
         searched = interval_text(robot, parameter, between)
         raise AnalysisError("the straight walk has no pitchfork in this interval", field=parameter, value=searched)
     fork = forks[-1]
-    make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.
     angles = fork.point.mode.real[3 : robot.body.modules + 2]
-    starts = switch(make, fork.point)
+    starts = switch(_followed(robot, parameter), fork.point)
     if len(starts) != 2:
         raise AnalysisError(f"{len(starts)} branches leave the straight walk there, not two", field=parameter)
     along, against = starts
     start = along if (side > 0) is bool(angles.sum() >= 0) else against
-    branch = follow(
-        make, start, between, points=points, longest=longest, closely=False,
-        precision=TOLERANCE,
-        progress=_shown(robot, parameter, points, progress),
-    )  # fmt: skip
+    branch = _follow(robot, parameter, start, between, points, longest, progress)
     attributes = {"side": side, **_verdict(robot, parameter, fork, branch)}
     return _walked(robot, parameter, between, branch, attributes)
 
@@ -156,42 +142,25 @@ def resumed(
     """
     saved = Robot(**tomllib.loads(data.attrs["robot_toml"]))
     if data.attrs["varied"] != parameter:
-        raise ParameterError(
-            "must be the parameter that the saved branch varies",
-            field="parameter",
-            value=parameter,
-            allowed=data.attrs["varied"],
-        )
+        said, varied = "must be the parameter that the saved branch varies", data.attrs["varied"]
+        raise ParameterError(said, field="parameter", value=parameter, allowed=varied)
     value = float(data.parameter_si[0])
     here, there = robot.with_value(parameter, value), saved.with_value(parameter, value)
     for name in _SAME:
         if getattr(here, name) != getattr(there, name):
-            raise ParameterError(
-                f"the saved branch belongs to another robot: {name} differs", field="robot", value=robot.name
-            )
+            said = f"the saved branch belongs to another robot: {name} differs"
+            raise ParameterError(said, field="robot", value=robot.name)
     if side is not None and side != data.attrs["side"]:
         raise ParameterError("must be the side to which the saved branch turns", field="side")
     between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
     (low, high), end = sorted(between), float(data.parameter_si[-1])
     ended = data.attrs["ending"] == Ending.LEFT_INTERVAL.label and end in (low, high)
     if ended or not low <= end <= high:
-        unit = robot.unit_of(parameter)
-        raise ParameterError(
-            "must contain the last point of the saved branch",
-            field="between",
-            value=interval_text(robot, parameter, (low, high)),
-            allowed=f"an interval that contains {units.format(end, unit, digits=6)}",
-        )
-    branch = follow(
-        _followed(saved, parameter),
-        _branch_of(data, _followed(saved, parameter)(value).scale),
-        between,
-        points=points,
-        longest=longest,
-        closely=False,
-        precision=TOLERANCE,
-        progress=_shown(saved, parameter, points, progress),
-    )
+        said, given = "must contain the last point of the saved branch", interval_text(robot, parameter, (low, high))
+        allowed = f"an interval that contains {units.format(end, robot.unit_of(parameter), digits=6)}"
+        raise ParameterError(said, field="between", value=given, allowed=allowed)
+    start = _branch_of(data, _followed(saved, parameter)(value).scale)
+    branch = _follow(saved, parameter, start, between, points, longest, progress)
     kept = {name: data.attrs[name] for name in _VERDICT}
     return _walked(saved, parameter, between, branch, {"side": data.attrs["side"], **kept})
 
@@ -220,8 +189,6 @@ def read_walks(path: str | Path) -> xr.Dataset:
 
 def as_json(data: xr.Dataset) -> dict[str, Any]:
     """A branch as plain numbers; an infinite radius (straight on) is null."""
-
-    columns = ("axis_radius", "path_radius", "heading_rate", "speed", "cost_of_transport", "multiplier")
     return {
         "robot": data.attrs["robot"],
         "parameter": data.attrs["varied"],
@@ -238,7 +205,7 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
                 "verdict": str(at.verdict.values),
                 "special": str(at.special.values) or None,
                 "mean_joint_angles_rad": [float(angle) for angle in at.mean_angle],
-                **{f"{name}_{_SUFFIX[name]}".rstrip("_"): finite(float(at[name])) for name in columns},
+                **{key: finite(float(at[name])) for name, key in _KEYS.items()},
                 "multipliers": np.column_stack([at.multiplier_real, at.multiplier_imag]).tolist(),
             }
             for at in (data.isel(point=i) for i in range(data.sizes["point"]))
@@ -246,17 +213,25 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
     }
 
 
-_VERDICT = ("criticality", "coefficient", "direction", "direction_confirms")
-
-
 def _followed(robot: Robot, parameter: str) -> Callable[[float], FollowedModel]:
     make = family(robot, parameter)
     return lambda value: FollowedModel(make(value).robot, TOLERANCE)
 
 
-def _shown(robot: Robot, parameter: str, points: int, progress: Progress) -> Callable[[int, BranchPoint], None]:
-    unit = robot.unit_of(parameter)
-    return lambda count, point: progress(count / points, units.format(point.value, unit, digits=4))
+def _follow(
+    robot: Robot,
+    parameter: str,
+    start: Start | Branch,
+    between: tuple[float, float],
+    points: int,
+    longest: float,
+    progress: Progress,
+) -> Branch:
+    def shown(count: int, point: BranchPoint) -> None:
+        progress(count / points, units.format(point.value, robot.unit_of(parameter), digits=4))
+
+    how: Any = {"points": points, "longest": longest, "closely": False, "precision": TOLERANCE}
+    return follow(_followed(robot, parameter), start, between, **how, progress=shown)
 
 
 def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch) -> dict[str, Any]:
@@ -286,17 +261,11 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     """Branch of a dataset, to the last bit."""
     kinds = {kind.label: kind for kind in Kind}
     multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
-    units = np.append(sizes, float(data.attrs["scale"]))
+    numbers = data.parameter_si.values.tolist(), data.orbit.values, multipliers, data.tangent.values
+    scale = np.append(sizes, float(data.attrs["scale"]))
     points = tuple(
-        BranchPoint(float(value), orbit, row, tangent, units, kinds.get(str(special)))
-        for value, orbit, row, tangent, special in zip(
-            data.parameter_si.values,
-            data.orbit.values,
-            multipliers,
-            data.tangent.values,
-            data.special.values,
-            strict=True,
-        )
+        BranchPoint(value, orbit, row, tangent, scale, kinds.get(str(special)))
+        for value, orbit, row, tangent, special in zip(*numbers, data.special.values, strict=True)
     )
     (ending,) = (each for each in Ending if each.label == data.attrs["ending"])
     return Branch(points, ending, float(data.attrs["step"]))

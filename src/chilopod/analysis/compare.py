@@ -78,29 +78,22 @@ class RobotComparison(Summary):
 
     def as_json(self) -> dict[str, Any]:
         """Differences and effects as plain numbers, SI; null where a robot has no such quantity."""
-
+        robots, quantities = (self.first, self.second), {}
+        for name, found in self.effects.items():
+            rows = zip(self.paths, np.array([found.alone, found.last, found.mean, found.error]).T.tolist(), strict=True)
+            quantities[name] = {
+                "values_si": [finite(found.first), finite(found.second)],
+                "effects_si": {
+                    path: dict(zip(("alone", "last", "mean", "error"), map(finite, row), strict=True))
+                    for path, row in rows
+                },
+            }
         return {
-            "robots": [self.first.name, self.second.name],
+            "robots": [robot.name for robot in robots],
             "parameter": self.onset.parameter,
-            "differences_si": {
-                path: [robot.get(path) if _has(robot, path) else None for robot in (self.first, self.second)]
-                for path in self.paths
-            },
+            "differences_si": {path: [_number(robot, path) for robot in robots] for path in self.paths},
             "without_effect": list(self.others),
-            "quantities": {
-                name: {
-                    "values_si": [finite(found.first), finite(found.second)],
-                    "effects_si": {
-                        path: dict(zip(("alone", "last", "mean", "error"), map(finite, row), strict=True))
-                        for path, row in zip(
-                            self.paths,
-                            np.array([found.alone, found.last, found.mean, found.error]).T.tolist(),
-                            strict=True,
-                        )
-                    },
-                }
-                for name, found in self.effects.items()
-            },
+            "quantities": quantities,
         }
 
     @property
@@ -194,18 +187,17 @@ def _grouped(paths: list[str], first: Robot, second: Robot, onset: Onset) -> lis
     for stem in ("springs.stiffness", "springs.damping"):
         group = f"{stem}[1:]" if onset.at is not None and onset.parameter == f"{stem}[0]" else stem
         own = [path for path in paths if path.startswith(f"{stem}[")]
-        if len(own) > 1 and _has(first, group) and _has(second, group):
+        if len(own) > 1 and None not in (_number(first, group), _number(second, group)):
             paths = [group if path == own[0] else path for path in paths if path not in own[1:]]
     return paths
 
 
-def _has(robot: Robot, path: str) -> bool:
-    """True if a robot has a number; a group of springs has one if all are alike."""
+def _number(robot: Robot, path: str) -> float | None:
+    """Number of a robot, SI; None if it has none. A group of springs has one if all are alike."""
     try:
-        robot.get(path)
+        return robot.get(path)
     except ParameterError:
-        return False
-    return True
+        return None
 
 
 def _comparable(first: Robot, second: Robot) -> tuple[Robot, Robot]:
@@ -224,9 +216,8 @@ def _comparable(first: Robot, second: Robot) -> tuple[Robot, Robot]:
 
 def _text(robot: Robot, path: str) -> str:
     """A number with its unit; nothing for a spring that a robot does not have."""
-    if not _has(robot, path):
-        return "-"
-    return units.format(robot.get(path), robot.unit_of(path), digits=5)
+    number = _number(robot, path)
+    return "-" if number is None else units.format(number, robot.unit_of(path), digits=5)
 
 
 def _effects(
@@ -246,7 +237,7 @@ def _effects(
             try:
                 robot = first
                 for at in sorted(changed):
-                    if _has(robot, paths[at]):  # a spring of a module that is not there has no effect
+                    if _number(robot, paths[at]) is not None:  # a spring of a module that is not there has no effect
                         robot = robot.with_value(paths[at], second.get(paths[at]))
                 known[changed] = function(robot)
             except ChilopodError:

@@ -23,7 +23,7 @@ from chilopod.analysis.parameters import numbers_read
 from chilopod.analysis.quantities import QUANTITIES, Measured, Mode, Onset, leading_mode, straight_return, unit_of
 from chilopod.errors import AnalysisError, ParameterError, known_names, nearest_name
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.notebook import Summary, tornado
+from chilopod.notebook import Summary, finite, tornado
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 
@@ -85,17 +85,15 @@ class Sensitivity(Summary, ReadOnlyArrays):
 
     def as_json(self) -> dict[str, Any]:
         """Values, derivatives and errors as plain numbers, SI, and the changes by 1 % of every number."""
-        found: dict[str, Any] = {"robot": self.robot.name, "parameter": self.onset.parameter}
-        own = dict(zip(self.paths, self.numbers.tolist(), strict=True)).get(self.onset.parameter)
-        found["at_si"] = own if self.onset.at is None else self.onset.at
-        found["numbers_si"] = dict(zip(self.paths, self.numbers.tolist(), strict=True))
+        numbers = dict(zip(self.paths, self.numbers.tolist(), strict=True))
+        at = numbers.get(self.onset.parameter) if self.onset.at is None else self.onset.at
+        found: dict[str, Any] = {"robot": self.robot.name, "parameter": self.onset.parameter, "at_si": at}
+        found["numbers_si"] = numbers
         for row, name in enumerate(self.quantities):
             errors = dict(zip(self.paths, self.errors[row].tolist(), strict=True))
             tables = {"derivatives_si": self.of(name), "errors_si": errors}
             tables["percent_per_percent" if name in _RELATIVE else "change_per_percent"] = self.percent(name)
-            known = {
-                key: {path: None if np.isnan(x) else x for path, x in table.items()} for key, table in tables.items()
-            }
+            known = {key: {path: finite(x) for path, x in table.items()} for key, table in tables.items()}
             found[name] = {"value_si": float(self.values[row]), **known}
         return found
 

@@ -120,30 +120,25 @@ class Uncertainty(Summary, ReadOnlyArrays):
 
     def as_json(self) -> dict[str, Any]:
         """Spread and shares as plain numbers, SI; null where unknown."""
-
         shares = self.shares
-        columns = zip(
-            self.paths, self.tolerances.tolist(), shares.first.tolist(), shares.first_ends.tolist(),
-            shares.total.tolist(), shares.total_ends.tolist(), strict=True,
-        )  # fmt: skip
         return {
             "robot": self.robot.name,
             "parameter": self.onset.parameter,
             "onset_si": self.value,
             "deviation_propagated_si": self.propagated,
             "deviation_sampled_si": finite(self.deviation),
-            "interval_si": [finite(each) for each in self.interval],
+            "interval_si": [*map(finite, self.interval)],
             "evaluations": self.evaluations,
             "failed": self.failed,
             "numbers": {
                 path: {
-                    "tolerance_si": tolerance,
-                    "first_share": finite(first),
-                    "first_interval": [finite(each) for each in first_ends],
-                    "total_share": finite(total),
-                    "total_interval": [finite(each) for each in total_ends],
+                    "tolerance_si": float(self.tolerances[i]),
+                    "first_share": finite(shares.first[i]),
+                    "first_interval": [*map(finite, shares.first_ends[i])],
+                    "total_share": finite(shares.total[i]),
+                    "total_interval": [*map(finite, shares.total_ends[i])],
                 }
-                for path, tolerance, first, first_ends, total, total_ends in columns
+                for i, path in enumerate(self.paths)
             },
         }
 
