@@ -15,7 +15,7 @@ from chilopod.notebook import block, folded, picture, table, words
 from chilopod.stability import begin, follow, follow2, locate
 from chilopod.steering import Target, course_named, strategy_named
 from chilopod.tasks import Driver, drive, ends, turn, walk
-from chilopod.tasks.runs import draw_paths
+from chilopod.tasks.walk import draw_paths
 from chilopod.trials import Trial
 from helpers import systems
 

@@ -6,7 +6,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.errors import ParameterError
 from chilopod.tasks import ends, walk
-from chilopod.tasks.runs import Runs
+from chilopod.tasks.walk import Runs
 from chilopod.trials import NONE, Disturbance, Trial, run
 
 ROBOT = load_robot("aoi2022-planar").with_value("springs.stiffness[0]", 0.5)

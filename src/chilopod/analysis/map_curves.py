@@ -75,7 +75,7 @@ class Edge:
     across: bool
 
     def ordered(self, along: Any, other: Any) -> tuple[Any, Any]:
-        """What belongs to the number that changes along it, and to the other, in the order of the map's axes."""
+        """Parts of the number that changes along it, and of the other number, in the order of the map's axes."""
         return (along, other) if self.across else (other, along)
 
 

@@ -18,8 +18,6 @@ import typer
 
 from chilopod.cli import (
     branch,
-    compare,
-    course,
     doctor,
     identify,
     live,
@@ -30,8 +28,8 @@ from chilopod.cli import (
     sensitivity,
     size,
     stability,
+    targets,
     trials,
-    turn,
     walk,
 )
 from chilopod.cli.commands import new_app
@@ -49,12 +47,12 @@ app.command("stability", short_help="Stability of the straight walk: its Floquet
 app.command("bifurcation", short_help="Points at which the straight walk gives way, and how.")(stability.bifurcation)
 app.command("branch", short_help="Curved walks beyond that point: how tightly they turn.")(branch.branch)
 app.command("sensitivity", short_help="What each number of a robot does to where it bends.")(sensitivity.sensitivity)
-app.command("compare", short_help="Differing numbers of two robots, and the part of each.")(compare.compare)
+app.command("compare", short_help="Differing numbers of two robots, and the part of each.")(sensitivity.compare)
 app.command("size", short_help="Numbers of a robot at which it does what is wished.")(size.size)
 app.command("map", short_help="Map over two numbers: where it holds, bends or undulates.")(map.stability_map)
 app.command("walk", short_help="Let a robot walk, and report where it gets to.")(walk.walk)
-app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(turn.turn)
-app.command("course", short_help="Walk from target to target, and report on each.")(course.course)
+app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(targets.turn)
+app.command("course", short_help="Walk from target to target, and report on each.")(targets.course)
 app.command("live", short_help="Watch a robot walk in the browser, and change it.")(live.live)
 app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(play.play)
 app.add_typer(identify.app, name="identify")

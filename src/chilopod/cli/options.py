@@ -70,13 +70,6 @@ OnsetBetweenOption = Annotated[
         "0.04 to 1.6 times friction x speed x duty factor x module length.",
     ),
 ]
-AtOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="VALUE",
-        help="Value of this number at which growth, frequency and radius are taken; by default that of the robot.",
-    ),
-]
 OutOption = Annotated[
     Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for the results, besides the text.")
 ]

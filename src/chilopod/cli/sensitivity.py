@@ -1,4 +1,5 @@
-"""``chilopod sensitivity``: effect of each number of a robot on where it bends, and its spread with tolerances."""
+"""``chilopod sensitivity`` and ``chilopod compare``: effect of each number of a robot on where it bends, with its
+spread, and the part of each number in the difference of two robots."""
 
 from __future__ import annotations
 
@@ -6,11 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import AtOption, OnsetOptions, reading, with_options
+from chilopod.cli.options import OnsetOptions, read_robot, reading, with_options
 from chilopod.errors import ParameterError
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
+
+AtOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="VALUE",
+        help="Value of --parameter at which growth, frequency and radius are taken; by default that of the robot.",
+    ),
+]
 
 
 @with_options
@@ -61,6 +70,36 @@ def sensitivity(
     else:
         names = show.split(",") if show else DEFAULT
         options.study("sensitivity", lambda progress: analysis.sensitivity(described, onset, names, progress=progress))
+
+
+@with_options
+def compare(
+    options: OnsetOptions,
+    other: Annotated[str, typer.Argument(metavar="OTHER", help="Robot to compare with; --set changes both.")],
+    at: AtOption = None,
+    show: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="Quantities, with commas: onset, growth, frequency, coefficient, radius and speed (of the curved "
+            "walk), settling, margin, friction, work.",
+        ),
+    ] = "onset,growth,speed",
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of orders, for more than 8 differences.")] = 0,
+) -> None:
+    """Differing numbers of two robots, and the part of each in the difference of where they bend.
+
+    The onset is the value of the number at which the straight walk begins to bend. A part is the mean over all orders
+    in which the numbers of the first robot can be changed to those of the second (Shapley value), so parts add up.
+
+    Example: chilopod compare aoi2022-planar aoi2022
+    """
+    first, second = options.described, read_robot(other, options.overrides)
+    onset = options.number(at)
+    from chilopod import analysis
+
+    names = show.split(",")
+    options.study("comparison", lambda progress: analysis.compare(first, second, onset, names, seed, progress))
 
 
 def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, float]:

@@ -20,7 +20,7 @@ from chilopod.cli.progress import progress_bar
 if TYPE_CHECKING:
     from chilopod import tasks
     from chilopod.progress import Progress
-    from chilopod.tasks.runs import Runs
+    from chilopod.tasks.walk import Runs
 
 Found = TypeVar("Found", bound="Runs")
 

@@ -8,11 +8,10 @@ if TYPE_CHECKING:
     from chilopod.tasks.course import Driven, Driver, drive, driver
     from chilopod.tasks.identify import identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
-    from chilopod.tasks.runs import RunOptions
     from chilopod.tasks.sizing import size
     from chilopod.tasks.sizing.result import Sizing
     from chilopod.tasks.turn import Turn, turn
-    from chilopod.tasks.walk import Ends, Walks, ends, walk
+    from chilopod.tasks.walk import Ends, RunOptions, Walks, ends, walk
 else:
     __getattr__, __dir__ = exports(
         __name__,
@@ -20,11 +19,10 @@ else:
             "course": ("Driven", "Driver", "drive", "driver"),
             "identify": ("identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
-            "runs": ("RunOptions",),
             "sizing": ("size",),
             "sizing.result": ("Sizing",),
             "turn": ("Turn", "turn"),
-            "walk": ("Ends", "Walks", "ends", "walk"),
+            "walk": ("Ends", "RunOptions", "Walks", "ends", "walk"),
         },
     )
 

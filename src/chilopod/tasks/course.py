@@ -20,7 +20,7 @@ from chilopod.robot import Robot
 from chilopod.steering import Course, RadiusLaw, Strategy, Verdict, random_course
 from chilopod.steering.strategies import check_strategy
 from chilopod.tasks.radius_law import radius_law
-from chilopod.tasks.runs import Pathed, RunOptions, runs
+from chilopod.tasks.walk import Pathed, RunOptions, runs
 from chilopod.trials import Trial
 
 _RATE = 20.0  # Hz, of records: looks of the referee fall on samples
@@ -165,10 +165,6 @@ def _shown(value: float | None) -> str:
     return "-" if value is None else f"{value:.2g}"
 
 
-def _arrived(record: xr.Dataset) -> int:
-    return int((record.goal_verdict == Verdict.ARRIVED.label).sum())
-
-
 def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
     sentences = {verdict.label: verdict.sentence for verdict in Verdict}
     goals = []
@@ -179,7 +175,7 @@ def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
         goals.append({"verdict": verdict, "sentence": sentences[verdict], "place_m": place, **measures})
     return {
         "status": str(record.status.values[0]),
-        "arrived": _arrived(record),
+        "arrived": int((record.goal_verdict == Verdict.ARRIVED.label).sum()),
         "time_s": finite(float(np.nanmax(record.goal_end.values))),
         "spring_work_J": float(record.goal_spring_work.sum()),
         "drive_work_J": float(record.goal_drive_work.sum()),

@@ -20,7 +20,7 @@ from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate
 from chilopod.steering.strategies import check_strategy
 from chilopod.tasks.radius_law import radius_law
-from chilopod.tasks.runs import Pathed, RunOptions, runs
+from chilopod.tasks.walk import Pathed, RunOptions, runs
 from chilopod.trials import NONE, Trial, check_fits, run, straight, together
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: start of the search for a strategy without a radius law
@@ -95,26 +95,19 @@ class Turn(Pathed):
             f"{self.strategy.name}: {self.strategy.sentence}",
             f"the circle to the target has a radius of {self.target.radius:.3f} m",
         ]
-        for name, spring in (
-            ("by the settled radius (the paper's k1-hat)", self.by_law),
-            ("walked with", self.stiffness),
-        ):
+        springs = {"by the settled radius (the paper's k1-hat)": self.by_law, "walked with": self.stiffness}
+        for name, spring in springs.items():
             if spring is not None:
                 above.append(f"spring {name}: {units.format(spring, 'N*mm/deg', digits=4)}")
-        above.append(
-            f"distance left, angle and effort (the paper's epsilon 1 to 3) at {found.time:.2f} s; nearest at any time"
-        )
+        measures = "distance left, angle and effort (the paper's epsilon 1 to 3)"
+        above.append(f"{measures} at {found.time:.2f} s; nearest at any time")
         rows: list[Sequence[str]] = [
             ("seed", "outcome", "arrival (s)", "nearest (m)", "left (m)", "angle (deg)", "effort (rad2 s)")
         ]
         for i, (label, outcome) in enumerate(zip(self.labels, found.outcome, strict=True)):
             arrival = f"{found.arrival[i]:.2f}" if np.isfinite(found.arrival[i]) else "never"
-            nearest, left, angle = (
-                f"{found.nearest[i]:.4f}",
-                f"{found.distance[i]:.3f}",
-                f"{np.degrees(found.angle[i]):.2f}",
-            )
-            rows.append((label, outcome.label, arrival, nearest, left, angle, f"{found.effort[i]:.4f}"))
+            nearest, left, effort = f"{found.nearest[i]:.4f}", f"{found.distance[i]:.3f}", f"{found.effort[i]:.4f}"
+            rows.append((label, outcome.label, arrival, nearest, left, f"{np.degrees(found.angle[i]):.2f}", effort))
         return above, rows, []
 
 

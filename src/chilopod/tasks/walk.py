@@ -1,21 +1,158 @@
-"""Walks of one robot: one, or many that differ in their disturbances, and their results."""
+"""Walks of one robot: one, or many that differ in their disturbances; options and results that all tasks share."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 import xarray as xr
 
-from chilopod.engine import Controller
+from chilopod.engine import Controller, HasFootCreep, engine_named
+from chilopod.engine.named import path_of
+from chilopod.notebook import Summary, axes_for, picture
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
-from chilopod.tasks.runs import Pathed, RunOptions, Runs, runs
-from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summaries, together
+from chilopod.steering import ARRIVAL_RADIUS
+from chilopod.trials import NONE, Trial, WalkSummary, as_now, run, run_each, straight, summaries, together
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MOST = 12  # walks that are drawn in a notebook
+
+
+class RunOptions(TypedDict, total=False):
+    """Options of every task with walks: seeds, repeats, folder and progress.
+
+    Attributes
+    ----------
+    seed, repeats
+        Seed of the first walk's disturbances, from which the others count up, None (default) for no disturbance; and
+        number of walks, by default 1.
+    folder, progress
+        Folder that keeps all trials, if any; function of the fraction done (0 to 1) and a few words.
+    """
+
+    seed: int | None
+    repeats: int
+    folder: str | Path | None
+    progress: Progress
+
+
+def runs(
+    trial: Trial,
+    seed: int | None = None,
+    repeats: int = 1,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> tuple[tuple[Trial, ...], list[xr.Dataset]]:
+    """Trials of a walk and their records, by :class:`RunOptions`."""
+    trials = trial.repeated(seed, repeats)
+    return trials, run(trials, folder, progress)
+
+
+@dataclass(frozen=True)
+class Runs(Summary):
+    """Walks that differ only in their seed, with their trials."""
+
+    trials: tuple[Trial, ...]
+
+    @property
+    def first(self) -> Trial:
+        """Trial of the first walk; the others differ only in the seed."""
+        return self.trials[0]
+
+    @property
+    def robot(self) -> Robot:
+        """Robot that walked."""
+        return self.first.robot
+
+    @property
+    def engine(self) -> str:
+        """Name of the engine."""
+        return self.first.engine
+
+    @property
+    def who(self) -> str:
+        """Names of robot and engine."""
+        return f"{self.robot.name}, {self.engine}"
+
+    @property
+    def seeds(self) -> list[int | None]:
+        """Seed of every walk; None for a walk without disturbance."""
+        return [None if trial.disturbance == NONE else trial.seed for trial in self.trials]
+
+    @property
+    def labels(self) -> list[str]:
+        """:attr:`seeds` in words."""
+        return ["-" if seed is None else str(seed) for seed in self.seeds]
+
+    @cached_property
+    def foot_creep(self) -> float | None:
+        """Resistance of the engine's floor to creep: coefficient of the viscous friction across the way that gives the
+        same creep of standing feet, N*s/m; None if they do not creep, or the robot cannot stand."""
+        engine = engine_named(self.engine)
+        found = engine.foot_creep(self.robot).across if isinstance(engine, HasFootCreep) else np.inf
+        return found if np.isfinite(found) else None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers; null for missing values."""
+        steering = self.first.controller
+        controller = None if steering is None else path_of(type(steering))
+        shared = {"robot": self.robot.name, "engine": self.engine, "controller": controller, **self._found()}
+        return {**shared, "foot_creep_N_s_m": self.foot_creep}
+
+    def _found(self) -> dict[str, Any]:
+        return {}
+
+
+class Pathed(Runs):
+    """Base of walks that have a record, and are drawn as paths over the floor."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def record(self) -> xr.Dataset: ...
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the path of module 1 in every walk, the first dozen of them, and the targets."""
+        axes = axes_for(axes)
+        draw_paths(axes, self.record)
+        return axes
+
+    def _picture(self) -> str:
+        count = self.record.sizes["robot"]
+        alt = f"paths of {'a walk' if count == 1 else f'{count} walks'} from above"
+        return picture(self.plot, alt if count <= _MOST else f"{alt}, the first {_MOST} drawn")
+
+
+def draw_paths(axes: Axes, record: xr.Dataset) -> None:
+    """Draw the path of module 1 in every walk of a record, the first dozen of them, and the targets."""
+    from matplotlib.patches import Circle
+
+    drawn = record.isel(robot=slice(_MOST))
+    for way in drawn.position.transpose("robot", "time", "axis").values:
+        axes.plot(*way.T)
+    for x, y in _targets(drawn):
+        if np.isfinite(x + y):
+            axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, color="C2", alpha=0.35))
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+
+
+def _targets(record: xr.Dataset) -> np.ndarray:
+    """Positions on the floor, shape (targets, 2), each once."""
+    if "goal_place" in record:
+        places = record.goal_place.transpose("robot", "goal", "axis").values
+    elif "target" in record:
+        places = record.target.transpose(..., "robot", "axis").values
+    else:
+        places = np.empty((0, 2))
+    return np.unique(places.reshape(-1, 2), axis=0)
 
 
 @dataclass(frozen=True)
