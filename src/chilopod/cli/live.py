@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import EngineOption, ForceOption, SetOption, choices, free, read_robot, reading, with_options
+from chilopod.errors import OutputError, ParameterError
 from chilopod.live.ports import check_port
 from chilopod.live.wishes import LARGEST_SEED
 
@@ -96,7 +97,6 @@ def live(options: LiveOptions) -> None:
 
 def _duration(typed: str | None) -> float:
     from chilopod import units
-    from chilopod.errors import ParameterError
 
     with reading("duration"):
         seconds = math.inf if typed is None else units.parse(typed, "s")
@@ -106,7 +106,6 @@ def _duration(typed: str | None) -> float:
 
 
 def _keep(folder: Path, replace: bool, name: str, record: bytes, page: str) -> None:
-    from chilopod.errors import OutputError
     from chilopod.output import write_all
 
     try:
@@ -118,8 +117,6 @@ def _keep(folder: Path, replace: bool, name: str, record: bytes, page: str) -> N
 
 
 def _end(page: Live, replace: bool) -> None:
-    from chilopod.errors import OutputError
-
     page.close()
     for recording in page.undelivered:  # better here than nowhere
         with suppress(OutputError):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import ChilopodError, ParameterError, nearest_name
+from chilopod.errors import ChilopodError, OutputError, ParameterError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod.analysis import Onset
@@ -226,8 +226,6 @@ def save(file: Path, text: str, robot: Robot, *, force: bool, as_json: bool, end
 
 def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:
     """Write the files of a result, name them on stderr, and print the result, also where a file cannot be written."""
-    from chilopod.errors import OutputError
-
     failure = None
     try:
         for path in write():

@@ -12,7 +12,7 @@ import typer
 from chilopod.cli.options import ForceOption, JsonOption, print_result, read_robot, with_options
 from chilopod.cli.progress import progress_bar
 from chilopod.cli.walking import ClusterOption, walking_on
-from chilopod.errors import ParameterError
+from chilopod.errors import OutputError, ParameterError, in_words
 from chilopod.paper.registry import REGISTRY, chosen
 
 if TYPE_CHECKING:
@@ -77,7 +77,6 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
         problem = "must not be given, because the paper's numbers are those of its own robot"
         allowed = "no --set; stability, bifurcation, branch, walk and turn take any robot"
         raise ParameterError(problem, field="--set", value=options.overrides[0], allowed=allowed)
-    from chilopod.errors import in_words
     from chilopod.paper.section import Size
 
     size = Size.FULL if options.everything or options.only else Size.MAIN
@@ -99,7 +98,6 @@ def _computed(
     options: ReportOptions, sections: list[Section[Any]], size: Size
 ) -> tuple[Found, Report, Exception | None]:
     """Results, their report, and the error that stopped the work, if one did."""
-    from chilopod.errors import OutputError
     from chilopod.paper import section as computed
     from chilopod.paper.ahead import Studio, walked_ahead
     from chilopod.paper.duration import plan
@@ -135,8 +133,6 @@ def _computed(
 
 
 def _print(options: ReportOptions, found: Found, report: Report) -> None:
-    from chilopod.errors import in_words
-
     rows, robot_rows = [row for part in found.planar_rows().values() for row in part], found.robot_rows()
     result = {
         "robot": found.context.robot.name,

@@ -15,9 +15,9 @@ from chilopod.notebook import Shown, aligned
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.statistics import LEVEL
+from chilopod.tasks.identify.constants import CONFIDENCE
 from chilopod.tasks.identify.critical import searched
 from chilopod.tasks.identify.data import CriticalMode
-from chilopod.tasks.identify.estimates import CONFIDENCE
 from chilopod.tasks.identify.planar_fit import (
     FREE,
     allowed_ranges,

@@ -18,7 +18,7 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError, RobotF
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.robot.files import described, parsed
-from chilopod.tasks.identify.free import FreeConstants
+from chilopod.tasks.identify.constants import FreeConstants
 from chilopod.text_file import read_text
 from chilopod.units import Description, Quantity
 

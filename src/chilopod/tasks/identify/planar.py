@@ -27,8 +27,8 @@ from chilopod.notebook import axes_for
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
+from chilopod.tasks.identify.constants import Estimates, Identified
 from chilopod.tasks.identify.data import CriticalMode
-from chilopod.tasks.identify.estimates import Estimates, Identified
 from chilopod.tasks.identify.planar_fit import (
     FREE,
     allowed_ranges,

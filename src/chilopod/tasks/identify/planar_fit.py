@@ -16,10 +16,9 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
+from chilopod.tasks.identify.constants import CONFIDENCE, Constant, FreeConstants, with_values
 from chilopod.tasks.identify.critical import Critical, Pitchforks, searched
 from chilopod.tasks.identify.data import CriticalMode
-from chilopod.tasks.identify.estimates import CONFIDENCE
-from chilopod.tasks.identify.free import Constant, FreeConstants, with_values
 
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""

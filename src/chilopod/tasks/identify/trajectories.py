@@ -23,9 +23,8 @@ from chilopod.planar import PlanarModel, initial_states
 from chilopod.planar.sampled import states_at
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
+from chilopod.tasks.identify.constants import CONFIDENCE, Estimates, FreeConstants, Identified
 from chilopod.tasks.identify.data import RecordedWalks
-from chilopod.tasks.identify.estimates import CONFIDENCE, Estimates, Identified
-from chilopod.tasks.identify.free import FreeConstants
 from chilopod.tasks.identify.recordings import Recording, read_recordings
 
 if TYPE_CHECKING:

@@ -33,9 +33,8 @@ from chilopod.notebook import axes_for
 from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
+from chilopod.tasks.identify.constants import CONFIDENCE, Estimates, FreeConstants, Identified
 from chilopod.tasks.identify.data import FITTED, BaseSeries
-from chilopod.tasks.identify.estimates import CONFIDENCE, Estimates, Identified
-from chilopod.tasks.identify.free import FreeConstants
 from chilopod.tasks.identify.twin_series import DURATION, LOST, Series, base_series, residuals
 from chilopod.tasks.identify.valley import LEAST, Samples, Surrogate
 from chilopod.tasks.radius_law import DURATION as LONG

@@ -16,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
 from chilopod.frozen import Array
-from chilopod.tasks.identify.estimates import CONFIDENCE
+from chilopod.tasks.identify.constants import CONFIDENCE
 
 LEAST = 20.0
 """Number of effective samples below which the ends of an interval are not reliable."""

@@ -22,8 +22,8 @@ from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, spring, typeset
+from chilopod.tasks.identify.constants import CONFIDENCE
 from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
-from chilopod.tasks.identify.estimates import CONFIDENCE
 from chilopod.tasks.identify.valley import LEAST, Samples
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
