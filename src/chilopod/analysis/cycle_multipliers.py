@@ -262,9 +262,8 @@ def bend_onset(
     (a, b), (at_a, at_b) = between, [excess(end)[0] for end in between]
     if at_a * at_b > 0.0:
         said = f"must hold an onset; the multiplier is {1.0 + at_a:.4f} and {1.0 + at_b:.4f} at its ends"
-        raise ParameterError(
-            said, field="onset", value=f"{shown(a)} to {shown(b)}", allowed="values on both sides of 1"
-        )
+        given = f"{shown(a)} to {shown(b)}"
+        raise ParameterError(said, field="onset", value=given, allowed="values on both sides of 1")
     return crossing(excess, (a, at_a), (b, at_b))
 
 

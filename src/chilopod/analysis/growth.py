@@ -39,6 +39,7 @@ class Fate(Labelled):
 
 
 FATES = tuple(Fate)
+_FAILED = np.array([np.nan, np.nan, np.nan, -1, FATES.index(Fate.FAILED)])  # column of a computation that failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +116,7 @@ def _leading(robots: list[Robot], half: bool) -> Array:
     rows = _rows(values, period, half)
     for r in np.flatnonzero(~failed & (np.abs(moduli - 1.0).min(axis=1) < near)):
         rows[:, r] = _resolved(robots[r], half)
-    rows[:, failed] = np.array([np.nan, np.nan, np.nan, -1, FATES.index(Fate.FAILED)])[:, None]
+    rows[:, failed] = _FAILED[:, None]
     return rows
 
 
@@ -140,7 +141,7 @@ def _resolved(robot: Robot, half: bool) -> Array:
     try:
         found = stability.multipliers(PlanarModel(robot))
     except ChilopodError:
-        return np.array([np.nan, np.nan, np.nan, -1, FATES.index(Fate.FAILED)])
+        return _FAILED
     nu = found.values if found.half_period is None else found.half_period
     period = robot.gait.period
     column = _rows(nu[None], np.array([period]), half)[:, 0]

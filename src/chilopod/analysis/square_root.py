@@ -76,9 +76,8 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
         raise ParameterError("must be finite, and every spring must be positive", field="angle")
     bent = np.unique(x[y > 0.0])
     if x.size < 3 or bent.size < 2:
-        raise AnalysisError(
-            "must come from at least two springs that bend the robot and three trials", field="angle", value=bent.size
-        )
+        said = "must come from at least two springs that bend the robot and three trials"
+        raise AnalysisError(said, field="angle", value=bent.size)
     # Given 1/kc the amplitude follows, so only 1/kc is searched: at least two springs have to lie beyond it.
     grid = bent[-2] - np.geomspace(_CLOSEST * (bent[-1] - bent[-2]), _FARTHEST * bent[-2], _GRID)
     basis = _root(x, grid[:, None])

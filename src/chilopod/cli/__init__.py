@@ -101,7 +101,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         # Usage errors have no public base class that all supported versions of typer share, but they all do this.
         if hasattr(error, "format_message"):
-            return _fail(f"{error.format_message()} ({_help_of(error)})", USAGE_ERROR)
+            context = getattr(error, "ctx", None)
+            command = context.command_path if context else "chilopod"
+            return _fail(f"{error.format_message()} (see {command} --help)", USAGE_ERROR)
         if isinstance(error, ChilopodError):
             return _fail(str(error), USAGE_ERROR)
         if isinstance(error, OSError):
@@ -121,11 +123,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     if code == INTERRUPTED:  # recent versions of typer make this of a KeyboardInterrupt
         return _fail("interrupted", INTERRUPTED)
     return code if isinstance(code, int) else 0
-
-
-def _help_of(error: Exception) -> str:
-    context = getattr(error, "ctx", None)
-    return f"see {context.command_path if context else 'chilopod'} --help"
 
 
 def _not_imported(error: Exception) -> str | None:

@@ -60,9 +60,8 @@ class CriticalMode(Description):
             raise ParameterError("must hold k1", field="between", value=shown, allowed=allowed)
         mode = np.array(self.components)
         if abs(np.linalg.norm(mode) - 1.0) > _UNIT:
-            raise ParameterError(
-                "must have the norm 1", field="components", value=self.components, allowed="cosines, one for each joint"
-            )
+            said, allowed = "must have the norm 1", "cosines, one for each joint"
+            raise ParameterError(said, field="components", value=self.components, allowed=allowed)
         # A mode is a direction: both signs are the same mode.
         object.__setattr__(self, "components", tuple((mode * np.sign(mode.sum() or 1.0)).tolist()))
         return self

@@ -23,7 +23,7 @@ from chilopod.analysis.parameters import ALL, PAPER_UNIT
 from chilopod.analysis.straight_walk import first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
-from chilopod.notebook import axes_for
+from chilopod.notebook import axes_for, finite
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
@@ -48,13 +48,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BESIDE = 0.25  # of the range of the offset, by which the profile goes beyond it
-_UNITS = {  # of the profile, N*mm/deg where none is given
-    "friction": "N*s/m",
-    "half_width": "m",
-    "largest_residual": "1",
-    "coefficient": "1/rad^2",
-    "verdict": "",
-}
+# Units of the profile, N*mm/deg where none is given.
+_UNITS = {"friction": "N*s/m", "half_width": "m", "largest_residual": "1", "coefficient": "1/rad^2", "verdict": ""}
 
 
 @dataclass(frozen=True)
@@ -92,9 +87,7 @@ class Identification(Identified):
         found = np.column_stack([self.constants, self.ranges]) / scale_of(self.given, self.data)[:, None]
         found[0] = 0.25 / found[0, [0, 2, 1]]
         names = "k1/(friction*speed*duty*module_length)", "half_width/module_length", "forward_offset/module_length"
-        return {
-            name: [None if np.isnan(x) else x for x in row] for name, row in zip(names, found.tolist(), strict=True)
-        }
+        return {name: [*map(finite, row)] for name, row in zip(names, found.tolist(), strict=True)}
 
     @property
     def estimates(self) -> Estimates:
@@ -187,7 +180,6 @@ def _profile(
     offsets = np.linspace(low - beside, high + beside, count)
     rows: dict[int, dict[str, float | str]] = {}
     middle = int(np.abs(offsets - best[2]).argmin())
-    done = 0
     for direction in (range(middle, count), range(middle - 1, -1, -1)):
         last, lost, largest = best, False, np.nan
         for index in direction:
@@ -200,8 +192,7 @@ def _profile(
                 found = _predictions(with_constants(robot, constants), variants)
             fitted = {"friction": constants[0], "half_width": constants[1], "largest_residual": largest}
             rows[index] = fitted | found
-            done += 1
-            progress(0.4 + 0.6 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
+            progress(0.4 + 0.6 * len(rows) / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
     columns = {name: np.array([rows[i][name] for i in range(count)]) for name in rows[0]}
     return xr.Dataset(
         {name: (("forward_offset",), each, {"units": _UNITS.get(name, PAPER_UNIT)}) for name, each in columns.items()},
