@@ -5,10 +5,9 @@ import pytest
 
 from chilopod.errors import AnalysisError
 from chilopod.stability import Kind
-from chilopod.stability.crossing_description import kind_at_plus_one
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalFormStatus, normal_form
-from chilopod.stability.points import Criticality, criticality
+from chilopod.stability.points import Criticality, criticality, kind_at_plus_one
 from chilopod.stability.returns import ReturnMap
 
 

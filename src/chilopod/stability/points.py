@@ -1,16 +1,28 @@
-"""Bifurcation points and their descriptions."""
+"""Bifurcation points and their descriptions: kind, modes, normal form and symmetry."""
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from chilopod.errors import AnalysisError
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
-from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus
+from chilopod.stability.crossing_place import critical_multipliers
+from chilopod.stability.interface import SystemLike, is_autonomous, sizes
+from chilopod.stability.normal_forms.manifold import CriticalOrbit
+from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, normal_form
+from chilopod.stability.orbits.orbit import Orbit
+from chilopod.stability.returns import returned_states
 from chilopod.stability.shown import Shown, bounded, number
-from chilopod.stability.symmetry.isotypic import SymmetricCrossing
+from chilopod.stability.spectrum import Spectrum, phased, spectrum
+from chilopod.stability.symmetry.groups import symmetric_basis
+from chilopod.stability.symmetry.isotypic import Block, SymmetricCrossing, SymmetricKind, symmetric_crossing
+from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event
 
 
 class Kind(Labelled):
@@ -168,3 +180,225 @@ def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationP
     if point.kind is Kind.NEIMARK_SACKER:
         point = replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
     return point
+
+
+_EPSILON = float(np.finfo(float).eps)
+_FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
+_SETTLED = 1e-7  # change of the mean from half as many parts; its error is about the square of that
+
+_ASIDE, _ROUNDS = 0.05, 20  # distance of a second orbit, in sizes of the states, and number of its corrections
+_CRITICAL = 1e-6  # distance from one of a critical multiplier, and relative singular value of its direction
+_CLEAR = 3.0  # least quadratic coefficient, relative to its error, of a transcritical point
+_NEGLIGIBLE = 0.3  # largest negligible error of the quadratic term, relative to the cubic one as sampled
+_VANISHES = 1e-9  # residual, relative to the distance, that counts as zero
+
+
+class ContinuumError(AnalysisError):
+    """Orbits form a continuum at a crossing, which is no bifurcation point of one orbit."""
+
+
+def described(
+    system: SystemLike,
+    place: tuple[float, float],
+    orbit: Orbit,
+    crossing: Crossing,
+    block: Block | None,
+    *,
+    kind: Kind | None = None,
+    with_normal_form: bool = True,
+) -> BifurcationPoint:
+    """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added. The
+    critical multipliers belong to the whole return map; their block and the kind of the point are given if known."""
+    value, error_bound = place
+    spec = spectrum(orbit.image)
+    critical = critical_multipliers(spec, crossing)
+    nu = complex(spec.values[critical[0]])
+    mode, left = spec.right[:, critical[0]], spec.left[:, critical[0]]
+    peak = mode[np.abs(mode).argmax()]
+    scale = np.abs(peak) / peak / _mean_size(system, orbit, mode)
+    mode, left = mode * scale, left / scale.conjugate()
+    frequency, k = 0.0, orbit.image.returns
+    if crossing.event is Event.PAIR:
+        angle = float(np.angle(np.exp(1j * k * np.angle(nu))))
+        # The mode of a conjugate pair with positive frequency.
+        if angle < 0:
+            nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
+        frequency = angle / orbit.period
+    elif crossing.event is Event.MINUS and k % 2:
+        frequency = np.pi / orbit.period
+    simple = critical.size == (2 if crossing.event is Event.PAIR else 1)
+    breaking = block is not None and not block.trivial
+    form = None
+    # At +1 the normal form, or a broken symmetry, determines the kind.
+    asked = with_normal_form or (crossing.event is Event.PLUS and not breaking and kind is None)
+    if simple and asked and not crossing.collision:
+        form = _formed(system, orbit, crossing.event, nu, mode, left)
+    # No orbits branch off from a Krein collision, whatever the symmetries.
+    branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
+    symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
+    if kind is None and crossing.event is Event.PLUS and not crossing.collision:
+        alone = simple and (form is None or form.status is not NormalFormStatus.SEVERAL_CRITICAL)
+        if not alone and _is_continuum(system, orbit, mode):
+            count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
+            said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
+            raise ContinuumError(said)
+    modes = None if simple else _modes(spec, crossing, orbit, block, symmetry)
+    if kind is None:
+        kind = _kind(crossing, k, form, symmetry if breaking else None)
+        if kind is Kind.TRANSCRITICAL and modes is not None and symmetry is not None:
+            kind, symmetry = _by_quadratic_term(system, orbit, modes, symmetry)
+    verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
+    about: dict[str, Any] = {"criticality": verdict, "multiplicity": critical.size, "symmetry": symmetry}
+    error_bound += 4.0 * _EPSILON * abs(value)
+    period = orbit.period
+    point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, period=period, **about)
+    if not simple:
+        return replace(point, modes=modes)
+    return with_coefficients(point, form) if form is not None and with_normal_form else point
+
+
+def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
+    """Root mean square of a mode over a return, across the motion; 1 for a given period, which fixes time 0."""
+    if not is_autonomous(system):
+        return 1.0
+    # The flow carries the velocity as it carries the mode.
+    start = np.stack([mode, system.velocity(np.array(orbit.state))], axis=1)
+    moves: list[tuple[Array, ComplexArray]] = [(orbit.state, start)]
+    duration = orbit.image.duration
+
+    def carried(x: Array, directions: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
+        x, derivative = system.flow(np.array(x), 0.0, part * duration)
+        return x, derivative @ directions
+
+    def mean_square(moves: list[tuple[Array, ComplexArray]]) -> float:
+        vectors, velocities = np.moveaxis(np.array([directions for _, directions in moves]), 2, 0)
+        along = (vectors * velocities).sum(axis=1) / (velocities * velocities).sum(axis=1)
+        return float((np.abs(vectors - along[:, None] * velocities) ** 2).sum(axis=1).mean())
+
+    for _ in range(_FEWEST_PARTS - 1):
+        moves.append(carried(*moves[-1], 1.0 / _FEWEST_PARTS))
+    mean = mean_square(moves)
+    while True:
+        between = [carried(*move, 0.5 / len(moves)) for move in moves]
+        before, mean = mean, 0.5 * (mean + mean_square(between))
+        moves = [move for pair in zip(moves, between, strict=True) for move in pair]
+        if abs(mean - before) <= _SETTLED * mean or len(moves) >= _MOST_PARTS:
+            return float(np.sqrt(mean))
+
+
+def _is_continuum(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> bool:
+    """True if all terms of the bifurcation equation vanish along a mode: an orbit beside this one, corrected across the
+    critical space alone, returns to itself (Lyapunov-Schmidt reduction). Orbits of a linear map do so uncorrected."""
+    size = sizes(system, orbit.state, orbit.image.duration)
+    ahead = mode.real / size
+    shift = _ASIDE * ahead / np.linalg.norm(ahead)
+    matrix = orbit.image.jacobian * size / size[:, None] - np.eye(size.size)
+    across, offs = np.linalg.pinv(matrix, rcond=_CRITICAL), [np.inf]
+    with contextlib.suppress(AnalysisError), np.errstate(all="ignore"):
+        for _ in range(_ROUNDS):
+            x = orbit.state + size * shift
+            residual = (returned_states(system, x[None], orbit.section)[0] - x) / size
+            offs.append(float(np.abs(residual).max()))
+            shift = shift - across @ residual
+    return offs[-1] <= _VANISHES * _ASIDE < offs[1]
+
+
+def _formed(
+    system: SystemLike, orbit: Orbit, event: Event, nu: complex, mode: ComplexArray, left: ComplexArray
+) -> NormalForm | None:
+    """The normal form for one critical multiplier or pair; None if it cannot be computed."""
+    image = orbit.image
+    exact = nu / abs(nu) if event is Event.PAIR else complex(TARGETS[event])
+    if event is not Event.PAIR:
+        mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
+    bounded = replace(image, error=np.nan_to_num(image.error, nan=0.0, posinf=0.0))
+    scale = sizes(system, orbit.state, image.duration)
+
+    def mapped(states: Array) -> Array:
+        return returned_states(system, states, orbit.section)
+
+    try:
+        return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)
+    except (AnalysisError, SpentError, ValueError):
+        return None
+
+
+def _by_quadratic_term(
+    system: SystemLike, orbit: Orbit, modes: ComplexArray, symmetry: SymmetricCrossing
+) -> tuple[Kind, SymmetricCrossing]:
+    """Kind of a crossing at +1 whose symmetry allows quadratic terms, by their coefficients along the axial branches:
+    transcritical if one is significant, pitchfork if all are negligible, else a branch point."""
+    axes = [i for i, branch in enumerate(symmetry.branches) if not branch.reversed]
+    kinds = {_along_axis(system, orbit, modes[:, i].real) for i in axes}
+    if Kind.TRANSCRITICAL in kinds:
+        return Kind.TRANSCRITICAL, symmetry
+    if kinds == {Kind.PITCHFORK}:
+        return Kind.PITCHFORK, replace(symmetry, kind=SymmetricKind.EQUIVARIANT_PITCHFORK)
+    return Kind.BRANCH_POINT, symmetry
+
+
+def _along_axis(system: SystemLike, orbit: Orbit, mode: Array) -> Kind:
+    """Kind of a crossing at +1 among the states with the symmetries of an axial branch, where the multiplier is simple;
+    a branch point if that cannot be computed."""
+    x, image, size = orbit.state, orbit.image, sizes(system, orbit.state, orbit.image.duration)
+    basis = symmetric_basis(system, x + mode / np.linalg.norm(mode / size), size)
+    if basis is None:
+        return Kind.BRANCH_POINT
+    units, start = size / size[:, None], basis.T @ (x / size)
+    jacobian = basis.T @ (image.jacobian * units) @ basis
+    error = np.abs(basis.T) @ (np.nan_to_num(image.error, posinf=0.0) * units) @ np.abs(basis)
+    within = replace(image, state=start, jacobian=jacobian, error=error, velocity=None, normal=None)
+    spec = spectrum(within)
+    right, left = (each[:, spec.nearest(1.0)].real.astype(np.complex128) for each in (spec.right, spec.left))
+
+    def mapped(states: Array) -> Array:
+        moved = returned_states(system, x + size * ((states - start) @ basis.T), orbit.section)
+        return np.asarray(start + ((moved - x) / size) @ basis)
+
+    try:
+        return kind_at_plus_one(normal_form(mapped, CriticalOrbit(start, within, 1.0 + 0.0j, right, left)))
+    except (AnalysisError, SpentError, ValueError):
+        return Kind.BRANCH_POINT
+
+
+def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: SymmetricCrossing | None) -> Kind:
+    if crossing.collision:
+        return Kind.KREIN_COLLISION if crossing.event is Event.PAIR else Kind.COLLISION
+    if crossing.event is Event.PAIR:
+        return Kind.NEIMARK_SACKER
+    if crossing.event is Event.MINUS:
+        return Kind.PERIOD_DOUBLING if returns % 2 else Kind.PITCHFORK
+    if broken is not None:
+        return Kind.PITCHFORK if broken.quadratic == 0 else Kind.TRANSCRITICAL
+    # The orbit exists on both sides, so it does not end in a fold here.
+    return kind_at_plus_one(form) if form is not None else Kind.BRANCH_POINT
+
+
+def _modes(
+    spec: Spectrum, crossing: Crossing, orbit: Orbit, block: Block | None, symmetry: SymmetricCrossing | None
+) -> ComplexArray:
+    """Modes of several critical multipliers: along axial branches, if any; real ones are an orthonormal basis."""
+    critical = critical_multipliers(spec, crossing)
+    if block is None or symmetry is None or not symmetry.branches or critical.size > 2 * block.dimension:
+        vectors = spec.right[:, critical]
+        if crossing.event is Event.PAIR:
+            return vectors
+        real = np.linalg.svd(np.hstack([vectors.real, vectors.imag]))[0][:, : critical.size]
+        return real.astype(np.complex128)
+    values, vectors = np.linalg.eig(block.reduced(orbit.image.jacobian))
+    eigenvector = vectors[:, np.abs(values - spec.values[critical[0]]).argmin()]
+    modes = phased(np.stack([block.mode(eigenvector, branch.direction) for branch in symmetry.branches], axis=1))
+    return np.asarray(modes / np.linalg.norm(modes, axis=0))
+
+
+def kind_at_plus_one(form: NormalForm) -> Kind:
+    """Kind at a real multiplier +1 if the orbit continues: transcritical with a significant quadratic term, pitchfork
+    without one but with a cubic one, branch point if the errors leave that open."""
+    if form.status is not NormalFormStatus.FOUND:
+        return Kind.BRANCH_POINT
+    if abs(form.quadratic) > _CLEAR * form.quadratic_error:
+        return Kind.TRANSCRITICAL
+    cubic = abs(form.cubic) * form.amplitude
+    if abs(form.cubic) > form.cubic_error and form.quadratic_error <= _NEGLIGIBLE * cubic:
+        return Kind.PITCHFORK
+    return Kind.BRANCH_POINT

@@ -237,12 +237,7 @@ class _Stated:
     """Checked properties of right-hand sides, the same throughout most families, whose members differ in ``args``."""
 
     def __init__(
-        self,
-        dimension: int,
-        period: float | None,
-        guess: float | None,
-        about: dict[str, Any],
-        more: dict[str, Any],
+        self, dimension: int, period: float | None, guess: float | None, about: dict[str, Any], more: dict[str, Any]
     ) -> None:
         autonomous = period is None
         if autonomous and guess is None:

@@ -25,9 +25,9 @@ from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, Within, special_point
-from chilopod.stability.crossing_description import ContinuumError
 from chilopod.stability.crossing_place import crossings_in
 from chilopod.stability.interface import offers
+from chilopod.stability.points import ContinuumError
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.isotypic import Block

@@ -14,10 +14,9 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.crossing_description import described
 from chilopod.stability.crossing_place import SAFETY, Course, Sample, orbit_blocks, past_singular, place_error
 from chilopod.stability.orbits.orbit import Orbit, bounded, searched_orbit
-from chilopod.stability.points import Kind
+from chilopod.stability.points import Kind, described
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.equations import Plane, Step

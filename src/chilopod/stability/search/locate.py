@@ -17,11 +17,10 @@ from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
-from chilopod.stability.crossing_description import described
 from chilopod.stability.crossing_place import Course, Sample, crossings_in, orbit_blocks, past_singular, place_error
 from chilopod.stability.interface import Family, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
-from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.points import BifurcationPoint, Kind, described
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.search.samples import NEAR_FOLD, SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said

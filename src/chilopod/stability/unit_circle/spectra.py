@@ -309,8 +309,7 @@ class Spectra:
             if not rest.size:
                 break
             reach = self.factor_sizes(root.place, event)[1][: rest.size].max() + allowed.max()
-            # A real multiplier on the circle is +1 or -1. For any errors, a critical one is so at the nearer of the
-            # two.
+            # A real multiplier on the circle is +1 or -1: for any errors a critical one is so at the nearer one.
             near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
             number = int(near.sum()) - self.idle[event]
             if number > 0 and (not conservative or root.event in (event, None)):
@@ -356,8 +355,7 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
         terms = np.take_along_axis(terms, order, axis=1)
         few = min(terms.shape[1], 2 * left_out + _SPARE)
         for term in terms[:, :few].T:
-            # Times (term + t), up to t^left_out; the others are too far from zero for their omission to
-            # matter.
+            # Times (term + t), up to t^left_out; the others are too far from zero to matter.
             scale = np.maximum(np.abs(term), 1.0)
             logs += np.log(scale)
             shifted = np.concatenate([np.zeros_like(small[:, :1]), small[:, :-1]], axis=1)
