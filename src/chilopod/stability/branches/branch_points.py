@@ -13,15 +13,7 @@ from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import Family, SystemLike, returns_per_period, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import (
-    ReturnMap,
-    Section,
-    in_parts,
-    return_map,
-    returned_states,
-    section_at,
-    whole_period,
-)
+from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
 from chilopod.stability.spectrum import stable_within
 from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.tracing.equations import Before
@@ -216,12 +208,6 @@ class FamilyReturns:
         """H at a state."""
         self.budget.take()
         return np.asarray(returned_states(self.system(value), x[None], section)[0])
-
-    def noise(self, x: Array, value: float, section: Section | None) -> float:
-        """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
-        image, system = self.image(x, value, section), self.system(value)
-        other = in_parts(system, x, image.duration)
-        return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
     def by_parameter(self, x: Array, value: float, section: Section | None, mapped: Array | None = None) -> Array:
         """dH/dp at a state, per scale, shape (n,), from H there if it is known. The parabola through a third value is

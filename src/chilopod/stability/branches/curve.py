@@ -27,7 +27,7 @@ from chilopod.stability.branches.branch_points import (
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import checked_flow, is_autonomous, offers
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
-from chilopod.stability.returns import ReturnMap, Section, on_section, return_duration, section_at
+from chilopod.stability.returns import ReturnMap, Section, in_parts, on_section, return_duration, section_at
 from chilopod.stability.spectrum import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
@@ -133,7 +133,13 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         residual = off * max(_SMALLEST, size)
         if singular or not stalled or residual > SETTLED * max(1.0, size):
             return False
-        return residual <= _CLEAR * self.noise(found.x, found.value, anchor.section)
+        return residual <= _CLEAR * self._noise(found.x, found.value, anchor.section)
+
+    def _noise(self, x: Array, value: float, section: Section | None) -> float:
+        """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
+        image, system = self.image(x, value, section), self.system(value)
+        other = in_parts(system, x, image.duration)
+        return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
     def stretches(self, step: Step[Anchor, OnCurve]) -> bool:
         """True unless short steps are wanted, or the system gives the sizes of its states."""

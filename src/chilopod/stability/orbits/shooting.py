@@ -88,7 +88,7 @@ def nodes_along(system: SystemLike, x: Array, duration: float, count: int, value
 
 @dataclass(frozen=True)
 class Problem:
-    """What :func:`shot` solves: the systems by the parameter, with its equation ``free``, None for a given one.
+    """Problem of :func:`shot`: the systems by the parameter, with its equation ``free``, None for a given one.
 
     ``shared`` is a basis of the space of the first state's corrections, shape (n, k). Every evaluation takes a return
     of the budget. With ``careful`` steps are short, the return time is free and the section not needed until it nearly
