@@ -44,7 +44,6 @@ _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a 
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
 _SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
 _TELLING = 1e-3  # step, in units, that is short enough to tell a branch from another one near by
-_EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 
 class Found(NamedTuple):
@@ -230,7 +229,7 @@ def _crossed_within(within: Within) -> bool:
         known |= {place: within.near_jacobian(place) for place in places if place not in known}
         nu = np.linalg.eigvals(np.array([known[place] for place in places])).astype(np.complex128)
         with np.errstate(all="ignore"):  # test functions, which change sign at the events
-            tests = np.stack([factors(nu, event).prod(axis=1).real for event in _EVENTS], axis=1)
+            tests = np.stack([factors(nu, event).prod(axis=1).real for event in Event], axis=1)
         outside = (np.abs(nu) > 1.0).sum(axis=1)
         if not np.isfinite(tests).all() or (outside != outside[0]).any():
             return True
@@ -251,5 +250,5 @@ def _crossed_between_ends(within: Within, turned: bool) -> bool:
         real, outside = np.abs(nu.imag) < 1e-9 * np.maximum(1e-3, np.abs(nu)), np.abs(nu) > 1.0
         beyond = (real & (nu.real < -1.0), real & (nu.real > 1.0), ~real & outside & (nu.imag > 0.0))
         counts.append([int(each.sum()) for each in beyond])
-    changed = {event for event, a, b in zip(_EVENTS, *counts, strict=True) if a != b}
+    changed = {event for event, a, b in zip(Event, *counts, strict=True) if a != b}
     return bool(changed - {Event.PLUS} if turned else changed)

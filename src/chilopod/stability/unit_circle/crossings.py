@@ -8,7 +8,7 @@ matrix, must change by the crossings in between: if not, the crossing multiplier
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -82,9 +82,8 @@ def find_crossings(
     a, b, parameter = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
-    status = finder.search()
-    crossings = []
-    for each in finder.crossings:
+    (status, found), crossings = finder.search(), []
+    for each in found:
         value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
         crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
     return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), spectra.evaluations)
@@ -109,39 +108,37 @@ def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], 
     return a, b, parameter
 
 
+@dataclass(frozen=True)
 class _Finder:
     """The search, in a coordinate with an even effect of the parameter."""
 
-    def __init__(self, spectra: Spectra, a: float, b: float, shown: Callable[[float], float]) -> None:
-        self.spectra = spectra
-        self.a, self.b = a, b
-        self.shown = shown
-        self.report = Report()
-        self.crossings: list[Crossing] = []
+    spectra: Spectra
+    a: float
+    b: float
+    shown: Callable[[float], float]
+    report: Report = field(default_factory=Report)
 
-    def search(self) -> SearchStatus:
-        """Find the crossings; return the result."""
+    def search(self) -> tuple[SearchStatus, list[Crossing]]:
+        """Find the crossings."""
         report, spectra = self.report, self.spectra
         first = first_places(self.a, self.b)
         spectra.at(first)
         if not spectra.values:
             if spectra.left <= 0:
-                return SearchStatus.BUDGET
+                return SearchStatus.BUDGET, []
             report.leave("there is no matrix anywhere")
-            return SearchStatus.INCOMPLETE
+            return SearchStatus.INCOMPLETE, []
         self._rest(first)
         events = [event for event in Event if spectra.idle[event] < self._factors(event) <= _MANY]
         if self._factors(Event.PAIR) > _MANY:
             self._probe()
         found = self._searched(events)
         roots = [root for event in events for root in self._roots(event, found[event])]
-        accounts = Accounts(spectra, (self.a, self.b), self.shown, report)
-        self.crossings = accounts.balance(roots)
-        if report.spent:
-            return SearchStatus.BUDGET
-        if report.open:
-            return SearchStatus.INCOMPLETE
-        return SearchStatus.CONSERVATIVE if spectra.conservative else SearchStatus.COMPLETE
+        crossings = Accounts(spectra, (self.a, self.b), self.shown, report).balance(roots)
+        status = SearchStatus.CONSERVATIVE if spectra.conservative else SearchStatus.COMPLETE
+        if report.spent or report.open:
+            status = SearchStatus.BUDGET if report.spent else SearchStatus.INCOMPLETE
+        return status, crossings
 
     def _factors(self, event: Event) -> int:
         m = self.spectra.size
