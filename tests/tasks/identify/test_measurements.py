@@ -16,7 +16,6 @@ from chilopod.tasks.identify import (
     NextMeasurements,
     SelfTest,
     check,
-    critical,
     next_measurements,
     planar_fit,
     self_test,
@@ -104,7 +103,7 @@ def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch)
 def test_data_that_leave_a_combination_open_bound_nothing(found):
     # The spring and the mode of three modules are two numbers for three constants.
     robot, far = ROBOT.with_value("body.modules", 3), (0.5 * DATA.k1, 5.0 * DATA.k1)
-    spring, mode = critical.searched(robot, far)
+    spring, mode = planar_fit.searched(robot, far)
     data = DATA.model_copy(update={"k1": spring, "components": tuple(mode), "between": far})
     assert np.isnan(
         planar_fit.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar_fit.FREE]))

@@ -13,7 +13,7 @@ from chilopod.errors import AnalysisError, ParameterError, RobotFileError, UnitE
 from chilopod.paper.printed import critical_mode_data
 from chilopod.robot import load_robot
 from chilopod.show.figures import identification
-from chilopod.tasks.identify import TEMPLATES, CriticalMode, RecordedWalks, critical, load_data, planar, planar_fit
+from chilopod.tasks.identify import TEMPLATES, CriticalMode, RecordedWalks, load_data, planar, planar_fit
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
@@ -27,7 +27,7 @@ def test_residuals_need_the_number_of_modules_of_the_data():
 
 def test_a_robot_without_a_pitchfork_is_refused(monkeypatch):
     # Of such a robot every search ends where it began.
-    monkeypatch.setattr(critical, "bifurcations", lambda *_, **__: [])
+    monkeypatch.setattr(planar_fit, "bifurcations", lambda *_, **__: [])
     with pytest.raises(AnalysisError, match="must have a pitchfork between k1 = 4 N"):
         planar.identify_planar(ROBOT, DATA)
 

@@ -16,7 +16,6 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.statistics import LEVEL
 from chilopod.tasks.identify.constants import CONFIDENCE
-from chilopod.tasks.identify.critical import searched
 from chilopod.tasks.identify.data import CriticalMode
 from chilopod.tasks.identify.planar_fit import (
     FREE,
@@ -25,6 +24,7 @@ from chilopod.tasks.identify.planar_fit import (
     confidence_intervals,
     fits_from_every_start,
     scale_of,
+    searched,
     with_constants,
 )
 

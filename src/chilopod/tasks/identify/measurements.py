@@ -27,9 +27,8 @@ from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.tasks.identify.critical import Pitchforks
 from chilopod.tasks.identify.planar import Identification
-from chilopod.tasks.identify.planar_fit import FREE, determined, jacobian, scale_of, with_constants
+from chilopod.tasks.identify.planar_fit import FREE, Pitchforks, determined, jacobian, scale_of, with_constants
 
 _STEP, _AGREE = 1e-3, 0.05  # of differences, in units of `scale_of`, and how well they agree with those of its double
 _CHANGES = {ALL: (0.5, 0.7, 1.5), "gait.stride": (0.6, 1.5), "gait.stance": (1.5,)}  # factors

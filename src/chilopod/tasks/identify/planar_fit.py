@@ -1,4 +1,10 @@
-"""Fits of the planar model's constants to a critical spring and its mode, and what the data leave of them."""
+"""Fits of the planar model's constants to a critical spring and its mode, and what the data leave of them.
+
+A search finds every critical spring of an interval. A robot beside one whose critical spring is known has one nearby:
+there the return map of the straight walk has the multiplier of a pitchfork, -1 over half a period if the gait is
+mirrored after it, else 1 over a period. Newton's method takes a tenth of the time of a search, but knows nothing of
+points farther away.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +17,15 @@ from scipy.optimize import least_squares, minimize
 from scipy.stats import chi2
 
 from chilopod import units
-from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.analysis.parameters import K1, PAPER_UNIT
+from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
+from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
+from chilopod.stability import Kind
 from chilopod.tasks.identify.constants import CONFIDENCE, Constant, FreeConstants, with_values
-from chilopod.tasks.identify.critical import Critical, Pitchforks, searched
 from chilopod.tasks.identify.data import CriticalMode
 
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
@@ -27,13 +35,75 @@ FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 _STARTS = ((0.6, 0.2, 0.15), (1.5, 0.45, 0.3), (0.8, 0.4, 0.1))
 _BOUNDS = ((0.05, 20.0), (0.02, 3.0), (-0.6, 1.2))
 """Bounds of the search, in the same units."""
-_STEP = 1e-6  # of differences, in the same units
+_STEP = 1e-6  # of differences, in the same units, and of springs, relative
 _OPEN = 1e-4  # singular value of an open combination, relative to all
 _MOST_MOVES, _LONGEST_MOVE = 40, 0.1  # to the end of an interval, in the same units
 _ROOM = 1e-3  # of chi-square
 _MET = 1.0 + 1e-6  # residual that counts as 1
 _RISE = float(chi2.ppf(CONFIDENCE, 1))  # of chi-square at the end of an interval
+_MOST, _FOUND = 12, 1e-12  # steps of Newton's method for a critical spring, and the last one, relative
+_FARTHEST = 0.3  # relative step, and distance of the multiplier, at which it gives up
 _MOST_LOST = 20  # robots without a pitchfork, in one search for an end
+
+
+Critical = tuple[float, Array]
+"""Critical k1, N*m/rad, and joint angles of the mode, of unit norm and positive sum, shape (N-1,)."""
+
+
+class Pitchforks:
+    """Last pitchfork in k1 of robots that differ little: the first is searched ``between`` two springs, N*m/rad, and
+    the others are found from one beside it."""
+
+    def __init__(self, between: Sequence[float]) -> None:
+        self._between, self._near = between, 0.0
+
+    def __call__(self, robot: Robot) -> Critical | None:
+        """Spring and mode of a robot; None if it has no pitchfork."""
+        found = _beside(robot, self._near) if self._near else None
+        if found is None and (other := searched(robot, self._between)) is not None:
+            found = _beside(robot, other[0])
+        self._near = self._near if found is None else found[0]
+        return found
+
+
+def searched(robot: Robot, between: Sequence[float]) -> Critical | None:
+    """Spring and mode of the last pitchfork in k1 in an interval; None if there is none."""
+    with suppress(AnalysisError):
+        for each in reversed(bifurcations(robot, K1, (between[0], between[1]), normal_form=False)):
+            if each.point.kind is Kind.PITCHFORK:
+                components = each.joint_components.real
+                return each.point.value, components * np.sign(components.sum())
+    return None
+
+
+def _beside(robot: Robot, near: float) -> Critical | None:
+    """Spring near another, and mode; None if Newton's method finds none."""
+    spring, target = near, 1.0 if PlanarModel(robot).symmetry is None else -1.0
+    with suppress(AnalysisError, np.linalg.LinAlgError):
+        for _ in range(_MOST):
+            here, there = _maps([robot.with_value(K1, spring * (1.0 + step)) for step in (0.0, _STEP)])
+            values, vectors = np.linalg.eig(here)
+            at = int(np.abs(values - target).argmin())
+            if abs(values[at] - target) > _FARTHEST or values[at].imag != 0.0:
+                return None
+            right, left = vectors[:, at].real, np.linalg.inv(vectors)[at].real
+            slope = left @ (there - here) @ right / (_STEP * spring)
+            step = float((target - values[at].real) / slope)
+            if abs(step) <= _FOUND * spring:
+                part = right[3 : robot.body.modules + 2]
+                return spring, part / np.linalg.norm(part) * np.sign(part.sum())
+            spring += min(max(step, -_FARTHEST * spring), _FARTHEST * spring)
+    return None
+
+
+def _maps(robots: list[Robot]) -> Array:
+    """Return maps of the straight walks of robots with one gait, shape (robots, 2N+1, 2N+1)."""
+    models = [PlanarModel(robot) for robot in robots]
+    symmetry, period = models[0].symmetry, models[0].period
+    if symmetry is None:
+        return PlanarModel.flow_many(models, 0.0, period)[0]
+    maps: Array = symmetry @ PlanarModel.flow_many(models, 0.0, 0.5 * period)[0]
+    return maps
 
 
 class _LostError(Exception):
