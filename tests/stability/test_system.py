@@ -254,3 +254,38 @@ def test_a_flow_of_volumes_alone_does_not_make_a_system_stiff():
 def test_tiny_multipliers_have_the_larger_bound():
     found = full_period(np.array([1e-9, 1e-12], complex), np.array([1e-16, 1e-8]), 1, np.zeros(2), 1.0)
     assert found.error_bound == 1e-8
+
+
+def rotating(t, x, a=-0.1, b=0.37):
+    """z' = i z + e^{it} g(e^{-it} z), g(w) = (a + ib) (w - 1) - |w - 1|^2 (w - 1): the orbit e^{it} has the multipliers
+    exp(2 pi (a +- ib)), and is symmetric in time to every rotation."""
+    c, s = np.cos(t), np.sin(t)
+    u, v = c * x[0] + s * x[1] - 1.0, c * x[1] - s * x[0]
+    r = u * u + v * v
+    p, q = a * u - b * v - r * u, b * u + a * v - r * v
+    return [-x[1] + c * p - s * q, x[0] + s * p + c * q]
+
+
+def turn(order):
+    c, s = np.cos(2.0 * pi / order), np.sin(2.0 * pi / order)
+    return np.array([[c, s], [-s, c]])
+
+
+@pytest.mark.parametrize("order", [2, 3, 4, 6])
+def test_symmetries_in_time_of_any_order(order):
+    """S x(T / k) = x(0), as of the motion e^{it}."""
+    system = from_rhs(rotating, 2, 2.0 * pi, symmetry=turn(order))
+    orbit = find_orbit(system, [0.9, 0.1])
+    np.testing.assert_allclose(orbit.state, [1.0, 0.0], atol=1e-12)
+    assert orbit.image.returns == order
+    found = multipliers(system, [0.9, 0.1])
+    np.testing.assert_allclose(found.values[0], np.exp(2.0 * pi * (-0.1 + 0.37j)), atol=found.error_bound + 1e-15)
+
+
+def test_a_symmetry_that_the_flow_does_not_have_is_refused():
+    backward = turn(3).T
+    with pytest.raises(ParameterError, match=r"symmetry: must be a symmetry .*allowed: S with S f\(t \+ T/k, x\)"):
+        from_rhs(rotating, 2, 2.0 * pi, symmetry=backward)
+    system = PeriodicSystem(2, 2.0 * pi, from_rhs(rotating, 2, 2.0 * pi).flow, symmetry=backward)
+    with pytest.raises(AnalysisError, match="symmetry: must be one of the motion"):
+        find_orbit(system, [0.9, 0.1])

@@ -139,7 +139,7 @@ Slopes = Callable[[Array, Array], Array]
 _CLAIMS = {
     "timeless": ("must be given", "T: the right-hand side depends on t"),
     "period": ("period", "T with f(t + T, x) = f(t, x); a function of one period takes t % T"),
-    "symmetry": ("symmetry", "S with S f(t, x) = f(t + T/2, S x)"),
+    "symmetry": ("symmetry", "S with S f(t + T/k, x) = f(t, S x), of order k"),
     "spatial_symmetry": ("symmetry", "P with P f(t, x) = f(t, P x)"),
 }
 

@@ -41,7 +41,7 @@ class SystemLike(Protocol):
 
     @property
     def symmetry(self) -> Array | None:
-        """Matrix S, shape (n, n), of finite order k with S f(t, x) = f(t + T/k, S x), or None. H = S flow(T/k) is then
+        """Matrix S, shape (n, n), of finite order k with S f(t + T/k, x) = f(t, S x), or None. H = S flow(T/k) is then
         a return map. The order is 2 unless the system has a ``symmetry_order``."""
 
     def flow(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array]:

@@ -43,7 +43,7 @@ class PeriodicSystem(ReadOnlyArrays):
     flow
         Function ``flow(x, t0, t1) -> (x1, dx1/dx)``.
     symmetry
-        Optional S, shape (n, n), of finite order k (S applied k times is 1), with S f(t, x) = f(t + T/k, S x): then the
+        Optional S, shape (n, n), of finite order k (S applied k times is 1), with S f(t + T/k, x) = f(t, S x): then the
         orbits with S x(T/k) = x(0) are fixed points of the return map H = S flow(T/k), whose multipliers nu give those
         of the full period as nu^k.
     spatial_symmetry
@@ -253,7 +253,7 @@ class _Stated:
         claims = [Claim(field, one, shift * length, np.atleast_1d(part * length), base, np.inf)]
         if not given.events:  # a symmetry would also have to hold for these
             if system.symmetry is not None:
-                later = 0.0 if autonomous else length / system.symmetry_order
+                later = 0.0 if autonomous else length - length / system.symmetry_order  # T/k before
                 claims.append(Claim("symmetry", system.symmetry, later, given.times, base, length))
             for matrix in spatial_symmetries(system):
                 claims.append(Claim("spatial_symmetry", matrix, 0.0, given.times, base, length))

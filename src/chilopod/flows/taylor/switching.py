@@ -37,7 +37,8 @@ def start(tape: Any, motion: Any, t: float) -> None:
 
 @fused_njit(error_model="numpy")
 def settle(tape: Any, motion: Any, unit: float) -> int:
-    """Choose the branch of every switch at a state; where its function is zero, by the sign of its derivative."""
+    """Choose the branch of every switch at a state; where its function is zero, by the sign that it is about to have.
+    If f on that branch pushes it back, the motion slides along the switching surface."""
     switches = tape.switches
     values, branches, scales = motion.series.values, motion.series.branches, motion.scales
     choose(tape, motion.series)
@@ -104,7 +105,11 @@ def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
 
 @fused_njit(error_model="numpy")
 def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any) -> int:
-    """Pass a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``."""
+    """Pass a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``.
+
+    With reset r and guard g, the derivative is Dr + (f+ - Dr f-) grad g / (grad g . f-), f- and f+ before and after
+    (the saltation matrix; Dr f- is ``before``, grad g . f- is ``slope``, grad g times the seeds ``gradient``).
+    """
     n, switches = tape.layout[0], tape.switches
     values, branches = motion.series.values, motion.series.branches
     g = switches[1, s]
@@ -167,17 +172,18 @@ def await_events(tape: Any, directions: Any, motion: Any, unit: float, soon: flo
         if switches[0, s] != ops.GUARD:
             continue
         value, slope = series.values[switches[1, s], 0], series.values[switches[1, s], 1]
-        scales[s] = soon * abs(slope) / _ZERO
+        scales[s] = soon * abs(slope) / _ZERO  # `settle` takes a guard this near zero for zero
         if not (slope != 0.0 and abs(value) <= soon * abs(slope)):
             continue
         direction = 1.0 if slope > 0.0 else -1.0
         ahead = is_timed(tape, s)
         if not ahead and directions[switches[2, s]] * direction > 0.0:
+            # Try the event: does the guard run back after the reset? State and branches are copies, the series is not.
             then = Series(series.values, series.tangents, series.branches.copy())
             after = Motion(motion.x.copy(), motion.seeds, then, scales)
             cross(tape, directions, after, s, direction, unit, t, np.empty(motion.seeds.shape))
             ahead = series.values[switches[1, s], 1] * direction < 0.0
-            back = Motion(motion.x, motion.seeds, then, scales)
+            back = Motion(motion.x, motion.seeds, then, scales)  # expand the series at the start again
             start(tape, back, t)
             settle(tape, back, unit)
         series.branches[s] = -direction if ahead else direction

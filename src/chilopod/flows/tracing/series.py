@@ -73,7 +73,11 @@ def values_at(
     program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, branches: Any
 ) -> None:
     """Coefficients 0 to ``order`` of the operations in a span (first and past-last), and of the states from ``slopes``.
-    One call with single arrays does all orders, as counting references to arrays takes long."""
+    One call with single arrays does all orders, as counting references to arrays takes long.
+
+    Product: c_k = sum_j a_j b_{k-j}. Quotient: c_k = (a_k - sum_{j>0} b_j c_{k-j}) / b_0. Function with c' = w a':
+    k c_k = sum_{j>0} j a_j w_{k-j}.
+    """
     for k in range(order + 1):
         for i in range(span[0], span[1]):
             code, a, b = program[0, i], program[1, i], program[2, i]
@@ -142,7 +146,11 @@ def tangents_at(
     program: Any, terms: Any, slopes: Any, span: Any, order: int, unit: float, values: Any, tangents: Any
 ) -> None:
     """The same for the tangents that are needed, from values computed before. Each is a sum of one or two products of
-    series, w da; a single loop computes them all, because calls with arrays, and copies of the loop, take long."""
+    series, w du; a single loop computes them all, because calls with arrays, and copies of the loop, take long.
+
+    Product: dc = b da + a db. Quotient: dc_k = (da_k - sum_j c_j db_{k-j} - sum_{j>0} b_j dc_{k-j}) / b_0. Function:
+    dc = w da. The loop sums ``factor`` w_j du_{k-j} from j = ``first`` on.
+    """
     nodes, orders, lanes = tangents.shape
     tangents = as_lanes(tangents.reshape(nodes, orders, lanes // HALF, HALF), HALF)
     for k in range(order + 1):

@@ -57,6 +57,8 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
     """
     third = (3, 0) if at.real else (2, 1)
     manifold = Manifold(mapped, at, 3)
+    # Hill climbing in the amplitude: `growing` is its direction (0 before the first error is known), `turned` counts
+    # reversals, `best` is the sample with the least error of the coefficient.
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
     best = None
     best_error, status = np.inf, NormalFormStatus.LINEAR
@@ -65,7 +67,7 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
     for _ in range(_TRIALS):
         found = manifold.sample(radius)
         share, order, seen = (np.inf, 2, True) if found is None else _departure(found, at)
-        if found is not None and found.blur > _BLURRED * radius:
+        if found is not None and found.blur > _BLURRED * radius:  # the orbit's error hides the terms
             low, factor = radius, _UP
         elif found is None or share > _TOO_FAR:
             high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
@@ -76,7 +78,7 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
         elif bends < _BENDS and manifold.bend(found):
             bends += 1
             continue  # once more, along the better curve
-        elif not seen:
+        elif not seen:  # the map is linear to its error
             best, low, ups = (found, dict(manifold.curve)), radius, ups + 1
             factor = _linear_up(mapped, at, manifold.curve, radius, high) if ups <= _UPS else np.inf
         else:

@@ -15,7 +15,16 @@ from chilopod.flows.arguments import check_arguments, finite_array
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
-from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
+from chilopod.stability.interface import (
+    Capabilities,
+    SystemLike,
+    check_system,
+    checked_flow,
+    is_autonomous,
+    is_stiff,
+    offers,
+    sizes,
+)
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, shot
@@ -44,6 +53,7 @@ _CLOSES = 1e-8  # residual, relative to motion and sizes of the states, of an ea
 _COARSE = 1e-11  # error, relative to the sizes of the states, from which a second computation estimates it too
 _CHANCE = 1e-13  # difference, relative to the sizes of the states, of two computations that may agree by chance
 _SYMMETRIC = 1e-12  # residual, relative to the sizes of the states, of a symmetry of the orbit
+_ALIKE = 1e-6  # distance of a return, relative to the sizes and its growth, from the symmetric one
 _BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
@@ -286,10 +296,23 @@ def near_orbit(
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
+        if system.symmetry is not None and not is_autonomous(system):
+            _check_symmetry(system, x, duration, size)
         return bounded(system, x, duration)
     section = section_at(system, x, units, duration)
     image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
+
+
+def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array) -> None:
+    """AnalysisError if the second return from an orbit's state is not symmetric to the first."""
+    after, jacobian = checked_flow(system, x, 0.0, duration)
+    second = carried(system, after[None], duration, 2.0 * duration)[0]
+    off = _relative(system.symmetry @ second - after, size)
+    if off > _ALIKE * max(1.0, float(np.abs(jacobian * size / size[:, None]).max())):
+        said = f"must be one of the motion: after a return it misses the symmetric one by {off:.1e} of its size"
+        allowed = "S with S f(t + T/k, x) = f(t, S x), of order k, also for guards and resets"
+        raise AnalysisError(said, field="symmetry", allowed=allowed)
 
 
 def bounded(system: SystemLike, x: Array, duration: float, error: Array | None = None) -> Orbit:

@@ -166,7 +166,12 @@ class _Frame(NamedTuple):
 
 
 class _Equations:
-    """The equations at some nodes and their derivatives."""
+    """The equations at some nodes and their derivatives.
+
+    For nodes x_i, the time T of a return and the parameter p they are F_i = phi(x_i; T/m, p) - x_{i+1} = 0. Row i of
+    ``_linear`` is [dF_i/dx_i | dF_i/dT | dF_i/dp | F_i]; products of these rows make every node a linear function of
+    x_0, T, p and 1.
+    """
 
     def __init__(self, problem: Problem, nodes: Nodes, frame: _Frame) -> None:
         if problem.budget is not None:

@@ -97,7 +97,7 @@ def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
 
 
 def centraliser(group: Group, gamma: Array) -> Group:
-    """The subgroup of all P that commute with a symmetry in time, gamma f(t, x) = f(t + T/k, gamma x): those that
+    """The subgroup of all P that commute with a symmetry in time, gamma f(t + T/k, x) = f(t, gamma x): those that
     commute with the derivative of the flow on an invariant orbit then do so with the return map gamma Phi.
 
     The symmetry must normalise the group: gamma P gamma^-1 is an element for every element P.

@@ -1,4 +1,9 @@
-"""Balance of the number of multipliers outside the unit circle with the crossings, and missing crossings."""
+"""Balance of the number of multipliers outside the unit circle with the crossings, and missing crossings.
+
+Between two places with certain counts, the difference of the counts is the sum of the changes at the crossings between
+them. Where it is not, a crossing is missing (the multipliers are followed), several roots hide each other (they are
+separated), or a count nearer to a root decides.
+"""
 
 from __future__ import annotations
 

@@ -212,7 +212,7 @@ class _Search:
         return 0.5 * b - 0.5 * a <= least
 
     def _parts(self, a: float, b: float, signs: Array, logs: Array) -> list[_Part] | None:
-        """Parts of a piece; None if more places promise them, empty if it must be cut."""
+        """Parts of a piece; None if more places promise them, an empty list if the piece must be cut in two."""
         absent = np.isnan(signs) | np.isnan(logs) | (logs == np.inf)
         if absent.any():
             return [_Part(a, b, _Kind.MISSING)] if absent.all() or self._fine(a, b, _HOLE) else []
@@ -263,7 +263,11 @@ class _Search:
         return parts
 
     def doubtful(self, room: int) -> list[Interval]:
-        """Pieces around parts that need their own scale, within ``room`` values of the function."""
+        """Pieces around parts that need their own scale, within ``room`` values of the function.
+
+        A run of parts without a certain sign is settled if the function has opposite signs at its ends and all its
+        polynomials are monotonic: it has one zero. Else it is searched again on twice its width, on its own scale.
+        """
         runs = [run for run in self._runs() if any(part.kind in _OPEN for part in run[1])]
         ends = [self._ends(*run) for run in runs]
         unknown = sorted({place for place in itertools.chain(*ends) if place not in self.signs})
