@@ -14,7 +14,7 @@ from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.robot.walks import BEND, SPRINGS, VARIANT_SPRINGS
 from chilopod.paper.section import Context, Found, Size
 from chilopod.paper.table import Kind, OfPlanar, Result, robot_rows
-from chilopod.paper.turning.criteria import saturated
+from chilopod.paper.turning.study import saturated
 from helpers.made_up_robot import AMPLITUDE, base_walks, durations, series, task, turning, walks, with_criteria
 
 SOFT, SLOW, PHASE = "k2-5 = 28 N*mm/deg", "stride 1.8 cm", "module phase 180 deg"

@@ -6,7 +6,7 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.paper.robot.turning import INSTANTS, compared, verdict
-from chilopod.paper.turning.criteria import ratios
+from chilopod.paper.turning.study import ratios
 from chilopod.paper.turning.trials import strategy_tasks
 from chilopod.steering import ARRIVAL_RADIUS, Target
 from helpers.made_up_robot import task

@@ -15,9 +15,8 @@ from chilopod.errors import ParameterError
 from chilopod.paper import statements
 from chilopod.paper.section import Context, Size
 from chilopod.paper.table import OfPlanar, Row, Verdict
-from chilopod.paper.turning.criteria import all_lower, minima
 from chilopod.paper.turning.sections import rows
-from chilopod.paper.turning.study import turning
+from chilopod.paper.turning.study import all_lower, minima, turning
 from chilopod.paper.turning.trials import CRITERIA, springs_by_outcome, turning_task
 from chilopod.robot import load_robot
 from chilopod.steering import Outcome, Target

@@ -17,7 +17,7 @@ from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import UNDULATION, RobotWalks
 from chilopod.paper.statements import listed
 from chilopod.paper.table import INCREASES, OfTwin, Result, Statement, Verdict, compared, estimated, of_twin, within
-from chilopod.paper.turning.criteria import SCALES, all_lower, around, in_words, minima, saturation, softest_minima
+from chilopod.paper.turning.study import SCALES, all_lower, around, in_words, minima, saturation, softest_minima
 from chilopod.paper.turning.trials import LegYaw, arrivals, by_leg_yaw, outcome_words, springs_by_outcome
 from chilopod.show.words import listing
 from chilopod.statistics import Answer, Estimate, increases, mean, spread_difference

@@ -25,7 +25,7 @@ from chilopod.paper.printed import CRITERION_NAMES, base_series_data
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.section import Context, Size
-from chilopod.paper.turning.criteria import minima
+from chilopod.paper.turning.study import minima
 from chilopod.paper.turning.trials import strategy_tasks
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot

@@ -18,7 +18,7 @@ import xarray as xr
 from chilopod.paper import printed
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.section import QUICK_REPEATS, Context, Size
-from chilopod.paper.turning.criteria import minima, ratios
+from chilopod.paper.turning.study import minima, ratios
 from chilopod.paper.turning.trials import DURATION, TurningTask, strategy_tasks, without_leg_yaw
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -82,7 +82,7 @@ def robot_strategies(context: Context, progress: Progress = silent) -> xr.Datase
     Returns
     -------
     Dataset over limit (deg), instant and criterion: ``ratio``, ``low`` and ``high``, the results of
-    :func:`chilopod.paper.turning.criteria.ratios`, and, over strategy too, ``smallest`` (m, rad, rad^2*s); over limit
+    :func:`chilopod.paper.turning.study.ratios`, and, over strategy too, ``smallest`` (m, rad, rad^2*s); over limit
     ``seconds``, the earliest arrival. Attribute: ``repeats``.
     """
     repeats = context.size.of(STRATEGY_REPEATS, QUICK_REPEATS, 2)

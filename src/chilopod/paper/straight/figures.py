@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ def variants(data: xr.Dataset) -> Panel:
 
 def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_VARIANTS, narrow)
-    names = [_broken(typeset(str(name))) for name in data.variant.values]
+    names = [re.sub(r" (?=\d)", "\n", typeset(str(name))) for name in data.variant.values]
     rows = np.arange(len(names))
     both = np.array([data.critical_k1.values, data.robot_printed.values])
     changes = 100.0 * (both / both[:, :1] - 1.0)
@@ -92,13 +93,6 @@ def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
     axes["B"].axvline(0.0, color=style.BLACK, lw=0.8)
     figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside upper left", ncols=1 if narrow else 2)
     return figure
-
-
-def _broken(name: str) -> str:
-    """Name on two lines; the second line begins with the value, if there is one: "stride" over "1.8 cm"."""
-    words = name.split()
-    cut = next((index for index, word in enumerate(words) if word[0].isdigit()), len(words))
-    return "\n".join(" ".join(part) for part in (words[:cut], words[cut:]) if part)
 
 
 def modules(data: xr.Dataset) -> Panel:

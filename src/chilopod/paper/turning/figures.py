@@ -16,8 +16,7 @@ from chilopod.paper import printed
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, legend_below, over_compliance
 from chilopod.paper.statements import listed
-from chilopod.paper.turning.criteria import SCALES, all_lower, in_words, minima, saturation, softest_minima
-from chilopod.paper.turning.study import Turning
+from chilopod.paper.turning.study import SCALES, Turning, all_lower, in_words, minima, saturation, softest_minima
 from chilopod.paper.turning.trials import (
     LegYaw,
     TurningTask,

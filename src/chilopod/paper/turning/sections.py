@@ -8,9 +8,8 @@ from chilopod.paper.movies import movies
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.section import Context, Movie, Section
 from chilopod.paper.table import OfPlanar, Result, Row, agreement, unprinted
-from chilopod.paper.turning.criteria import SCALES, counted, minima, softest_minima
 from chilopod.paper.turning.figures import panels
-from chilopod.paper.turning.study import ROUGH, Turning, turning
+from chilopod.paper.turning.study import ROUGH, SCALES, Turning, counted, minima, softest_minima, turning
 from chilopod.paper.turning.trials import by_leg_yaw, outcome_words, span
 from chilopod.progress import Progress
 

@@ -16,7 +16,7 @@ from chilopod.paper.robot.walks import RobotWalks
 from chilopod.paper.shapes import DASHED, finish, legend_below
 from chilopod.paper.statements import listed
 from chilopod.paper.turning import figures as planar
-from chilopod.paper.turning.criteria import in_words, saturation
+from chilopod.paper.turning.study import in_words, saturation
 from chilopod.paper.turning.trials import TurningTask, arrivals, by_leg_yaw, outcome_words
 from chilopod.show import style
 from chilopod.show.panel import Panel
