@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
-    from chilopod.trials.batch import batches, walked
+    from chilopod.trials.batch import Executor, Here, batches, using, walked
     from chilopod.trials.cluster import Cluster
-    from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import as_now, check_fits, run, run_each, together
     from chilopod.trials.store import Store
     from chilopod.trials.summary import AVERAGED, WalkSummary, mean_joint_angles, straight, summaries
@@ -21,9 +20,8 @@ else:
     __getattr__, __dir__ = exports(
         __name__,
         {
-            "batch": ("batches", "walked"),
+            "batch": ("Executor", "Here", "batches", "using", "walked"),
             "cluster": ("Cluster",),
-            "executors": ("Executor", "Here", "using"),
             "run": ("as_now", "check_fits", "run", "run_each", "together"),
             "store": ("Store",),
             "summary": ("AVERAGED", "WalkSummary", "mean_joint_angles", "straight", "summaries"),

@@ -26,7 +26,7 @@ from chilopod.cores import cores
 from chilopod.errors import ClusterError, ParameterError, one_line
 from chilopod.extras import needs
 from chilopod.process import on_leave
-from chilopod.trials.executors import Pace
+from chilopod.trials.batch import Pace
 from chilopod.trials.on_worker import PACKAGES, check_versions, packed, unpacked, versions, walked_there
 
 if TYPE_CHECKING:

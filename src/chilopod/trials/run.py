@@ -13,9 +13,8 @@ from chilopod.errors import AnalysisError
 from chilopod.output import check_room
 from chilopod.progress import Progress, silent
 from chilopod.record import check_memory
-from chilopod.trials.batch import NOT_KEPT, batches
+from chilopod.trials.batch import NOT_KEPT, Executor, batches, current
 from chilopod.trials.description import meanwhile_unchanged
-from chilopod.trials.executors import Executor, current
 from chilopod.trials.store import Store
 from chilopod.trials.trial import Trial
 
