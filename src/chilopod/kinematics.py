@@ -60,8 +60,9 @@ def foot_velocities(places: Array, rates: Array, speed: float, yaw: ArrayLike = 
 def from_modules(centres: Array, headings: Array, inside: Array) -> Array:
     """Positions or velocities of feet, shape (..., N, 2, 2), on the axes that headings are measured from.
 
-    ``inside`` has them relative to the centres of their modules, in the frames of these, same shape; ``centres`` has
-    the positions or velocities of the centres, shape (..., N, 2); headings are in rad, shape (..., N).
+    ``inside`` has them relative to the centres of their modules, in the frames of these, same shape, or (points, 2) if
+    they are alike in all modules; ``centres`` has the positions or velocities of the centres, shape (..., N, 2);
+    headings are in rad, shape (..., N).
     """
     ahead, left = (direction[..., None, :] for direction in directions(headings))
     out: Array = centres[..., None, :] + inside[..., :1] * ahead + inside[..., 1:] * left

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from chilopod import load_robot
+from chilopod.record import bearing_and_distance
 
 ROBOT = load_robot("aoi2022-planar")
 
@@ -81,7 +82,10 @@ def on_course(record, places, turns, verdicts):
         begin, end = turns[robot, goal]
         target[(record.time.values >= begin) & (record.time.values <= end), robot] = places[robot, goal]
     stiffness = np.tile(ROBOT.springs.stiffness, (record.sizes["robot"], 1))
+    bearing, away = bearing_and_distance(record.position.values, record.heading.values, target)
     return record.assign(
+        distance=(("time", "robot"), away, {"units": "m"}),
+        bearing=(("time", "robot"), bearing, {"units": "rad"}),
         target=(("time", "robot", "axis"), target, {"units": "m"}),
         stiffness=(("robot", "joint"), stiffness, {"units": "N*m/rad"}),
         goal_place=(("robot", "goal", "axis"), places, {"units": "m"}),

@@ -64,12 +64,9 @@ def title(done: Driven) -> str:
 
 def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
     """Bearing of the present target, deg, without lines across its jumps."""
-    place = walk.position.transpose("time", "axis")
     # One that was the target all the time has one place for all times.
-    place, target = place.values, walk.target.broadcast_like(place).transpose("time", "axis").values
-    away = target - place
-    angle = np.arctan2(away[:, 1], away[:, 0]) - walk.heading.values
-    angle = np.rad2deg((angle + np.pi) % (2.0 * np.pi) - np.pi)
+    target = walk.target.broadcast_like(walk.position).transpose("time", "axis").values
+    angle = np.rad2deg(walk.bearing.values)
     angle[1:][(np.abs(np.diff(angle)) > 180.0) | (np.diff(target, axis=0) != 0.0).any(-1)] = np.nan
     return angle
 

@@ -35,7 +35,7 @@ def draw(done: Turn, narrow: bool = False) -> Figure:
         color = style.CURVES[robot % len(style.CURVES)]
         axes["B"].plot(walk.time, walk.distance, color=color)
         # A line does not cross the picture where the angle jumps from -180 to 180.
-        angle = np.rad2deg(walk.bearing.values.copy())
+        angle = np.rad2deg(walk.bearing.values)
         angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan
         axes["C"].plot(walk.time, angle, color=color)
     axes["B"].axhline(ARRIVAL_RADIUS, color=style.GREY, linestyle=(0, (4, 2)), linewidth=1.2)

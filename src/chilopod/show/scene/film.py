@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.errors import OutputError, ParameterError
 from chilopod.frozen import Array
+from chilopod.kinematics import from_modules
 from chilopod.show import style
 from chilopod.show.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.show.scene.frames import Floor, Scene, close, scene
@@ -311,9 +312,9 @@ class FilmPanel:
             middle = np.nanmean(frames.spine[around, robot], axis=(0, 1))
             self._look_at(Floor.of(middle, self.floor.size, self.floor.grid))
         headings, feet = frames.headings[index, robot], frames.feet[index, robot]
-        self.modules.set_verts(list(_on_modules(centres, headings, self.outline)))
+        self.modules.set_verts(list(from_modules(centres, headings, self.outline)))
         self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind != "stopped" else 0.45)
-        hips = _on_modules(centres, headings, self.hips)
+        hips = from_modules(centres, headings, self.hips)
         self.legs.set_segments(list(np.stack([hips, feet], axis=-2).reshape(-1, 2, 2)))
         self.legs.set_color([COLORS["ink"] if each else COLORS["air"] for each in stands.ravel()])
         self.path.set_data(*frames.centres[: index + 1, robot, 0].T)
@@ -351,13 +352,6 @@ class FilmPanel:
 
 def _dot(face: str, edge: str, size: float, line: float = 1.2, **more: Any) -> Line2D:
     return Line2D([], [], ls="", marker="o", ms=size, mfc=face, mec=edge, mew=line, **more)
-
-
-def _on_modules(centres: NDArray[Any], headings: NDArray[Any], points: NDArray[Any]) -> NDArray[np.float64]:
-    """Points (V, 2) that are fixed in every module, on the floor: (N, V, 2)."""
-    cos, sin = np.cos(headings)[:, None], np.sin(headings)[:, None]
-    x, y = points.T
-    return centres[:, None] + np.stack([x * cos - y * sin, x * sin + y * cos], axis=-1)
 
 
 def _outline(length: float) -> NDArray[np.float64]:
