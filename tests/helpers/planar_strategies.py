@@ -89,12 +89,16 @@ def mid_interval(model, fraction: float, inside: float = 0.5) -> float:
     return float(times[i] + inside * widths[i])
 
 
+def beside(x) -> np.ndarray:
+    """The state one bit beside another."""
+    return np.append(np.nextafter(x[0], np.inf), x[1:])
+
+
 def nonlinear_flow(model, x, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
     """State and derivative by the nonlinear equations, on the straight walk too: from a state one bit beside it."""
-    beside = np.array(x, dtype=float)
-    beside[0] = np.nextafter(beside[0], np.inf)
-    assert not np.array_equal(beside, model.orbit)
-    return model.flow(beside, t0, t1)
+    start = beside(x)
+    assert not np.array_equal(start, model.orbit)
+    return model.flow(start, t0, t1)
 
 
 def energy_rate(model, x, slope, stiffness=None):

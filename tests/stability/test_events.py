@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Event, from_rhs
 
 
@@ -94,3 +94,22 @@ def test_events_at_the_same_instant():
         )
         state, _ = system.flow(np.array([-0.5, 0.0]), 0.0, 0.95)
         np.testing.assert_allclose(state, [(1.0 + speeds[0]) * 0.45, speeds[0]], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "guard",
+    [
+        lambda t, x: np.sign(x[0]),
+        lambda t, x: np.where(x[0] > 0.0, 1.0, -1.0),
+        lambda t, x: np.floor(x[0]) + 0.5,
+        lambda t, x: 2.0 * (x[0] > 0.0) - 1.0,
+        lambda t, x: x[0] + 0.5 * np.sign(x[0]),
+    ],
+)
+@pytest.mark.parametrize("direction", [0, 1])
+def test_a_guard_that_jumps_through_zero_is_refused(guard, direction):
+    """Its event would be passed over."""
+    event = Event(guard, lambda t, x: [x[0], -0.7 * x[1]], direction)
+    system = from_rhs(lambda t, x: [x[1], -0.1 * x[1] - x[0] + np.cos(2.0 * t + 1.0)], 2, np.pi, events=[event])
+    with pytest.raises(AnalysisError, match=r"a guard jumps through zero at t = .*allowed: guards that pass zero cont"):
+        system.flow(np.array([-0.79, 2.97]), 0.0, np.pi)

@@ -289,3 +289,10 @@ def test_a_symmetry_that_the_flow_does_not_have_is_refused():
     system = PeriodicSystem(2, 2.0 * pi, from_rhs(rotating, 2, 2.0 * pi).flow, symmetry=backward)
     with pytest.raises(AnalysisError, match="symmetry: must be one of the motion"):
         find_orbit(system, [0.9, 0.1])
+
+
+def test_units_of_states_hundreds_of_orders_apart():
+    """A decay by e^-628 beside a slow one: its eigenvector, in balanced units, has entries whose squares vanish."""
+    found = multipliers(from_rhs(lambda t, x: [-100.0 * x[0], -0.2 * x[1] + x[0]], 2, 2.0 * pi), [0.0, 0.0])
+    np.testing.assert_allclose(found.values[0], exp(-0.4 * pi), atol=found.error_bound)
+    assert np.isfinite(found.error_bounds).all()

@@ -14,7 +14,7 @@ RESOLUTION = 4096  # number of grid points over the period; a pulse in time that
 _FAST, _MARGIN = 0.02, 8  # change between two of these points that is fast, and points beside it
 _STEPS_IN_FAST_PART = 16
 
-DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
+DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, JUMPS, TIME_OVER = range(9)
 """Ending of an integration."""
 
 _REASONS = {
@@ -29,6 +29,7 @@ _REASONS = {
         "a right-hand side that defines the sliding motion",
     ),
     CHATTERS: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
+    JUMPS: ("a guard jumps through zero at t = {t:g}", "guards that pass zero continuously"),
     GRAZES: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),
 }
 

@@ -113,7 +113,9 @@ def spectrum(image: ReturnMap) -> Spectrum:
     # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
     error = 4.0 * _EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
     right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
-    norms = np.linalg.norm(right, axis=0)
+    # Squares of tiny entries vanish; a power of 2 as a unit is exact.
+    size = np.exp2(np.floor(np.log2(np.abs(right).max(axis=0))))
+    norms = size * np.linalg.norm(right / size, axis=0)
     right, left = right / norms, left * norms
     # d nu = left^H E right, bounded from every entry of E.
     wrong = np.broadcast_to(image.error, image.jacobian.shape)

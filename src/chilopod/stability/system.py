@@ -177,7 +177,7 @@ def from_rhs(
     arithmetic, the elementary functions of numpy and math, numpy arrays, loops, and functions compiled with
     ``numba.njit``; a family over parameters (arguments, closures or globals that are floats) is traced once, or, if it
     branches on them, at every value. Jumps and kinks (``sign``, ``abs``, ``where``, ``%``, comparisons, ...) are found
-    and crossed exactly, in time and in state. A pulse in time narrower than about T / 50 000 may be missed.
+    and crossed exactly, in time and in state. A pulse in time narrower than T / 4096 may be missed.
 
     A stiff system, whose fastest decay is much faster than its motion, is integrated by an implicit method, Radau IIA
     collocation with the exact derivative of its steps. A function that branches on its arguments (``if x[0] > 0``) or

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.flows.carrying import DONE, GRAZES, SLIDES
+from chilopod.flows.carrying import DONE, GRAZES, JUMPS, SLIDES
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.series import Series, branch_at, choose, expand, expand_values, values_at
 
@@ -72,8 +72,8 @@ def is_timed(tape: Any, s: int) -> bool:
 
 
 @fused_njit(error_model="numpy")
-def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
-    """Update the branches of switches whose own functions jump with another switch."""
+def _carry_over(tape: Any, directions: Any, motion: Any, switched: int, surfaces: Any) -> int:
+    """Update the branches of switches whose own functions jump with another switch; a guard's must not pass zero."""
     program, terms, slopes, switches = tape.program, tape.terms, tape.slopes, tape.switches
     values, branches, scales = motion.series.values, motion.series.branches, motion.scales
     first = tape.layout[3]
@@ -83,8 +83,13 @@ def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
         first = stop
         g = values[switches[1, s], 0]
         if s != switched and abs(g - surfaces[s]) > _ZERO * scales[s]:
+            before = branches[s]
             branches[s] = branch_at(switches[0, s], g)
+            turn = branches[s] - before
+            if switches[0, s] == ops.GUARD and turn != 0.0 and turn * directions[switches[2, s]] >= 0.0:
+                return JUMPS
     values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
+    return DONE
 
 
 @fused_njit(error_model="numpy")
@@ -136,7 +141,9 @@ def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, uni
     elif switches[0, s] == ops.GUARD:
         return DONE  # f does not switch here
     else:
-        _carry_over(tape, motion, s, surfaces)
+        status = _carry_over(tape, directions, motion, s, surfaces)
+        if status != DONE:
+            return status
     expand_values(tape, 1, tape.layout[4], unit, motion.series)
     if not moves and values[g, 1] * direction < 0.0:
         return SLIDES
