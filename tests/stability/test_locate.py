@@ -17,6 +17,7 @@ from chilopod.stability import (
     SearchStatus,
     SpentError,
     find_orbit,
+    follow,
     from_map,
     from_rhs,
     locate,
@@ -201,7 +202,7 @@ def test_an_orbit_that_meets_another_one_and_ends_is_not_all():
     """The asymmetric orbit ends in the pitchfork; beyond it Newton's method finds the symmetric one."""
     found = locate(lambda r: lorenz(r, 0.41), (305.0, 325.0), orbit=[-13.484487, 37.180551, 286.471177])
     assert not found.complete
-    assert any("meets another one near 312.973" in remark for remark in found.remarks)
+    assert any("near 312.973" in remark and "another orbit meets it" in remark for remark in found.remarks)
 
 
 @pytest.mark.parametrize("gap", [0.1, 0.01, 0.001])
@@ -292,3 +293,31 @@ def test_a_point_among_the_symmetric_orbits_of_a_ring(cells, low):
     (point,) = found
     assert abs(point.value - 0.13426795201142) <= point.error_bound + 1e-13
     assert point.error_bound < 1e-9
+
+
+def close(distance):
+    """Two pitchforks at a distance on both sides of 0.01, of an orbit that has to be followed."""
+    return lambda a: from_rhs(lambda t, x: [((a - 0.01) ** 2 - distance**2) * x[0] - x[0] ** 3], 1, 2.0 * np.pi)
+
+
+def test_two_pitchforks_close_together_are_no_touch():
+    found = locate(close(1e-5), (-0.1, 0.13), orbit=[0.0])
+    assert found.complete
+    assert [point.kind for point in found] == [Kind.PITCHFORK] * 2
+    for point, truth in zip(found, (0.00999, 0.01001), strict=True):
+        assert abs(point.value - truth) <= point.error_bound < 1e-8
+
+
+@pytest.mark.parametrize("distance", [3e-6, 1e-6, 0.0])
+def test_what_may_be_a_touch_or_two_crossings_is_not_complete(distance):
+    found = locate(close(distance), (-0.1, 0.13), orbit=[0.0])
+    assert not found.complete
+    assert not len(found)
+    assert any("touches" in remark and " or " in remark for remark in found.remarks)
+
+
+@pytest.mark.parametrize("distance", [1e-5, 1e-6])
+def test_a_branch_reports_no_point_without_a_bound(distance):
+    branch = follow(close(distance), [0.0], (-0.1, 0.13))
+    for point in branch.special_points:
+        assert abs(abs(point.value - 0.01) - distance) <= point.bifurcation.error_bound

@@ -86,7 +86,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
             remarks += (f"near {near:.9g}: {error.problem}, so it is no bifurcation point",)
             continue
         if point is None:
-            remarks += (f"near {near:.9g}: {event.sentence}, but no multiplier of the orbit found there is critical",)
+            remarks += (f"near {near:.9g}: {event.sentence}, which the orbit that is found there does not confirm",)
         else:
             found.append((place.crossing.value, point))
     points: list[BranchPoint] = []

@@ -150,7 +150,8 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     point = replace(point, value=value)
     kind = Kind.FOLD if place.fold else None
     found = described(curve.system(value), (value, error), orbit, crossing, block, kind=kind)
-    if distances(np.array(found.multiplier), crossing.event) > _CRITICAL and not crossing.collision:
+    away = distances(np.array(found.multiplier), crossing.event)
+    if (away > _CRITICAL and not crossing.collision) or np.isinf(found.error_bound):
         return None
     bound = curve.multipliers(orbit.image)[1]
     return replace(point, orbit=orbit.state, special=found.kind, error_bound=bound, bifurcation=found)

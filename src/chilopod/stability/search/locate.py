@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -9,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
+from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
@@ -25,6 +27,7 @@ from chilopod.stability.returns import ReturnMap
 from chilopod.stability.search.samples import NEAR_FOLD, SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.shown import bounded as bounded_text
+from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Crossing, Event, Matrices
@@ -41,6 +44,7 @@ _FLOWS = 2  # flows of each, for every orbit of the budget
 _CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
 _COMES, _FARTHER = 1e-5, 100.0  # distance from a fold, relative to the interval, and factor of a second one
 _MERGING = 1e-4  # distance from a meeting of orbits, relative to the interval, at which multipliers are uncertain
+_ROUND_TOUCH = 9  # places in the surroundings of a touch
 _BETWEEN_POWERS = 0.75  # mean of the powers one half and one
 _AT_REST = 0.03  # motion, relative to the first orbit's, that counts as rest
 _PARTS = 5  # parts of a return at which the extent of the motion is sampled
@@ -90,7 +94,8 @@ def extent(samples: Samples) -> Extent:
         ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
         end = last.value
         if samples.merges:
-            ending = f"the orbit meets another one near {end:.9g}, which continues alone: a pitchfork of that one"
+            lost = "a multiplier comes to +1 and the corrector loses the orbit"
+            ending = f"near {end:.9g} {lost}: it touches +1 there, or another orbit meets it"
             end = max(start, end - _MERGING * samples.width)
         return Extent(start, end, folds, ending, beside=beside)
     # Near the fold multipliers move as a root of the distance, which a search cannot resolve.
@@ -271,7 +276,7 @@ def locate(
     return located(
         samples,
         lambda start, end: _crossings(samples, start, end, budget),
-        lambda crossing, block: [_described(samples, crossing, block, normal_form)],
+        lambda each, block: [_described(samples, one, block, normal_form) for one in _resolved(samples, each)],
         lambda fold: fold if normal_form else replace(fold, normal_form=None),
         _DESCRIBING,
     )
@@ -349,11 +354,48 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     return [(block, crossings_in(block, partial(whole, block), search)) for block in blocks]
 
 
+def _touches(samples: Samples, crossing: Crossing) -> bool:
+    """True if one multiplier, or one pair, touches the circle within the interval and goes back."""
+    alone = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1) and crossing.change == 0
+    return alone and not crossing.collision and samples.low < crossing.value < samples.high
+
+
+def _resolved(samples: Samples, crossing: Crossing) -> list[Crossing]:
+    """The crossing; for a touch by a followed orbit, whose multipliers are uncertain near +1, the crossings that orbits
+    with error bounds show in its surroundings."""
+    if samples.known or not _touches(samples, crossing):
+        return [crossing]
+
+    def margin(place: float) -> tuple[float, float]:
+        (sample,) = samples.at(np.array([place]))
+        spec = spectrum(bounded(samples.family(place), sample.orbit, sample.image.duration).image)
+        index = spec.nearest(crossing.multiplier)
+        return float(abs(spec.values[index])) - 1.0, float(spec.error[index])
+
+    places = np.linspace(*crossing.bracket, _ROUND_TOUCH)
+    known = {place: margin(place) for place in places.tolist()}
+    shape = Chebyshev.fit(places, [known[place][0] for place in places.tolist()], _ROUND_TOUCH // 2)
+    turns = np.asarray(shape.deriv().roots(), dtype=np.complex128)
+    for place in turns[np.abs(turns.imag) < np.ptp(places)].real.tolist():
+        if places[0] < place < places[-1]:
+            known[place] = margin(place)
+    sides = [(place, away > 0.0) for place, (away, error) in sorted(known.items()) if abs(away) > error]
+    number = crossing.multiplicity
+    found = [
+        replace(crossing, value=0.5 * (a + b), bracket=(a, b), change=number if after else -number)
+        for (a, before), (b, after) in itertools.pairwise(sides)
+        if before != after
+    ]
+    if not found:
+        a, b = crossing.bracket
+        said = f"touches the unit circle and goes back, or crosses it twice between {a:.9g} and {b:.9g}: errors hide it"
+        raise AnalysisError(said, field="multiplier")
+    return found
+
+
 def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> Found:
     """Description of a crossing of a known or followed orbit."""
-    # One multiplier, or one pair, touches the circle within the interval and goes back.
-    touch = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1) and crossing.change == 0
-    touch = touch and not crossing.collision and samples.low < crossing.value < samples.high
+    touch = _touches(samples, crossing)
 
     def bounded_at(value: float, state: Array, error: Array, duration: float) -> Orbit:
         return bounded(samples.family(value), state, duration, error)
