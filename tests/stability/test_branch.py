@@ -272,3 +272,13 @@ def test_the_first_point_of_a_doubled_branch_leads_to_the_same_branch():
         kinds = [(point.special, round(point.value, 9)) for point in branch.special_points]
         assert kinds == [(Kind.PERIOD_DOUBLING, 3.0), (Kind.PERIOD_DOUBLING, round(1.0 + 6.0**0.5, 9))]
         assert not branch.remarks
+
+
+@pytest.mark.parametrize("gap", [3e-5, 1e-5])
+def test_a_fold_near_another_branch_is_no_transcritical_point(gap):
+    """The orbits of x -> x - (x^2 - p^2 + gap^2) turn back at p = -gap, close before those that begin at p = gap."""
+    family = lambda p: from_map(lambda x: ([x[0] - x[0] ** 2 + p * p - gap * gap], [[1.0 - 2.0 * x[0]]]), 1)  # noqa: E731
+    branch = follow(family, begin(family, -0.5, [0.5]), (-0.5, 0.5))
+    (special,) = branch.special_points
+    assert special.special is Kind.FOLD
+    assert abs(special.value + gap) <= special.bifurcation.error_bound < 1e-9

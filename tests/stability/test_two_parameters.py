@@ -18,6 +18,7 @@ from chilopod.stability import (
     follow,
     follow2,
     from_map,
+    locate,
     switch2,
 )
 from chilopod.stability.codimension_two import detection
@@ -244,3 +245,23 @@ def test_a_multiplier_of_minus_1_breaks_a_symmetry_of_even_order(order, kind):
     (found,) = follow2(family2, point, ((-1.0, 1.0), (-0.31, 0.3)), second=-0.3, coefficients=False).special
     assert found.kind is kind
     np.testing.assert_allclose(found.values, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-3, 1.0])
+def test_states_at_zero_are_followed_as_others_are(shift):
+    """The curve of folds is p = 0 for all q, with a fold-flip at the origin; the second state is ``shift`` on it."""
+
+    def family2(p, q):
+        def image(x):
+            v = x[1] - shift
+            after = [x[0] - p - x[0] ** 2 + 0.1 * v**2, shift - (1.0 + q) * v + v**3]
+            return after, [[1.0 - 2.0 * x[0], 0.2 * v], [0.0, 3.0 * v**2 - 1.0 - q]]
+
+        return from_map(image, 2)
+
+    (point,) = locate(lambda p: family2(p, -0.3), (-0.2, 0.1), orbit=[0.44, shift])
+    curve = follow2(family2, point, ((-0.2, 0.1), (-0.5, 0.5)), second=-0.3)
+    assert set(curve.endings) == {Ending.LEFT_INTERVAL}
+    (special,) = curve.special
+    assert special.kind is CodimensionTwo.FOLD_FLIP
+    assert (np.abs(special.values) <= special.error_bound).all()

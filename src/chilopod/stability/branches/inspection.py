@@ -18,13 +18,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.special_points import Place, Within, special_point
+from chilopod.stability.branches.special_points import CLOSE, Place, Within, fold_within, special_point
 from chilopod.stability.crossing_place import crossings_in
 from chilopod.stability.interface import offers
 from chilopod.stability.points import ContinuumError
@@ -39,7 +38,6 @@ from chilopod.stability.unit_circle.zeros import FEW_PLACES, PLACES, interpolate
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
 _BUDGET = 400  # corrected orbits within one step
 _ERROR = 1e-10  # relative error of the return map's derivative at a corrected orbit
-_CLOSE = 1e-9  # precision of a located point along the curve, relative to the step
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a branch point
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
 _SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
@@ -60,7 +58,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     leaving = step.start.leaving
     rising = float(step.start.tangent[-1])
     # A curve that starts at a fold does not find it again.
-    turned = not leaving and abs(rising) > _CLOSE and rising * float(step.tangent[-1]) < 0.0
+    turned = not leaving and abs(rising) > CLOSE and rising * float(step.tangent[-1]) < 0.0
     flipped = not leaving and _sign(step.start.matrix) != _sign(step.matrix)
     foreseen = leaving or _sign(predicted(step.start, step.size).matrix) == _sign(step.matrix)
     if not foreseen and not flipped and step.size > _TELLING:
@@ -159,9 +157,9 @@ def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[Place], t
     for block, found in _searched(within) if crossed else ():
         if found.status in (SearchStatus.BUDGET, SearchStatus.INCOMPLETE):
             remarks += tuple(f"near {step.found.value:.6g}: {remark}" for remark in found.remarks)
-        places += [_placed(within, each, block) for each in found.crossings if each.value > _CLOSE * step.size]
+        places += [_placed(within, each, block) for each in found.crossings if each.value > CLOSE * step.size]
     if turned and not any(place.fold or place.branching for place in places):
-        fold = _fold(within, 0.0, step.size)
+        fold = fold_within(within, 0.0, step.size)
         if _branches_meet(within.at(fold.crossing.value)):  # a branch that leaves there, or an uncertain tangent
             fold = replace(fold, crossing=replace(fold.crossing, change=0), fold=False, branching=True)
         places.append(fold)
@@ -175,18 +173,8 @@ def _placed(within: Within, crossing: Crossing, block: Block | None) -> Place:
     before, after = within.sides(crossing.value)
     branching = _branches_meet(within.at(crossing.value))
     if float(before.tangent[-1] * after.tangent[-1]) < 0.0 and not branching:
-        return _fold(within, before.size, after.size)
+        return fold_within(within, before.size, after.size)
     return Place(crossing, block, branching=branching)
-
-
-def _fold(within: Within, a: float, b: float) -> Place:
-    """Place where the tangent's component along the parameter vanishes; it changes sign between two places."""
-
-    def along(place: float) -> float:
-        return float((within.at(place) if place else within.step.start).tangent[-1])
-
-    place = float(brentq(along, a, b, xtol=_CLOSE * within.step.size))
-    return Place(Crossing(place, (place, place), Event.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
 
 
 def _branches_meet(step: Step[Anchor, OnCurve]) -> bool:

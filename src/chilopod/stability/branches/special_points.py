@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
@@ -22,7 +23,10 @@ from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.equations import Plane, Step
 from chilopod.stability.tracing.tolerances import AWAY
 from chilopod.stability.tracing.tracer import Parts
-from chilopod.stability.unit_circle.spectra import Crossing, distances
+from chilopod.stability.unit_circle.spectra import Crossing, Event, distances
+
+CLOSE = 1e-9
+"""Precision of a located point along the curve, relative to the step."""
 
 SAME_ORBIT = 1e-6
 """Distance between states of one orbit, relative to the sizes of the states."""
@@ -115,6 +119,16 @@ class Place:
     branching: bool = False
 
 
+def fold_within(within: Within, a: float, b: float) -> Place:
+    """Place where the tangent's component along the parameter vanishes; it changes sign between two places."""
+
+    def along(place: float) -> float:
+        return float((within.at(place) if place else within.step.start).tangent[-1])
+
+    place = float(brentq(along, a, b, xtol=CLOSE * within.step.size))
+    return Place(Crossing(place, (place, place), Event.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
+
+
 def special_point(within: Within, place: Place) -> BranchPoint | None:
     """The special point at a place within a step; None without a critical multiplier there."""
     curve, crossing, block = within.curve, place.crossing, place.block
@@ -150,6 +164,10 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     point = replace(point, value=value)
     kind = Kind.FOLD if place.fold else None
     found = described(curve.system(value), (value, error), orbit, crossing, block, kind=kind)
+    if place.branching and found.kind is Kind.TRANSCRITICAL:
+        before, after = within.sides(crossing.value)
+        if float(before.tangent[-1] * after.tangent[-1]) < 0.0:  # a fold near another branch, which it does not meet
+            return special_point(within, fold_within(within, before.size, after.size))
     away = distances(np.array(found.multiplier), crossing.event)
     if (away > _CRITICAL and not crossing.collision) or np.isinf(found.error_bound):
         return None

@@ -35,6 +35,7 @@ from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_T
 Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
 
+_AT_ZERO = 1e6  # change over the box, relative to the sizes of the states, of an orbit at zero
 _STEP = 1e-6  # step of differences, in units of the frame: it affects only the speed of Newton's method
 _STALLED = 3  # corrections that did not halve a small residual, as Broyden's method may stall that long
 
@@ -252,16 +253,17 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
         size = sizes(system, place.state, image.duration)
-        if self.known or place.state.any() or offers(system, "scale"):
+        if self.known or offers(system, "scale"):
             return size
-        # The parameters set the size of an orbit that rests at zero.
+        # The parameters set the size of an orbit that rests at zero, but for round-off.
         reach = 0.0
         for j in range(2):
             values = place.values.copy()
             values[j] += self._inward(place, j) * self.widths[j]
             moved = self._mapped(replace(place, values=values), section, False)[1].state - image.state
             reach = max(reach, float((np.abs(moved) / size).max()) / _STEP)
-        return size * reach if reach > 0.0 else size
+        at_zero = reach > (_AT_ZERO if place.state.any() else 0.0)
+        return size * reach if at_zero else size
 
     def _inward(self, place: Place, j: int) -> float:
         """A step of one parameter, in units of its interval, that stays within it."""

@@ -128,7 +128,8 @@ class Curve2(Result):
             (each.kind.label, *(bounded(*pair) for pair in zip(each.values, each.error_bound, strict=True)))
             for each in self.special
         ]
-        ends = [" ".join((end.sentence, why)).strip() for end, why in zip(self.endings, self.reasons, strict=True)]
+        pairs = zip(self.endings, self.reasons, strict=True)
+        ends = [f"{end.sentence} ({why})" if why else end.sentence for end, why in pairs]
         return [
             f"Curve2: {self.kind.label}, {len(self.points)} points",
             f"from ({p:.9g}, {q:.9g}): {ends[0]}",
