@@ -11,9 +11,9 @@ from scipy.special import mathieu_a, mathieu_b
 
 from chilopod.errors import ParameterError
 from chilopod.stability.unit_circle.crossings import SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import Event, Spectra, symmetric
+from chilopod.stability.unit_circle.spectra import CircleEvent, Spectra, symmetric
 
-MINUS, PLUS, PAIR = Event.MINUS, Event.PLUS, Event.PAIR
+MINUS, PLUS, PAIR = CircleEvent.MINUS, CircleEvent.PLUS, CircleEvent.PAIR
 
 
 def family(matrix, error=1e-16):

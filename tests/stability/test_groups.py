@@ -9,7 +9,7 @@ import pytest
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import SymmetricKind, isotypic, symmetric_crossing
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.unit_circle.spectra import CircleEvent
 from helpers.spectra import farthest
 
 
@@ -314,7 +314,7 @@ def crossing(generators, critical, number=-1):
     ],
 )
 def test_crossing_at_plus_one(generators, kind, quadratic, axial):
-    found = crossing(generators, Event.PLUS)
+    found = crossing(generators, CircleEvent.PLUS)
     assert found.kind is kind
     assert found.quadratic == quadratic
     assert found.complete
@@ -324,13 +324,13 @@ def test_crossing_at_plus_one(generators, kind, quadratic, axial):
 @pytest.mark.parametrize("cells", range(3, 13))
 def test_dihedral_axes(cells):
     faithful = [block for block in isotypic(finite_group(dihedral(cells))) if block.kernel.sum() == 1][-1]
-    assert len(symmetric_crossing(faithful, Event.PLUS).branches) == (1 if cells % 2 else 2)
+    assert len(symmetric_crossing(faithful, CircleEvent.PLUS).branches) == (1 if cells % 2 else 2)
 
 
 def test_isotropy_of_axial_branches_is_what_the_modes_keep():
     group = finite_group(GROUPS["S4"])
     block = isotypic(group)[-1]
-    for branch in symmetric_crossing(block, Event.PLUS).branches:
+    for branch in symmetric_crossing(block, CircleEvent.PLUS).branches:
         mode = block.mode([1.0], branch.direction)
         assert np.abs(mode.imag).max() == 0.0
         kept = np.abs(group.elements @ mode - mode).max(axis=1) < 1e-12
@@ -339,14 +339,14 @@ def test_isotropy_of_axial_branches_is_what_the_modes_keep():
 
 
 def test_no_lines_are_looked_for_at_a_pair():
-    found = crossing(cyclic(5), Event.PAIR)
+    found = crossing(cyclic(5), CircleEvent.PAIR)
     assert found.kind is SymmetricKind.SYMMETRIC_NEIMARK_SACKER
     assert found.branches == ()
 
 
 def test_period_doubling_has_no_quadratic_terms_and_keeps_shifts_by_the_old_period():
-    assert crossing(np.eye(1)[None], Event.MINUS).kind is SymmetricKind.SYMMETRY_KEPT
-    found = crossing(dihedral(3), Event.MINUS)
+    assert crossing(np.eye(1)[None], CircleEvent.MINUS).kind is SymmetricKind.SYMMETRY_KEPT
+    found = crossing(dihedral(3), CircleEvent.MINUS)
     assert found.kind is SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
     assert found.quadratic == 0
     # A mirror keeps the orbits, or does so together with the shift.

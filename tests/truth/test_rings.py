@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from chilopod.stability.symmetry.groups import commutes, finite_group
 from chilopod.stability.symmetry.isotypic import SymmetricKind, isotypic, symmetric_crossing
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.unit_circle.spectra import CircleEvent
 from helpers.spectra import farthest
 
 
@@ -86,7 +86,7 @@ def test_five_van_der_pol_cells():
         root = cmath.sqrt(0.25 * growth**2 - stiffness)
         known = [cmath.exp((0.5 * growth + sign * root) * duration) for sign in (1, -1)]
         assert farthest(np.linalg.eigvals(matrix), known) < 1e-13
-        crossing = symmetric_crossing(block, Event.PAIR)
+        crossing = symmetric_crossing(block, CircleEvent.PAIR)
         assert crossing.kind is (
             SymmetricKind.SYMMETRY_KEPT if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER
         )

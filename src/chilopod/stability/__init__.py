@@ -13,6 +13,7 @@ from chilopod.flows.rhs import Event
 from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, switch
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.two_parameters import follow2, switch2
+from chilopod.stability.continuation.tracer import Ending
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.hopf import locate_hopf
@@ -25,7 +26,6 @@ from chilopod.stability.search.locate import Located, locate
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.isotypic import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.system import PeriodicSystem, from_map, from_rhs
-from chilopod.stability.tracing.tracer import Ending
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
 __all__ = [

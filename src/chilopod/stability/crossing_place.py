@@ -23,7 +23,7 @@ from chilopod.stability.spectrum import Spectrum, disturbed, return_multipliers,
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings
-from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event, Matrices, distances
+from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossing, Matrices, distances
 
 
 def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...], tuple[str, ...]]:
@@ -123,7 +123,7 @@ class Course:
 
 def critical_multipliers(spec: Spectrum, crossing: Crossing) -> NDArray[np.intp]:
     """Indices of the multipliers that are critical at a crossing, the nearest first."""
-    if crossing.event is not Event.PAIR:
+    if crossing.event is not CircleEvent.PAIR:
         return np.argsort(distances(spec.values, crossing.event), kind="stable")[: crossing.multiplicity]
     # The requested one of a pair comes first.
     nu = crossing.multiplier
@@ -155,7 +155,7 @@ def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
     between = spectrum(replace(image, jacobian=0.5 * (before + after), error=0.0))
     critical = critical_multipliers(between, crossing)
     left, right = between.left[:, critical], between.right[:, critical]
-    if crossing.event is Event.PAIR:
+    if crossing.event is CircleEvent.PAIR:
         nu = between.values[critical]
         moved = np.einsum("ik,ij,jk->k", left.conj(), after - before, right)
         return float(np.abs((nu.conj() * moved).real / np.abs(nu)).min()) / apart
@@ -190,7 +190,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
 
 def _collision(matrix: Array, crossing: Crossing) -> float:
     values = np.linalg.eigvals(matrix).astype(np.complex128)
-    if crossing.event is not Event.PAIR:
+    if crossing.event is not CircleEvent.PAIR:
         near = np.argsort(distances(values, crossing.event))[:2]
         return float(np.prod(values[near] - TARGETS[crossing.event]).real)
     sums = values + 1.0 / values
@@ -221,7 +221,7 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     together until interpolations of two orders agree. None if the orbit is regular, there is no room, or another
     multiplier is as near +1.
     """
-    if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
+    if crossing.event is not CircleEvent.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
     tried: list[tuple[float, float, _Interpolation]] = []
     for nodes, reach in _nodes(course, crossing.value):

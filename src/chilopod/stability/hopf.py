@@ -32,7 +32,7 @@ from chilopod.stability.search.samples import Samples
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import Crossing, Event
+from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
 _EPSILON = float(np.finfo(float).eps)
@@ -135,7 +135,7 @@ def _piece(
         return [(None, find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable))]
 
     def described(crossing: Crossing, _: Block | None) -> list[Found]:
-        if crossing.event is Event.PLUS:
+        if crossing.event is CircleEvent.PLUS:
             return [f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one"]
         if crossing.collision:
             return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]

@@ -22,7 +22,7 @@ from chilopod.stability.shown import Shown, bounded, number
 from chilopod.stability.spectrum import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.symmetry.isotypic import Block, SymmetricCrossing, SymmetricKind, symmetric_crossing
-from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event
+from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossing
 
 
 class Kind(Labelled):
@@ -218,25 +218,25 @@ def described(
     scale = np.abs(peak) / peak / _mean_size(system, orbit, mode)
     mode, left = mode * scale, left / scale.conjugate()
     frequency, k = 0.0, orbit.image.returns
-    if crossing.event is Event.PAIR:
+    if crossing.event is CircleEvent.PAIR:
         angle = float(np.angle(np.exp(1j * k * np.angle(nu))))
         # The mode of a conjugate pair with positive frequency.
         if angle < 0:
             nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
         frequency = angle / orbit.period
-    elif crossing.event is Event.MINUS and k % 2:
+    elif crossing.event is CircleEvent.MINUS and k % 2:
         frequency = np.pi / orbit.period
-    simple = critical.size == (2 if crossing.event is Event.PAIR else 1)
+    simple = critical.size == (2 if crossing.event is CircleEvent.PAIR else 1)
     breaking = block is not None and not block.trivial
     form = None
     # At +1 the normal form, or a broken symmetry, determines the kind.
-    asked = with_normal_form or (crossing.event is Event.PLUS and not breaking and kind is None)
+    asked = with_normal_form or (crossing.event is CircleEvent.PLUS and not breaking and kind is None)
     if simple and asked and not crossing.collision:
         form = _formed(system, orbit, crossing.event, nu, mode, left)
     # No orbits branch off from a Krein collision, whatever the symmetries.
-    branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
+    branching = block is not None and not (crossing.collision and crossing.event is CircleEvent.PAIR)
     symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
-    if kind is None and crossing.event is Event.PLUS and not crossing.collision:
+    if kind is None and crossing.event is CircleEvent.PLUS and not crossing.collision:
         alone = simple and (form is None or form.status is not NormalFormStatus.SEVERAL_CRITICAL)
         if not alone and _is_continuum(system, orbit, mode):
             count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
@@ -304,12 +304,12 @@ def _is_continuum(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> bool:
 
 
 def _formed(
-    system: SystemLike, orbit: Orbit, event: Event, nu: complex, mode: ComplexArray, left: ComplexArray
+    system: SystemLike, orbit: Orbit, event: CircleEvent, nu: complex, mode: ComplexArray, left: ComplexArray
 ) -> NormalForm | None:
     """The normal form for one critical multiplier or pair; None if it cannot be computed."""
     image = orbit.image
-    exact = nu / abs(nu) if event is Event.PAIR else complex(TARGETS[event])
-    if event is not Event.PAIR:
+    exact = nu / abs(nu) if event is CircleEvent.PAIR else complex(TARGETS[event])
+    if event is not CircleEvent.PAIR:
         mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
     bounded = replace(image, error=np.nan_to_num(image.error, nan=0.0, posinf=0.0))
     scale = sizes(system, orbit.state, image.duration)
@@ -363,10 +363,10 @@ def _along_axis(system: SystemLike, orbit: Orbit, mode: Array) -> Kind:
 
 def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: SymmetricCrossing | None) -> Kind:
     if crossing.collision:
-        return Kind.KREIN_COLLISION if crossing.event is Event.PAIR else Kind.COLLISION
-    if crossing.event is Event.PAIR:
+        return Kind.KREIN_COLLISION if crossing.event is CircleEvent.PAIR else Kind.COLLISION
+    if crossing.event is CircleEvent.PAIR:
         return Kind.NEIMARK_SACKER
-    if crossing.event is Event.MINUS:
+    if crossing.event is CircleEvent.MINUS:
         return Kind.PERIOD_DOUBLING if returns % 2 else Kind.PITCHFORK
     if broken is not None:
         return Kind.PITCHFORK if broken.quadratic == 0 else Kind.TRANSCRITICAL
@@ -381,7 +381,7 @@ def _modes(
     critical = critical_multipliers(spec, crossing)
     if block is None or symmetry is None or not symmetry.branches or critical.size > 2 * block.dimension:
         vectors = spec.right[:, critical]
-        if crossing.event is Event.PAIR:
+        if crossing.event is CircleEvent.PAIR:
             return vectors
         real = np.linalg.svd(np.hstack([vectors.real, vectors.imag]))[0][:, : critical.size]
         return real.astype(np.complex128)

@@ -27,15 +27,15 @@ from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchP
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Found, inspect
+from chilopod.stability.continuation.equations import Step
+from chilopod.stability.continuation.tolerances import SHORTEST
+from chilopod.stability.continuation.tracer import Ending, outward, trace
 from chilopod.stability.interface import Family, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import carried, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum import VERDICTS
-from chilopod.stability.tracing.equations import Step
-from chilopod.stability.tracing.tolerances import SHORTEST
-from chilopod.stability.tracing.tracer import Ending, outward, trace
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,12 +11,12 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.stability.continuation.equations import Before
 from chilopod.stability.interface import Family, SystemLike, returns_per_period, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
 from chilopod.stability.spectrum import stable_within
 from chilopod.stability.symmetry.groups import symmetric_basis
-from chilopod.stability.tracing.equations import Before
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class BranchPoint(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False)
 class Anchor(ReadOnlyArrays):
-    """A point from which steps start: see :class:`chilopod.stability.tracing.equations.Anchor`."""
+    """A point from which steps start: see :class:`chilopod.stability.continuation.equations.Anchor`."""
 
     last: BranchPoint  # the point
     matrix: Array  # Jacobian of [H - x; tangent . step] by state and parameter, in units, shape (n+1, n+1)

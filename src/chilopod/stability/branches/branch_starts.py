@@ -17,7 +17,7 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symme
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.interface import Family, SystemLike, is_autonomous, offers, returns_per_period, sizes, system_of
-from chilopod.stability.orbits.orbit import Orbit, bounded, known_state, searched_orbit
+from chilopod.stability.orbits.orbit import Orbit, known_state, searched_orbit, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import Section, carried, returned_states, whole_period
 
@@ -294,7 +294,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
         tangent = np.append(start.mode / units[:-1], 0.0)
         tangent /= np.linalg.norm(tangent)
     leaving = start.mode is not None
-    known = image if leaving else bounded(curve.system(start.value), start.orbit, image.duration).image
+    known = image if leaving else with_bounds(curve.system(start.value), start.orbit, image.duration).image
     values, bound = curve.multipliers(known)
     about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": curve.periods}
     if start.bifurcation is not None:

@@ -24,13 +24,13 @@ from chilopod.stability.branches.branch_points import (
     symmetric_space,
     within_space,
 )
+from chilopod.stability.continuation.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
+from chilopod.stability.continuation.tolerances import SETTLED, SHARPEST_TURN
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import checked_flow, is_autonomous, offers
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
 from chilopod.stability.returns import ReturnMap, Section, in_parts, on_section, return_duration, section_at
 from chilopod.stability.spectrum import return_multipliers, spectrum
-from chilopod.stability.tracing.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
-from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises

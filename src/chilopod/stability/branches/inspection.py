@@ -24,15 +24,15 @@ from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import CLOSE, Place, Within, fold_within, special_point
+from chilopod.stability.continuation.equations import Step, predicted
 from chilopod.stability.crossing_place import crossings_in
 from chilopod.stability.interface import offers
 from chilopod.stability.points import ContinuumError
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.tracing.equations import Step, predicted
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event, Matrices, factors
+from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossing, Matrices, factors
 from chilopod.stability.unit_circle.zeros import FEW_PLACES, PLACES, interpolated
 
 _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
@@ -68,14 +68,14 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
         return Found()
     places, remarks = _places(within, crossed, turned)
     branching = any(place.branching for place in places)
-    touches = any(each.crossing.event is Event.PLUS and each.crossing.change == 0 for each in places)
+    touches = any(each.crossing.event is CircleEvent.PLUS and each.crossing.change == 0 for each in places)
     if (flipped and not branching) or (touches and not flipped and step.size > _TELLING):
         raise AnalysisError("the step landed on another curve", field="step")
     sure = offers(curve.system(step.found.value), "flow_with_error")
     found: list[tuple[float, BranchPoint]] = []
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event
-        if (sure or (leaving and event is Event.PLUS)) and not _confirmed(within, place):
+        if (sure or (leaving and event is CircleEvent.PLUS)) and not _confirmed(within, place):
             remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which does not count",)
             continue
         try:
@@ -129,7 +129,7 @@ def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
         spec = spectrum(image)
         index = int(np.abs(spec.values - crossing.multiplier).argmin())
         nu = spec.values[index]
-        if crossing.event is Event.PAIR:
+        if crossing.event is CircleEvent.PAIR:
             return np.array([abs(nu) - 1.0]), spec.error[[index]], image
         target = TARGETS[crossing.event]
         distances = np.abs(spec.values - target)
@@ -168,7 +168,7 @@ def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[Place], t
 
 def _placed(within: Within, crossing: Crossing, block: Block | None) -> Place:
     """Place where multipliers cross."""
-    if crossing.event is not Event.PLUS:
+    if crossing.event is not CircleEvent.PLUS:
         return Place(crossing, block)
     before, after = within.sides(crossing.value)
     branching = _branches_meet(within.at(crossing.value))
@@ -217,7 +217,7 @@ def _crossed_within(within: Within) -> bool:
         known |= {place: within.near_jacobian(place) for place in places if place not in known}
         nu = np.linalg.eigvals(np.array([known[place] for place in places])).astype(np.complex128)
         with np.errstate(all="ignore"):  # test functions, which change sign at the events
-            tests = np.stack([factors(nu, event).prod(axis=1).real for event in Event], axis=1)
+            tests = np.stack([factors(nu, event).prod(axis=1).real for event in CircleEvent], axis=1)
         outside = (np.abs(nu) > 1.0).sum(axis=1)
         if not np.isfinite(tests).all() or (outside != outside[0]).any():
             return True
@@ -238,5 +238,5 @@ def _crossed_between_ends(within: Within, turned: bool) -> bool:
         real, outside = np.abs(nu.imag) < 1e-9 * np.maximum(1e-3, np.abs(nu)), np.abs(nu) > 1.0
         beyond = (real & (nu.real < -1.0), real & (nu.real > 1.0), ~real & outside & (nu.imag > 0.0))
         counts.append([int(each.sum()) for each in beyond])
-    changed = {event for event, a, b in zip(Event, *counts, strict=True) if a != b}
-    return bool(changed - {Event.PLUS} if turned else changed)
+    changed = {event for event, a, b in zip(CircleEvent, *counts, strict=True) if a != b}
+    return bool(changed - {CircleEvent.PLUS} if turned else changed)

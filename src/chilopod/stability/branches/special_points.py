@@ -15,15 +15,15 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.curve import Curve
+from chilopod.stability.continuation.equations import Plane, Step
+from chilopod.stability.continuation.tolerances import AWAY
+from chilopod.stability.continuation.tracer import Parts
 from chilopod.stability.crossing_place import SAFETY, Course, Sample, orbit_blocks, past_singular, place_error
-from chilopod.stability.orbits.orbit import Orbit, bounded, searched_orbit
+from chilopod.stability.orbits.orbit import Orbit, searched_orbit, with_bounds
 from chilopod.stability.points import Kind, described
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.tracing.equations import Plane, Step
-from chilopod.stability.tracing.tolerances import AWAY
-from chilopod.stability.tracing.tracer import Parts
-from chilopod.stability.unit_circle.spectra import Crossing, Event, distances
+from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, distances
 
 CLOSE = 1e-9
 """Precision of a located point along the curve, relative to the step."""
@@ -126,7 +126,7 @@ def fold_within(within: Within, a: float, b: float) -> Place:
         return float((within.at(place) if place else within.step.start).tangent[-1])
 
     place = float(brentq(along, a, b, xtol=CLOSE * within.step.size))
-    return Place(Crossing(place, (place, place), Event.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
+    return Place(Crossing(place, (place, place), CircleEvent.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
 
 
 def special_point(within: Within, place: Place) -> BranchPoint | None:
@@ -148,7 +148,7 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
 
         def bounded_at(_: float, moved: Array, error: Array, duration: float) -> Orbit:
             x, value = curve.reached(start, moved)
-            return bounded(curve.system(value), x, duration, error[:-1] * curve.units(x.size)[:-1])
+            return with_bounds(curve.system(value), x, duration, error[:-1] * curve.units(x.size)[:-1])
 
         regular = past_singular(course, crossing, bounded_at)
     if regular is None:

@@ -25,12 +25,12 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
+from chilopod.stability.continuation.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 from chilopod.stability.interface import SystemLike, offers, returns_per_period, sizes, system_of
 from chilopod.stability.orbits.orbit import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.symmetry.groups import symmetric_states
-from chilopod.stability.tracing.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
-from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 
 Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
@@ -108,7 +108,7 @@ class Evaluated(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False)
 class Spot(Evaluated):
-    """Point of a curve from which steps start (:class:`~chilopod.stability.tracing.equations.Anchor`), in its frame."""
+    """Point of a curve, in its frame: an :class:`~chilopod.stability.continuation.equations.Anchor` of steps."""
 
     matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
     tangent: Array  # unit tangent, shape (m + k + 1,)

@@ -10,9 +10,9 @@ import numpy as np
 
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.labels import Labelled
+from chilopod.stability.continuation.tracer import Ending
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, mark, rows
-from chilopod.stability.tracing.tracer import Ending
 
 if TYPE_CHECKING:
     import xarray as xr

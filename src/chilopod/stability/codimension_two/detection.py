@@ -20,15 +20,15 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Spot
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
+from chilopod.stability.continuation.equations import Step
+from chilopod.stability.continuation.tracer import Parts
 from chilopod.stability.normal_forms.manifold import CriticalOrbit, ReturnedStates
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.returns import returned_states
 from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.groups import reverses
-from chilopod.stability.tracing.equations import Step
-from chilopod.stability.tracing.tracer import Parts
-from chilopod.stability.unit_circle.spectra import TARGETS, Event
+from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent
 
 _SAFETY = 1.5
 _BESIDE = 1e-3  # step of the differences of a test function, relative to the curve's step
@@ -47,7 +47,7 @@ class Own(enum.Enum):
     DOUBLE = enum.auto()
 
 
-Signal = Own | Event | CodimensionTwo
+Signal = Own | CircleEvent | CodimensionTwo
 """Test functions: those above; of other multipliers, +1, -1 or a pair on the circle; of a pair, one resonance each."""
 
 Signals = dict[Signal, tuple[float, float]]
@@ -112,7 +112,7 @@ class Detector:
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
         self._curve, self._kind, self._coefficients = curve, kind, coefficients
         form = (Own.COEFFICIENT,) if coefficients else ()
-        self._signals: tuple[Signal, ...] = (*form, *((Own.DOUBLE,) if curve.target else _COSINES), *Event)
+        self._signals: tuple[Signal, ...] = (*form, *((Own.DOUBLE,) if curve.target else _COSINES), *CircleEvent)
 
     def station(self, spot: Spot) -> Station:
         """The point at a spot, and the test functions."""
@@ -179,7 +179,7 @@ class Detector:
             factor = here.overlap if self._curve.target else 1.0
             return value * factor, error * abs(factor)
         nu, errors = here.spectrum.values[here.others], here.spectrum.error[here.others]
-        if signal is Event.PAIR:
+        if signal is CircleEvent.PAIR:
             first, second = np.triu_indices(nu.size, 1)
             sizes, off = np.abs(nu), errors[first] * np.abs(nu[second]) + errors[second] * np.abs(nu[first])
             return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], off)
@@ -240,7 +240,7 @@ class Detector:
         if signal is Own.DOUBLE:
             return CodimensionTwo.RESONANCE_1_1 if target > 0 else CodimensionTwo.RESONANCE_1_2
         nu = here.spectrum.values[here.others]
-        if signal is Event.PAIR:
+        if signal is CircleEvent.PAIR:
             complex_ones = np.abs(np.abs(nu) - 1.0)[np.abs(nu.imag) > _COMPLEX]
             # Two real multipliers with product 1 are not critical.
             reals = nu[np.abs(nu.imag) <= _COMPLEX].real

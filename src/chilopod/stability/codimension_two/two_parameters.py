@@ -1,6 +1,6 @@
 """Curves of bifurcation points in two parameters, and curves of folds that leave points of codimension two.
 
-The tracer (see :mod:`chilopod.stability.tracing.tracer`) follows them with the equations of :mod:`.bordered`, and
+The tracer (see :mod:`chilopod.stability.continuation.tracer`) follows them with the equations of :mod:`.bordered`, and
 points of codimension two are located within each step (see :mod:`.detection`).
 
 Where the cubic coefficient c of a -> (1 + b) a + c a^3 + e a^5 vanishes on a curve of period doublings or pitchforks
@@ -24,12 +24,12 @@ from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
+from chilopod.stability.continuation.equations import Step
+from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.interface import offers, sizes, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import return_duration, whole_period
 from chilopod.stability.symmetry.groups import reverses
-from chilopod.stability.tracing.equations import Step
-from chilopod.stability.tracing.tracer import Ending, trace
 
 BUDGET = 20_000
 """Default budget of a curve, in return maps with derivatives."""

@@ -298,7 +298,7 @@ def near_orbit(
     if with_error:
         if system.symmetry is not None and not is_autonomous(system):
             _check_symmetry(system, x, duration, size)
-        return bounded(system, x, duration)
+        return with_bounds(system, x, duration)
     section = section_at(system, x, units, duration)
     image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
@@ -315,7 +315,7 @@ def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array) 
         raise AnalysisError(said, field="symmetry", allowed=allowed)
 
 
-def bounded(system: SystemLike, x: Array, duration: float, error: Array | None = None) -> Orbit:
+def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | None = None) -> Orbit:
     """The orbit through a state on it, shape (n,), with the section across its motion and with error bounds, by the
     approximate ``duration`` of a return; ``error`` is a bound on the state's error, shape (n,), if known."""
     size = sizes(system, x, duration)

@@ -21,16 +21,15 @@ from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
 from chilopod.stability.crossing_place import Course, Sample, crossings_in, orbit_blocks, past_singular, place_error
 from chilopod.stability.interface import Family, returns_per_period
-from chilopod.stability.orbits.orbit import Orbit, bounded, from_known
+from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.search.samples import NEAR_FOLD, SPENT, Samples
-from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
-from chilopod.stability.shown import bounded as bounded_text
+from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, rows, said
 from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import Crossing, Event, Matrices
+from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, Matrices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -307,7 +306,7 @@ def located(
         status = status.worst(found.status)
         results += found.remarks
         for crossing in found.crossings:
-            if crossing.event is Event.PLUS and here.explains(crossing.value):
+            if crossing.event is CircleEvent.PLUS and here.explains(crossing.value):
                 continue
             samples.allow(returns)
             try:
@@ -356,7 +355,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
 
 def _touches(samples: Samples, crossing: Crossing) -> bool:
     """True if one multiplier, or one pair, touches the circle within the interval and goes back."""
-    alone = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1) and crossing.change == 0
+    alone = crossing.multiplicity <= (2 if crossing.event is CircleEvent.PAIR else 1) and crossing.change == 0
     return alone and not crossing.collision and samples.low < crossing.value < samples.high
 
 
@@ -368,7 +367,7 @@ def _resolved(samples: Samples, crossing: Crossing) -> list[Crossing]:
 
     def margin(place: float) -> tuple[float, float]:
         (sample,) = samples.at(np.array([place]))
-        spec = spectrum(bounded(samples.family(place), sample.orbit, sample.image.duration).image)
+        spec = spectrum(with_bounds(samples.family(place), sample.orbit, sample.image.duration).image)
         index = spec.nearest(crossing.multiplier)
         return float(abs(spec.values[index])) - 1.0, float(spec.error[index])
 
@@ -398,7 +397,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     touch = _touches(samples, crossing)
 
     def bounded_at(value: float, state: Array, error: Array, duration: float) -> Orbit:
-        return bounded(samples.family(value), state, duration, error)
+        return with_bounds(samples.family(value), state, duration, error)
 
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
     # A symmetry-breaking mode is not part of the orbit, which is regular among symmetric states.
@@ -407,19 +406,19 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     if regular is None:
         value, (sample,) = crossing.value, samples.at(np.array([crossing.value]))
         system, x, image = samples.family(value), sample.orbit, sample.image
-        orbit = from_known(system, x, image=image) if samples.known else bounded(system, x, image.duration)
+        orbit = from_known(system, x, image=image) if samples.known else with_bounds(system, x, image.duration)
         bound = place_error(course, crossing, orbit.image)
     else:
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit
     # Where an orbit is lost the point may be its fold.
     lost = samples.end < samples.high and value + bound >= samples.end
-    kind = Kind.BRANCH_POINT if (touch or (lost and trivial)) and crossing.event is Event.PLUS else None
+    kind = Kind.BRANCH_POINT if (touch or (lost and trivial)) and crossing.event is CircleEvent.PLUS else None
     system, asked = samples.family(value), with_normal_form and not touch
     point = described(system, (value, bound), orbit, crossing, block, kind=kind, with_normal_form=asked)
     if not point.error_bound < samples.width:
         raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
     if touch:
-        value_text = bounded_text(point.value, point.error_bound)
+        value_text = bounded(point.value, point.error_bound)
         return f"at {value_text} a multiplier only touches the unit circle and goes back: nothing changes"
     return point
 

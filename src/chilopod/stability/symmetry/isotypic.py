@@ -24,7 +24,7 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.stability.symmetry.groups import Group, Images
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.unit_circle.spectra import CircleEvent
 
 _TRIES = 8  # random matrices, of which one in millions is not generic
 _DISTINCT = 1e-7  # distance of eigenvalues of a random matrix of norm one that count as equal
@@ -232,13 +232,13 @@ class SymmetricCrossing:
     complete: bool
 
 
-def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> SymmetricCrossing:
+def symmetric_crossing(block: Block, critical: CircleEvent, returns: int = 1) -> SymmetricCrossing:
     """Crossing of the unit circle by a simple eigenvalue of a block's reduced matrix. With an even number of returns in
     a period, -1 breaks the symmetry in time: the new orbits have the same period, not twice that."""
     # At -1 the shift by one return makes all terms odd.
-    quadratic = _quadratics(block.representation) if critical is Event.PLUS else 0
+    quadratic = _quadratics(block.representation) if critical is CircleEvent.PLUS else 0
     kind = _kind(block, critical, quadratic, returns)
-    if critical is Event.PAIR or not block.real:  # fixed-point spaces of the complex type have even dimensions
+    if critical is CircleEvent.PAIR or not block.real:  # fixed-point spaces of the complex type have even dimensions
         return SymmetricCrossing(kind, quadratic, (), True)
     lines, complete = _fixed_lines(block.representation, critical)
     branches = [_branch(line, block, critical) for line in lines]
@@ -246,12 +246,12 @@ def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> Symme
     return SymmetricCrossing(kind, quadratic, tuple(branches), complete)
 
 
-def _kind(block: Block, critical: Event, quadratic: int, returns: int) -> SymmetricKind:
-    if block.trivial and not (critical is Event.MINUS and returns % 2 == 0):
+def _kind(block: Block, critical: CircleEvent, quadratic: int, returns: int) -> SymmetricKind:
+    if block.trivial and not (critical is CircleEvent.MINUS and returns % 2 == 0):
         return SymmetricKind.SYMMETRY_KEPT
-    if critical is Event.PAIR:
+    if critical is CircleEvent.PAIR:
         return SymmetricKind.SYMMETRIC_NEIMARK_SACKER
-    if critical is Event.MINUS and returns % 2:
+    if critical is CircleEvent.MINUS and returns % 2:
         return SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
     if block.dimension == 1:
         return SymmetricKind.PITCHFORK
@@ -264,12 +264,12 @@ def _quadratics(rho: Array) -> int:
     return round(float((one * (one**2 + two)).mean() / 2.0))
 
 
-def _fixed_lines(rho: Array, critical: Event) -> tuple[list[Array], bool]:
+def _fixed_lines(rho: Array, critical: CircleEvent) -> tuple[list[Array], bool]:
     """Unit vectors of the lines that are the fixed-point space of a subgroup (an intersection of those of single
     elements, at -1 with either sign), one of each class of conjugate ones; and True if the search was complete."""
     rho = _once(rho)
     most = _MOST_ENTRIES // rho.shape[1] ** 2
-    signed = np.concatenate([rho, -rho]) if critical is Event.MINUS else rho
+    signed = np.concatenate([rho, -rho]) if critical is CircleEvent.MINUS else rho
     # Eigenvectors of an orthogonal matrix to the eigenvalue 1 are those of its symmetric part.
     cosines, vectors = np.linalg.eigh(0.5 * (signed + np.swapaxes(signed, 1, 2)))
     projectors = _once((vectors * (cosines > 1.0 - _NULL)[:, None]) @ np.swapaxes(vectors, 1, 2))
@@ -313,9 +313,9 @@ def _once(matrices: Array) -> Array:
     return matrices[[images.new(image) for image in matrices @ images.probes]]
 
 
-def _branch(line: Array, block: Block, critical: Event) -> AxialBranch:
+def _branch(line: Array, block: Block, critical: CircleEvent) -> AxialBranch:
     w = line * np.sign(line[np.abs(line).argmax()])
     cosines = np.einsum("a,gab,b->g", w, block.representation, w)
-    kept = (np.abs(cosines) if critical is Event.MINUS else cosines) > 1.0 - _ALIGNED
-    turned = critical is Event.MINUS or bool((cosines < _ALIGNED - 1.0).any())
+    kept = (np.abs(cosines) if critical is CircleEvent.MINUS else cosines) > 1.0 - _ALIGNED
+    turned = critical is CircleEvent.MINUS or bool((cosines < _ALIGNED - 1.0).any())
     return AxialBranch(w, np.flatnonzero(kept), turned)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chilopod.stability.unit_circle.spectra import UNKNOWN, Crossing, Event, Root, Spectra, margins
+from chilopod.stability.unit_circle.spectra import UNKNOWN, CircleEvent, Crossing, Root, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
 
 LOST = "multipliers near the circle are known no better than their distance from it"
@@ -106,7 +106,7 @@ class Accounts:
         outside = int((found > errors).sum())
         if not spectra.conservative:
             return outside if int((np.abs(found) <= errors).sum()) <= spectra.resting else None
-        for event in Event:
+        for event in CircleEvent:
             # Multipliers that meet may have left the circle or not.
             sizes, uncertain = spectra.factor_sizes(place, event)
             if (sizes <= _GREY * uncertain)[spectra.idle[event] :].any():
@@ -217,7 +217,7 @@ class Accounts:
             return 2 * abs(change) <= number and (root.touch or change != 0)
         if root.touch:
             return change == 0
-        alone = len(crossings) == 1 and number == (2 if crossings[0].event is Event.PAIR else 1)
+        alone = len(crossings) == 1 and number == (2 if crossings[0].event is CircleEvent.PAIR else 1)
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
     def _followed(self, x: float, y: float, before: int, after: int) -> list[Root]:
@@ -261,7 +261,7 @@ class Accounts:
             if (count := self.count(middle)) is None:
                 break
             x, y = (middle, y) if count == before else (x, middle)
-        for event in (Event.MINUS, Event.PLUS, Event.PAIR):
+        for event in (CircleEvent.MINUS, CircleEvent.PLUS, CircleEvent.PAIR):
             root = Root(0.5 * x + 0.5 * y, x, y, event)
             if (x, y) != gap and self._is_critical(root) and self._explains(root, after - before):
                 return [root]
@@ -321,7 +321,7 @@ def _without_shadows(roots: list[Root]) -> list[Root]:
 def _outside_near(spectra: Spectra, crossing: Crossing, place: float) -> int:
     """Number of the multipliers nearest to the critical ones outside the circle, at a place beside a crossing."""
     nu, number = spectra.at(np.array([place]))[0], crossing.multiplicity
-    times = 2 if crossing.event is Event.PAIR else 1
+    times = 2 if crossing.event is CircleEvent.PAIR else 1
     if times == 2:
         nu = nu[nu.imag > 0.0]
     nearest = np.argsort(np.abs(nu - crossing.multiplier))[: number // times]

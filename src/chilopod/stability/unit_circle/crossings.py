@@ -17,7 +17,16 @@ from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
-from chilopod.stability.unit_circle.spectra import TARGETS, Crossing, Event, Matrices, Root, Spectra, factors, margins
+from chilopod.stability.unit_circle.spectra import (
+    TARGETS,
+    CircleEvent,
+    Crossing,
+    Matrices,
+    Root,
+    Spectra,
+    factors,
+    margins,
+)
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
 BUDGET = 5000  # default budget of matrices of a search
@@ -129,8 +138,8 @@ class _Finder:
             report.leave("there is no matrix anywhere")
             return SearchStatus.INCOMPLETE, []
         self._rest(first)
-        events = [event for event in Event if spectra.idle[event] < self._factors(event) <= _MANY]
-        if self._factors(Event.PAIR) > _MANY:
+        events = [event for event in CircleEvent if spectra.idle[event] < self._factors(event) <= _MANY]
+        if self._factors(CircleEvent.PAIR) > _MANY:
             self._probe()
         found = self._searched(events)
         roots = [root for event in events for root in self._roots(event, found[event])]
@@ -140,23 +149,23 @@ class _Finder:
             status = SearchStatus.BUDGET if report.spent else SearchStatus.INCOMPLETE
         return status, crossings
 
-    def _factors(self, event: Event) -> int:
+    def _factors(self, event: CircleEvent) -> int:
         m = self.spectra.size
-        return m if event is not Event.PAIR else m * (m - 1) // 2
+        return m if event is not CircleEvent.PAIR else m * (m - 1) // 2
 
     def _rest(self, places: Array) -> None:
         """Find factors that are critical at all places, with remarks."""
-        idle = self.spectra.idle = {event: self._idle(places, event) for event in Event}
-        for event in (Event.PLUS, Event.MINUS):
+        idle = self.spectra.idle = {event: self._idle(places, event) for event in CircleEvent}
+        for event in (CircleEvent.PLUS, CircleEvent.MINUS):
             if idle[event]:
                 many = "a multiplier is" if idle[event] == 1 else f"{idle[event]} multipliers are"
                 self.report.remarks.append(f"{many} {event.label} throughout and left aside")
-        if idle[Event.PAIR] > sum(idle[event] * (idle[event] - 1) // 2 for event in TARGETS):
+        if idle[CircleEvent.PAIR] > sum(idle[event] * (idle[event] - 1) // 2 for event in TARGETS):
             self.spectra.conservative = True
             pairs = "multipliers come in pairs with product 1 throughout: the family is conservative"
             self.report.remarks.append(pairs)
 
-    def _idle(self, places: Array, event: Event) -> int:
+    def _idle(self, places: Array, event: CircleEvent) -> int:
         """Number of factors of an event's function that vanish at all values of the parameter."""
         nu = self.spectra.at(places)
         here = np.isfinite(nu).all(axis=1)
@@ -165,7 +174,7 @@ class _Finder:
             return 0
         # A large eigenvalue makes the small ones, and their products with it, uncertain.
         largest = np.maximum(1.0, np.abs(nu).max(axis=1))
-        if event is Event.PAIR:
+        if event is CircleEvent.PAIR:
             largest = np.minimum(largest, _HUGE) ** 2
         clear = np.abs(factors(nu, event)).min(axis=1) > _IDLE * largest
         numbers = [0] * int(clear.sum())
@@ -201,10 +210,10 @@ class _Finder:
             again &= gap > _FINEST_PROBE
             places = (0.5 * known[1:-2] + 0.5 * known[2:-1])[again]
 
-    def _searched(self, events: list[Event]) -> dict[Event, Zeros]:
+    def _searched(self, events: list[CircleEvent]) -> dict[CircleEvent, Zeros]:
         """Zeros of the functions of some events: each with an even share of the budget, then with the rest."""
         reserve = int((1.0 - _SEARCH) * self.spectra.left)
-        found: dict[Event, Zeros] = {}
+        found: dict[CircleEvent, Zeros] = {}
         for number, event in enumerate(events):
             share = (self.spectra.left - reserve) // (len(events) - number)
             found[event] = self._zeros(event, self.spectra.left - share)
@@ -213,7 +222,7 @@ class _Finder:
                 found[event] = self._zeros(event, reserve)
         return found
 
-    def _zeros(self, event: Event, spare: int) -> Zeros:
+    def _zeros(self, event: CircleEvent, spare: int) -> Zeros:
         spectra = self.spectra
         return find_zeros(
             lambda places: spectra.function(places, event),
@@ -221,10 +230,10 @@ class _Finder:
             self.b,
             error=lambda places: spectra.function_error(places, event),
             left=lambda: spectra.left - spare,
-            skip=spectra.without_pair if event is Event.PAIR and not spectra.conservative else None,
+            skip=spectra.without_pair if event is CircleEvent.PAIR and not spectra.conservative else None,
         )
 
-    def _roots(self, event: Event, found: Zeros) -> list[Root]:
+    def _roots(self, event: CircleEvent, found: Zeros) -> list[Root]:
         report, spectra = self.report, self.spectra
         report.spent |= found.spent or spectra.left <= 0
         if not found.spent:
@@ -238,7 +247,7 @@ class _Finder:
             if spectra.left <= 0:
                 report.spent = True
                 break
-            if event is Event.PAIR and not spectra.conservative and spectra.without_pair(left, right):
+            if event is CircleEvent.PAIR and not spectra.conservative and spectra.without_pair(left, right):
                 continue
             if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
                 if not spectra.clear(left):  # or two real multipliers have product 1
@@ -247,7 +256,7 @@ class _Finder:
             roots.append(Root(left, left, left, event) if left == right else self._root(event, left, right))
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]
 
-    def _root(self, event: Event, left: float, right: float) -> Root:
+    def _root(self, event: CircleEvent, left: float, right: float) -> Root:
         logs = self.spectra.function(np.array([left, right]), event)[1]
         reference, within, slope = float(logs.max()), 0.1 * (right - left), 0.0
         if within > _NARROW * max(abs(left), abs(right)):

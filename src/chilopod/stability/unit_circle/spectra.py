@@ -37,7 +37,7 @@ _TELLING = 0.01  # error of a margin, from -1 to 1, that determines the multipli
 _FILL = 1e-30  # value in place of zeros, relative to the largest entry, for the balance of a triangular matrix
 
 
-class Event(Labelled):
+class CircleEvent(Labelled):
     """A place at which multipliers of a return map meet the unit circle."""
 
     MINUS = "-1", "a real multiplier passes -1"
@@ -45,12 +45,12 @@ class Event(Labelled):
     PAIR = "pair", "a complex pair passes the unit circle"
 
 
-TARGETS = {Event.MINUS: -1.0, Event.PLUS: 1.0}
+TARGETS = {CircleEvent.MINUS: -1.0, CircleEvent.PLUS: 1.0}
 
 
-def distances(nu: ComplexArray, event: Event) -> Array:
+def distances(nu: ComplexArray, event: CircleEvent) -> Array:
     """Distances of multipliers from their critical value at an event: from -1, from +1, or from the circle."""
-    return np.asarray(np.abs(np.abs(nu) - 1.0) if event is Event.PAIR else np.abs(nu - TARGETS[event]))
+    return np.asarray(np.abs(np.abs(nu) - 1.0) if event is CircleEvent.PAIR else np.abs(nu - TARGETS[event]))
 
 
 class Root(NamedTuple):
@@ -59,7 +59,7 @@ class Root(NamedTuple):
     place: float
     left: float
     right: float
-    event: Event | None  # event whose function vanishes; None if a multiplier was followed by its rank
+    event: CircleEvent | None  # event whose function vanishes; None if a multiplier was followed by its rank
     touch: bool = False  # the function does not change sign
     known: tuple[float, float] = (0.0, 0.0)  # interval without another root of the event, if known
 
@@ -70,7 +70,7 @@ class Crossing:
 
     value: float
     bracket: tuple[float, float]  # interval of the root finder around the value, without errors of the matrices
-    event: Event
+    event: CircleEvent
     multiplicity: int  # number of multipliers on the circle, counting both of a pair
     change: int  # rise of the number outside; 0 for a touch; at an end of the interval for a continued motion
     multiplier: complex  # critical multiplier, the one with positive imaginary part of a pair
@@ -90,7 +90,7 @@ class Spectra:
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
         self.values: list[float] = []  # values with a matrix, in order
         self.size = 0  # number of eigenvalues, once a matrix is known
-        self.idle = dict.fromkeys(Event, 0)  # numbers of factors of an event's function that vanish throughout
+        self.idle = dict.fromkeys(CircleEvent, 0)  # numbers of factors of an event's function that vanish throughout
         self.conservative = False  # multipliers come in pairs with product 1 throughout, and may stay on the circle
         self._matrices = matrices
         self._budget = budget
@@ -103,7 +103,7 @@ class Spectra:
     @property
     def resting(self) -> int:
         """Number of multipliers that are +1 or -1 throughout."""
-        return self.idle[Event.PLUS] + self.idle[Event.MINUS]
+        return self.idle[CircleEvent.PLUS] + self.idle[CircleEvent.MINUS]
 
     @property
     def evaluations(self) -> int:
@@ -222,13 +222,13 @@ class Spectra:
         """True if the distance of all multipliers from the circle exceeds their errors."""
         return bool((np.abs(self.margins(value)) > self.margin_errors(value)).all())
 
-    def factor_sizes(self, value: float, event: Event) -> tuple[Array, Array]:
+    def factor_sizes(self, value: float, event: CircleEvent) -> tuple[Array, Array]:
         """Rising sizes of the factors of an event's function, and their errors."""
         sizes = np.sort(np.abs(factors(self.at(np.array([value])), event)), axis=-1)
         moved = np.sort(np.abs(factors(self.disturbed(np.array([value])), event)), axis=-1)[0]
         return sizes[0], np.asarray(SAFETY * np.abs(moved - sizes).max(axis=0) + _ROUNDING)
 
-    def function(self, values: Array, event: Event) -> tuple[Array, Array]:
+    def function(self, values: Array, event: CircleEvent) -> tuple[Array, Array]:
         """The function that changes sign at an event, as signs and logarithms, shapes (k,).
 
         det(M + 1), det(M - 1), or the bialternate product, the product of nu_i nu_j - 1 over all pairs (Kuznetsov,
@@ -244,12 +244,12 @@ class Spectra:
             signs[here], logs[here] = symmetric(factors(nu[here], event), self.idle[event])
         return signs, logs - self._bounds(values, event)
 
-    def _bounds(self, values: Array, event: Event) -> Array:
+    def _bounds(self, values: Array, event: CircleEvent) -> Array:
         """Logarithms of the divisors of an event's function; NaN for a missing matrix."""
         stretch = np.array([self._stretch.get(value, np.nan) for value in values.tolist()])
-        return np.asarray(stretch * (1.0 if event is not Event.PAIR else self.size - 1.0))
+        return np.asarray(stretch * (1.0 if event is not CircleEvent.PAIR else self.size - 1.0))
 
-    def function_error(self, values: Array, event: Event) -> Array:
+    def function_error(self, values: Array, event: CircleEvent) -> Array:
         """Logarithm of the error of :meth:`function`, shape (k,)."""
         both = np.concatenate([self.at(values)[:, None], self.disturbed(values)], axis=1)
         of_all = symmetric(factors(both.reshape(-1, self.size), event), self.idle[event])
@@ -261,7 +261,7 @@ class Spectra:
         return np.asarray(largest - self._bounds(values, event) + np.log(SAFETY))
 
     def rooted(
-        self, function: Callable[[float], float], a: float, b: float, event: Event | None, within: float = 0.0
+        self, function: Callable[[float], float], a: float, b: float, event: CircleEvent | None, within: float = 0.0
     ) -> Root:
         """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
         most = min(200, max(self.left, 1))
@@ -319,10 +319,10 @@ class Spectra:
             rest = rest[~near]
         upper = rest[rest.imag > 0.0]
         if conservative:
-            upper = _meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
+            upper = _meeting(upper) if root.event is CircleEvent.PAIR and not root.touch else upper[:0]
         if upper.size:
             best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
-            found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative, around))
+            found.append(Crossing(root.place, bracket, CircleEvent.PAIR, 2 * upper.size, 0, best, conservative, around))
         return found
 
 
@@ -332,11 +332,11 @@ def margins(nu: ComplexArray) -> Array:
         return np.asarray(-np.sort(-np.tanh(np.log(np.abs(nu))), axis=-1))
 
 
-def factors(nu: ComplexArray, event: Event) -> ComplexArray:
+def factors(nu: ComplexArray, event: CircleEvent) -> ComplexArray:
     """Factors that vanish at an event: nu + 1, nu - 1, or nu_i nu_j - 1 over all pairs, along the last axis."""
-    if event is Event.MINUS:
+    if event is CircleEvent.MINUS:
         return nu + 1.0
-    if event is Event.PLUS:
+    if event is CircleEvent.PLUS:
         return nu - 1.0
     first, second = _pairs(nu.shape[-1])
     nu = nu * (_LARGEST / np.maximum(np.abs(nu), _LARGEST))  # so that no product overflows

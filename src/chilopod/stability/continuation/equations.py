@@ -14,7 +14,7 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
-from chilopod.stability.tracing import tolerances
+from chilopod.stability.continuation import tolerances
 
 
 class Before(NamedTuple):

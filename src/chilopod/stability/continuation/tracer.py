@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
-from chilopod.stability.tracing import tolerances
-from chilopod.stability.tracing.equations import A, Equations, Guess, OutsideBoxError, Plane, R, S, Step, predicted
+from chilopod.stability.continuation import tolerances
+from chilopod.stability.continuation.equations import A, Equations, Guess, OutsideBoxError, Plane, R, S, Step, predicted
 
 
 class Ending(Labelled):
