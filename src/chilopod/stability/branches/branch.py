@@ -26,7 +26,7 @@ from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.inspection import Found, inspect
+from chilopod.stability.branches.inspection import Inspected, inspect
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tolerances import SHORTEST
 from chilopod.stability.continuation.tracer import Ending, outward, trace
@@ -284,12 +284,12 @@ def followed(
     curve.first, curve.long_steps = branch.points[0], longest >= LONGEST
     found, remarks, done = list(branch.points), list(branch.remarks), 0
 
-    def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:
+    def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Inspected, BranchPoint], Ending | None]:
         within = inspect(curve, step, closely)
         reached = until is not None and any(point.special is until for point in within.points)
         return (within, step.end.last), Ending.ENOUGH_POINTS if reached else ending
 
-    def keep(looked: tuple[Found, BranchPoint], _: int) -> None:
+    def keep(looked: tuple[Inspected, BranchPoint], _: int) -> None:
         nonlocal done
         within, end = looked
         found.extend([*within.points, end])

@@ -23,7 +23,7 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.special_points import CLOSE, Place, Within, fold_within, special_point
+from chilopod.stability.branches.special_points import CLOSE, EventPlace, Within, fold_within, special_point
 from chilopod.stability.continuation.equations import Step, predicted
 from chilopod.stability.crossing_place import crossings_in
 from chilopod.stability.interface import offers
@@ -44,14 +44,14 @@ _SURE = 3.0  # factor on the error of a multiplier for a certain side of the cir
 _TELLING = 1e-3  # step, in units, that is short enough to tell a branch from another one near by
 
 
-class Found(NamedTuple):
+class Inspected(NamedTuple):
     """Special points within a step in order, an ordinary one between any two, and a sentence for each undecided one."""
 
     points: tuple[BranchPoint, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
-def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
+def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspected:
     """Find the events within a step; with ``closely`` also between ends that show none. An AnalysisError or an
     ArithmeticError if the step landed on another curve, or the corrector fails in between."""
     within = Within(curve, step)
@@ -65,7 +65,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
         raise AnalysisError("the step may have landed on another curve", field="step")
     crossed = _crossed_within(within) if closely else _crossed_between_ends(within, turned)
     if not (crossed or turned or flipped):
-        return Found()
+        return Inspected()
     places, remarks = _places(within, crossed, turned)
     branching = any(place.branching for place in places)
     touches = any(each.crossing.event is CircleEvent.PLUS and each.crossing.change == 0 for each in places)
@@ -94,10 +94,10 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
             points.append(within.ordinary(0.5 * (last + at)))
         points.append(special)
         last = at
-    return Found(tuple(points), remarks)
+    return Inspected(tuple(points), remarks)
 
 
-def _confirmed(within: Within, place: Place) -> bool:
+def _confirmed(within: Within, place: EventPlace) -> bool:
     """True if the critical multiplier changes sides at a place by more than the errors of the multipliers.
 
     Two that meet at +1 or -1 and leave along the circle, as without damping, may be on any side: the product of their
@@ -118,7 +118,7 @@ def _confirmed(within: Within, place: Place) -> bool:
     return False
 
 
-def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
+def _side(within: Within, at: float, place: EventPlace) -> tuple[float, ...]:
     """Side of the critical multiplier and, if it is real, sign of the product of all distances; 0 if undecided."""
     curve, step, crossing = within.curve, within.at(at), place.crossing
     (here, value_here, returned, _), section = step.found, within.step.start.section
@@ -149,7 +149,7 @@ def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
     return tuple(np.where(np.abs(away) > uncertain, np.sign(away), 0.0).tolist())
 
 
-def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
+def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[EventPlace], tuple[str, ...]]:
     """Places of events within a step, in order: multipliers cross the circle, or the curve turns."""
     step = within.step
     remarks: tuple[str, ...] = ()
@@ -166,15 +166,15 @@ def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[Place], t
     return sorted(places, key=lambda place: place.crossing.value), remarks
 
 
-def _placed(within: Within, crossing: Crossing, block: Block | None) -> Place:
+def _placed(within: Within, crossing: Crossing, block: Block | None) -> EventPlace:
     """Place where multipliers cross."""
     if crossing.event is not CircleEvent.PLUS:
-        return Place(crossing, block)
+        return EventPlace(crossing, block)
     before, after = within.sides(crossing.value)
     branching = _branches_meet(within.at(crossing.value))
     if float(before.tangent[-1] * after.tangent[-1]) < 0.0 and not branching:
         return fold_within(within, before.size, after.size)
-    return Place(crossing, block, branching=branching)
+    return EventPlace(crossing, block, branching=branching)
 
 
 def _branches_meet(step: Step[Anchor, OnCurve]) -> bool:

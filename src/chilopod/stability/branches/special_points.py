@@ -109,7 +109,7 @@ _BESIDE = 1e-3  # distance from a point at which rates of change are computed, r
 
 
 @dataclass(frozen=True)
-class Place:
+class EventPlace:
     """Place of an event within a step: the crossing, with the distance along the step's first tangent as its value, its
     block of the return map, and flags for a curve that turns back and for another curve that meets it."""
 
@@ -119,17 +119,17 @@ class Place:
     branching: bool = False
 
 
-def fold_within(within: Within, a: float, b: float) -> Place:
+def fold_within(within: Within, a: float, b: float) -> EventPlace:
     """Place where the tangent's component along the parameter vanishes; it changes sign between two places."""
 
     def along(place: float) -> float:
         return float((within.at(place) if place else within.step.start).tangent[-1])
 
     place = float(brentq(along, a, b, xtol=CLOSE * within.step.size))
-    return Place(Crossing(place, (place, place), CircleEvent.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
+    return EventPlace(Crossing(place, (place, place), CircleEvent.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
 
 
-def special_point(within: Within, place: Place) -> BranchPoint | None:
+def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
     """The special point at a place within a step; None without a critical multiplier there."""
     curve, crossing, block = within.curve, place.crossing, place.block
     start, low, high = within.step.start.last, within.low, within.step.size
@@ -175,7 +175,7 @@ def special_point(within: Within, place: Place) -> BranchPoint | None:
     return replace(point, orbit=orbit.state, special=found.kind, error_bound=bound, bifurcation=found)
 
 
-def _orbit(within: Within, point: BranchPoint, place: Place) -> Orbit:
+def _orbit(within: Within, point: BranchPoint, place: EventPlace) -> Orbit:
     """The orbit with its error bounds, if it is a simple solution."""
     curve, x = within.curve, point.orbit
     system = curve.system(point.value)
@@ -192,7 +192,7 @@ def _orbit(within: Within, point: BranchPoint, place: Place) -> Orbit:
     return Orbit(x, curve.image(x, point.value, section, with_error=True), np.zeros(x.size))
 
 
-def _value_error(within: Within, place: Place, along: float, image: ReturnMap) -> float:
+def _value_error(within: Within, place: EventPlace, along: float, image: ReturnMap) -> float:
     """Bound on the error of the parameter: that of the place times its rate, or at a fold from the orbit's equation."""
     curve, low, high, at = within.curve, within.low, within.step.size, within.at
     beside = _BESIDE * (high - low)

@@ -105,7 +105,7 @@ ReturnedStates = Callable[[Array], Array]
 Powers = tuple[int, int]
 """i and j of a monomial z^i conj(z)^j; j = 0 where z is real."""
 
-Curve = Mapping[Powers, ComplexArray]
+ManifoldCurve = Mapping[Powers, ComplexArray]
 """Coefficient of every monomial, shape (n,); of two conjugate ones only the one with i >= j."""
 
 Term = tuple[complex, float]
@@ -138,7 +138,7 @@ class CriticalOrbit(ReadOnlyArrays):
         count = 2 if self.real else _ANGLES
         return np.asarray(np.exp(2j * np.pi * np.arange(count) / count))
 
-    def displacements(self, curve: Curve, z: ComplexArray) -> Array:
+    def displacements(self, curve: ManifoldCurve, z: ComplexArray) -> Array:
         """W(z) - x, shape (*z.shape, n)."""
         total = np.zeros((*z.shape, self.state.size))
         for (i, j), coefficient in curve.items():

@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.labels import Labelled
-from chilopod.stability.normal_forms.manifold import CriticalOrbit, Curve, Manifold, ReturnedStates, Sampled, Term
+from chilopod.stability.normal_forms.manifold import (
+    CriticalOrbit,
+    Manifold,
+    ManifoldCurve,
+    ReturnedStates,
+    Sampled,
+    Term,
+)
 from chilopod.stability.spectrum import spectrum
 
 _TRIALS = 40  # largest number of sampled amplitudes
@@ -110,7 +117,7 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
     return status, found, manifold.coefficient(found, third)
 
 
-def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, high: float) -> float:
+def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: ManifoldCurve, radius: float, high: float) -> float:
     """Least factor on the amplitude at which nonlinear terms may become visible."""
     factor = 1.0
     reach = np.abs(at.image.jacobian)
@@ -290,7 +297,7 @@ class Quintic:
     # :class:`~chilopod.stability.normal_forms.normal_form.NormalForm`, and a bound on its error.
     coefficient: float
     error: float
-    curve: Curve  # the centre manifold, up to fourth order
+    curve: ManifoldCurve  # the centre manifold, up to fourth order
     amplitude: float  # largest amplitude at which the return map was sampled
 
 
@@ -300,7 +307,7 @@ def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float) -> Quin
     to a pitchfork, whose symmetry excludes terms of even order."""
     best: Quintic | None = None
     manifold = Manifold(mapped, at, 5)
-    curve: Curve = manifold.curve
+    curve: ManifoldCurve = manifold.curve
     for factor, radius in ((_STEP, amplitude), (1.0 / _STEP, amplitude / _STEP)):
         worse, tries = 0, 0
         while worse < _WORSE and tries < _TRIES:
