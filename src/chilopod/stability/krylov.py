@@ -32,6 +32,7 @@ from chilopod.stability.returns import (
     return_time,
     section_at,
     turned,
+    velocity_at,
 )
 from chilopod.stability.spectrum import FIRST_ORDER, eigensystem, eigenvalue_errors
 
@@ -163,7 +164,7 @@ def tangent_map(system: Capabilities, x: Array, section: Section | None = None) 
     state = turned(system, carried(system, x[None], 0.0, duration))[0]
     check_finite(state)
     if is_autonomous(system) and section is not None:
-        velocity, across = np.asarray(system.velocity(np.array(state))), Section(x, section.normal, duration)
+        velocity, across = velocity_at(system, state), Section(x, section.normal, duration)
     return TangentMap(system, x, state, duration, returns_per_period(system), across, velocity)
 
 

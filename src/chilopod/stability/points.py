@@ -13,11 +13,11 @@ from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
 from chilopod.stability.crossing_place import critical_multipliers
-from chilopod.stability.interface import SystemLike, is_autonomous, sizes
+from chilopod.stability.interface import SystemLike, checked_flow, is_autonomous, sizes
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, normal_form
 from chilopod.stability.orbits.orbit import Orbit
-from chilopod.stability.returns import returned_states
+from chilopod.stability.returns import returned_states, velocity_at
 from chilopod.stability.shown import Shown, bounded, number
 from chilopod.stability.spectrum import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.groups import symmetric_basis
@@ -262,12 +262,12 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
     if not is_autonomous(system):
         return 1.0
     # The flow carries the velocity as it carries the mode.
-    start = np.stack([mode, system.velocity(np.array(orbit.state))], axis=1)
+    start = np.stack([mode, velocity_at(system, orbit.state)], axis=1)
     moves: list[tuple[Array, ComplexArray]] = [(orbit.state, start)]
     duration = orbit.image.duration
 
     def carried(x: Array, directions: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
-        x, derivative = system.flow(np.array(x), 0.0, part * duration)
+        x, derivative = checked_flow(system, x, 0.0, part * duration)
         return x, derivative @ directions
 
     def mean_square(moves: list[tuple[Array, ComplexArray]]) -> float:

@@ -138,7 +138,7 @@ def section_at(
     if the period is known. The default duration of a return is the system's guess."""
     if not is_autonomous(system):
         return None
-    velocity = _velocity(system, x)
+    velocity = velocity_at(system, x)
     if duration is None:
         duration = return_duration(system)
     if not velocity.any():
@@ -158,7 +158,8 @@ def return_duration(system: SystemLike) -> float:
     return whole / returns_per_period(system)
 
 
-def _velocity(system: Autonomous, x: Array) -> Array:
+def velocity_at(system: Autonomous, x: Array) -> Array:
+    """dx/dt at a state, checked."""
     with UserCode("velocity"):
         velocity = numbers(system.velocity(np.array(x)), x.shape, "velocity")
     if not np.isfinite(velocity).all():
@@ -214,7 +215,7 @@ def return_map(system: SystemLike, x: Array, with_error: bool = True, section: S
     assert image.normal is not None
     # The flow maps the motion at the start to that at the end. In a stiff system rounding of the state changes this
     # motion, and so the projection along it.
-    off = np.abs(jacobian @ _velocity(system, x) - image.velocity) / abs(float(image.normal @ image.velocity))
+    off = np.abs(jacobian @ velocity_at(system, x) - image.velocity) / abs(float(image.normal @ image.velocity))
     return replace(image, error=image.error + _MISSED * np.outer(off, np.abs(image.normal @ jacobian)))
 
 
@@ -226,7 +227,7 @@ def on_section(
     count, wrong = returns_per_period(system), None if system.symmetry is None else np.abs(system.symmetry)
     velocity = normal = None
     if section is not None and is_autonomous(system):
-        velocity, normal = _velocity(system, state), section.normal
+        velocity, normal = velocity_at(system, state), section.normal
         across = _projection(velocity, normal)
         matrix, wrong = across @ matrix, np.abs(across) if wrong is None else np.abs(across) @ wrong
     if wrong is not None:
@@ -267,7 +268,7 @@ def _arrival(system: Autonomous, before: Array, section: Section, rest: float) -
     earlier: tuple[float, float] | None = None
     for _ in range(_CROSSING_ROUNDS):
         state = turned(system, carried(system, before[None], 0.0, rest))[0]
-        velocity = _velocity(system, state)
+        velocity = velocity_at(system, state)
         speed = float(section.normal @ velocity)
         off = float(section.normal @ (state - section.point))
         if speed == 0.0 or not math.isfinite(off):

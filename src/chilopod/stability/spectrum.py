@@ -31,8 +31,8 @@ from scipy.linalg.lapack import dgeqrf, dorgqr
 from chilopod.errors import AnalysisError
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.interface import Capabilities, SystemLike, is_autonomous, is_stiff, sizes
-from chilopod.stability.returns import ReturnMap, flow_with_error
+from chilopod.stability.interface import Capabilities, SystemLike, checked_flow, is_autonomous, is_stiff, sizes
+from chilopod.stability.returns import ReturnMap, flow_with_error, velocity_at
 
 SAFETY, DRAWS = 10.0, 8  # factor on the largest change of a result under random changes, and their number
 
@@ -223,7 +223,7 @@ def section_basis(system: SystemLike, state: Array, units: Array) -> Array:
     """Orthonormal basis of the plane across the motion, in units, shape (n, n-1), or of the whole space."""
     if not is_autonomous(system):
         return np.eye(units.size)
-    return normal_basis(np.asarray(system.velocity(state)) / units)
+    return normal_basis(velocity_at(system, state) / units)
 
 
 def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) -> _Part:
@@ -395,7 +395,7 @@ def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
     if slow == 0:
         return np.eye(1)
     for _ in range(_SHORTENINGS):
-        state, derivative = system.flow(x.copy(), 0.0, duration)
+        state, derivative = checked_flow(system, x, 0.0, duration)
         derivative = derivative * cut.units / cut.units[:, None]
         after = section_basis(system, state, cut.units)
         stretch, right = np.linalg.svd(after.T @ derivative @ cut.section)[1:]

@@ -16,7 +16,16 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
-from chilopod.stability.interface import Family, SystemLike, is_autonomous, offers, returns_per_period, sizes, system_of
+from chilopod.stability.interface import (
+    Family,
+    SystemLike,
+    checked_flow,
+    is_autonomous,
+    offers,
+    returns_per_period,
+    sizes,
+    system_of,
+)
 from chilopod.stability.orbits.orbit import Orbit, known_state, searched_orbit, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import Section, carried, returned_states, whole_period
@@ -238,7 +247,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
     flown = []
     for part in _PARTS:
         time = part * image.duration
-        state, derivative = system.flow(np.array(x), 0.0, time)
+        state, derivative = checked_flow(system, x, 0.0, time)
         flown.append((time, (state, derivative @ direction)))
 
     def departs(states: Array, linear: tuple[Array, Array], r: float) -> bool:
@@ -251,7 +260,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
             with np.errstate(all="ignore"):
                 there = x + r * direction
                 return departs(returned_states(system, there[None], section)[0], returned, r) or any(
-                    departs(system.flow(np.array(there), 0.0, time)[0], linear, r) for time, linear in flown
+                    departs(checked_flow(system, there, 0.0, time)[0], linear, r) for time, linear in flown
                 )
         except (AnalysisError, ArithmeticError, ValueError):
             return True

@@ -29,7 +29,15 @@ from chilopod.stability.continuation.tolerances import SETTLED, SHARPEST_TURN
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import checked_flow, is_autonomous, offers
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
-from chilopod.stability.returns import ReturnMap, Section, in_parts, on_section, return_duration, section_at
+from chilopod.stability.returns import (
+    ReturnMap,
+    Section,
+    in_parts,
+    on_section,
+    return_duration,
+    section_at,
+    velocity_at,
+)
 from chilopod.stability.spectrum import return_multipliers, spectrum
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
@@ -104,7 +112,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             assert last.period is not None
             assert earlier.period is not None
             lengthening = (last.period - earlier.period) / last.period / float(np.linalg.norm(back))
-            along = self._projection(np.asarray(system.velocity(section.point)), section)
+            along = self._projection(velocity_at(system, section.point), section)
             back[:-1], tangent[:-1] = along @ back[:-1], along @ tangent[:-1]
         return Anchor(last, matrix, Before(back, tangent, before.matrix), section, space, leaving, lengthening)
 
@@ -251,7 +259,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             section = section_at(system, x, self.sizes, image.duration)
             assert section is not None
             assert is_autonomous(system)
-            velocity = np.asarray(system.velocity(x))
+            velocity = velocity_at(system, x)
             self._check_moving(anchor.section, velocity, step.found)
             along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)

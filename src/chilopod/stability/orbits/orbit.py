@@ -39,6 +39,7 @@ from chilopod.stability.returns import (
     return_map,
     section_at,
     turned,
+    velocity_at,
 )
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.groups import symmetric_basis
@@ -231,7 +232,7 @@ def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
         passed = time
     # Over several rounds a sixteenth of the time may be half a round, where a state is zero again.
     size = np.maximum(size, np.abs(states).max(axis=0))
-    near = _CLOSES * min(1.0, _relative(np.asarray(system.velocity(np.array(x))) * duration, size))
+    near = _CLOSES * min(1.0, _relative(velocity_at(system, x) * duration, size))
     away = (np.abs(turned(system, np.array(states[1:])) - x) / size).max(axis=1)
     closed = counts[away <= near]
     return int(closed[0]) if closed.size else 1
@@ -292,7 +293,7 @@ def near_orbit(
             start = start._replace(states=start.states / size @ basis @ basis.T * size)
         found = shot(Problem(lambda _: system, None, shared, budget, careful), start, size, section)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
-    if is_autonomous(system) and _relative(np.asarray(system.velocity(np.array(x))) * duration, size) <= _RESTS:
+    if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:

@@ -20,7 +20,7 @@ from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
 from chilopod.stability.crossing_place import Course, Sample, crossings_in, orbit_blocks, past_singular, place_error
-from chilopod.stability.interface import Family, returns_per_period
+from chilopod.stability.interface import Family, checked_flow, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
 from chilopod.stability.returns import ReturnMap
@@ -147,7 +147,7 @@ def _at_rest(samples: Samples, value: float, state: Array, period: float) -> boo
         """Extent of the motion within a return, relative to the sizes of the states."""
         system, path = samples.family(value), [state]
         for _ in range(_PARTS - 1):
-            path.append(system.flow(path[-1], 0.0, period / returns_per_period(system) / _PARTS)[0])
+            path.append(checked_flow(system, path[-1], 0.0, period / returns_per_period(system) / _PARTS)[0])
         return float((np.ptp(np.array(path), axis=0) / samples.size).max())
 
     first = samples.low, samples.first.state, samples.first.period
