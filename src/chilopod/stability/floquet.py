@@ -182,9 +182,10 @@ def multipliers(
             result = replace(result, values=result.values[:count], half_period=half, error_bounds=bounds)
     if result.values.size == system.dimension - (system.period is None):
         return result
+    decide = "" if result.stable is None else "they decide whether the orbit is stable; "
     remark = (
-        f"only the {result.values.size} multipliers of largest modulus were computed; they decide whether the orbit "
-        f"is stable; the next one has a modulus of about {next_one:.3g}"
+        f"only the {result.values.size} multipliers of largest modulus were computed; {decide}the next one has a "
+        f"modulus of about {next_one:.3g}"
     )
     return replace(result, remarks=(remark,))
 

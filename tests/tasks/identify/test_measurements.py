@@ -51,6 +51,15 @@ def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_n
     assert min(ranked[-1]["range_left"].values()) > 0.99
 
 
+def test_a_radius_at_which_the_robot_folds_up_is_left_out(found, monkeypatch):
+    chosen = [each for each in usual(found) if each.name.startswith("radius, k1 = 7")]
+    assert next_measurements(found, chosen).rows
+    monkeypatch.setattr("chilopod.analysis.quantities.Measured.most_bent", lambda self, robot: 1.6)
+    ranked = next_measurements(found, chosen)
+    assert not ranked.rows
+    assert "must not fold up" in ranked.left_out[chosen[0].name]
+
+
 def test_measurements_of_known_effect(found):
     def no_effect(robot):
         return np.array([1.0])
