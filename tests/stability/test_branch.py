@@ -282,3 +282,17 @@ def test_a_fold_near_another_branch_is_no_transcritical_point(gap):
     (special,) = branch.special_points
     assert special.special is Kind.FOLD
     assert abs(special.value + gap) <= special.bifurcation.error_bound < 1e-9
+
+
+def test_no_branch_meets_a_family_by_energy_near_its_separatrix():
+    """Orbits of the soft spring x'' = x^3 - x, damped by p: their multiplier is 1, with an error that grows there."""
+
+    def family(p):
+        def rhs(t, x):
+            return [x[1] + p * (x[0] - x[0] ** 3), x[0] ** 3 - x[0] + p * x[1]]
+
+        return from_rhs(rhs, 2, None, guess_period=6.3)
+
+    branch = follow(family, begin(family, 0.0, [0.5, 0.0]), (-0.1, 0.1), points=20)
+    assert branch.points[-1].orbit[0] > 0.9999
+    assert not branch.special_points

@@ -75,6 +75,10 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
     found: list[tuple[float, BranchPoint]] = []
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event
+        alone = not (place.branching or place.fold) and (place.block is None or place.block.trivial)
+        if event is CircleEvent.PLUS and place.crossing.change == 0 and alone:
+            remarks += (f"near {near:.9g}: a multiplier comes to +1 and goes back, and no other orbit is near",)
+            continue
         if (sure or (leaving and event is CircleEvent.PLUS)) and not _confirmed(within, place):
             remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which does not count",)
             continue
