@@ -30,6 +30,7 @@ TOLERANCE = 1e-13
 """Default tolerance of the nonlinear flow, relative to max(1, |x|), per step."""
 
 _SAME_INSTANT = 1e-12  # in periods
+_SPREAD = 2.0  # factor on the error along one direction for that of any entry
 _COARSER = 10.0  # tolerance of a second computation, whose error is several times as large
 _ROWS_DIFFER = 2.0  # joint rates are differences of two rows
 _FEW = 2  # robots whose linear flows take no longer than waking other threads
@@ -132,7 +133,7 @@ class PlanarModel(ReadOnlyArrays):
         x = self._checked(x)
         if (x == self.orbit).all():
             return self.flow_with_error(x, t0, t1)[:2]
-        return self._tangents(x, t0, t1, self.tolerance)
+        return self._tangents(x, np.eye(self.dimension), t0, t1, self.tolerance)
 
     def flow_with_error(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array, float]:
         """:meth:`flow`, and a bound on the error of the largest entry of the derivative."""
@@ -142,20 +143,20 @@ class PlanarModel(ReadOnlyArrays):
             matrix = from_joint.copy()
             error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
             return x, to_joint @ matrix, _ROWS_DIFFER * error
-        state, derivative = self._tangents(x, t0, t1, self.tolerance)
+        state, derivative = self._tangents(x, np.eye(self.dimension), t0, t1, self.tolerance)
         # Against finer steps the global error stays within some tens of the tolerance per step, times the growth of the
         # motion; the derivative is that of a motion with this error, which adds the growth once more. Of a fast motion
-        # of many steps the error is larger: it is less than the difference from a coarser computation.
+        # of many steps the error is larger: less than the difference from a coarser computation in any direction.
         growth = max(1.0, float(np.abs(derivative).max()))
-        coarse = self._tangents(x, t0, t1, _COARSER * self.tolerance)[1]
-        error = max(100.0 * self.tolerance * growth**2, float(np.abs(coarse - derivative).max()))
+        along = np.cos(2.0 * np.arange(self.dimension) + 0.3)
+        coarse = self._tangents(x, along[None], t0, t1, _COARSER * self.tolerance)[1][:, 0]
+        error = max(100.0 * self.tolerance * growth**2, _SPREAD * float(np.abs(coarse - derivative @ along).max()))
         return state, derivative, error
 
-    def _tangents(self, x: Array, t0: float, t1: float, tolerance: float) -> tuple[Array, Array]:
-        """State at t1 and its derivative with respect to the state at t0, by the nonlinear equations."""
-        n = self.dimension
-        batch = np.tile(x.astype(np.complex128), (n, 1))
-        batch += 1j * COMPLEX_STEP * np.eye(n)
+    def _tangents(self, x: Array, directions: Array, t0: float, t1: float, tolerance: float) -> tuple[Array, Array]:
+        """State at t1 and its derivative along directions of the state at t0, shape (directions, 2N+1), as columns; by
+        the nonlinear equations."""
+        batch = x + 1j * COMPLEX_STEP * directions
         carry_tangents(self, batch, t0, t1, tolerance)
         return batch[0].real.copy(), batch.imag.T / COMPLEX_STEP
 
