@@ -1,4 +1,4 @@
-"""Interfaces of a periodic system: required members (:class:`SystemLike`, :class:`Autonomous`), others; its sizes.
+"""Interfaces of a periodic system: required members (:class:`SystemLike`, :class:`Autonomous`) and others.
 
 The optional members are those of :class:`Capabilities`. A missing one and one that is None are the same, so instances
 of one class may differ (as those of :class:`chilopod.stability.PeriodicSystem`).

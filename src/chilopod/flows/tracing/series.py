@@ -234,13 +234,13 @@ def choose(tape: Any, series: Any) -> None:
 def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: Any) -> None:
     """Values of nodes, shape (nodes, samples), at times and states, of which all may share one."""
     series = loaded(tape, params, 1, 0, np.zeros(tape.switches.shape[1]))
-    n, values = tape.layout[0], series.values
+    n, values, with_resets = tape.layout[0], series.values, (nodes >= tape.layout[4]).any()
     for m in range(found.shape[1]):
         for i in range(n):
             values[i, 0] = states[i, m % states.shape[1]]
         values[n, 0] = times[m % times.size]
         choose(tape, series)
-        if (nodes >= tape.layout[4]).any():  # of resets
+        if with_resets:
             values_at(tape.program, tape.terms, tape.slopes, tape.layout[4:6], 0, 1.0, values, series.branches)
         for i in range(nodes.size):
             found[i, m] = values[nodes[i], 0]

@@ -75,8 +75,9 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
     found: list[tuple[float, BranchPoint]] = []
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event
-        alone = not (place.branching or place.fold) and (place.block is None or place.block.trivial)
-        if event is CircleEvent.PLUS and place.crossing.change == 0 and alone:
+        touch = event is CircleEvent.PLUS and place.crossing.change == 0 and not place.crossing.collision
+        breaking = place.block is not None and not place.block.trivial
+        if touch and not (place.branching or place.fold or breaking):
             remarks += (f"near {near:.9g}: a multiplier comes to +1 and goes back, and no other orbit is near",)
             continue
         if (sure or (leaving and event is CircleEvent.PLUS)) and not _confirmed(within, place):

@@ -19,7 +19,6 @@ from chilopod.stability.interface import (
     Capabilities,
     SystemLike,
     check_system,
-    checked_flow,
     is_autonomous,
     is_stiff,
     offers,
@@ -298,18 +297,19 @@ def near_orbit(
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         if system.symmetry is not None and not is_autonomous(system):
-            _check_symmetry(system, x, duration, size)
+            _check_symmetry(system, x, duration, size, 1.0 if end is None else end[1])
         return with_bounds(system, x, duration)
     section = section_at(system, x, units, duration)
     image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
 
 
-def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array) -> None:
-    """AnalysisError if the second return from an orbit's state is not symmetric to the first."""
-    after, jacobian = checked_flow(system, x, 0.0, duration)
+def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array, jacobian: Array | float) -> None:
+    """AnalysisError if the second return from an orbit's state is not symmetric to the first, with its derivative."""
+    symmetry = np.asarray(system.symmetry)
+    after: Array = np.linalg.solve(symmetry, x).astype(np.float64)
     second = carried(system, after[None], duration, 2.0 * duration)[0]
-    off = _relative(system.symmetry @ second - after, size)
+    off = _relative(symmetry @ second - after, size)
     if off > _ALIKE * max(1.0, float(np.abs(jacobian * size / size[:, None]).max())):
         said = f"must be one of the motion: after a return it misses the symmetric one by {off:.1e} of its size"
         allowed = "S with S f(t + T/k, x) = f(t, S x), of order k, also for guards and resets"
