@@ -297,14 +297,14 @@ def near_orbit(
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         if system.symmetry is not None and not is_autonomous(system):
-            _check_symmetry(system, x, duration, size, 1.0 if end is None else end[1])
+            _check_symmetry(system, x, duration, size, np.eye(x.size) if end is None else end[1])
         return with_bounds(system, x, duration)
     section = section_at(system, x, units, duration)
     image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
 
 
-def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array, jacobian: Array | float) -> None:
+def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array, jacobian: Array) -> None:
     """AnalysisError if the second return from an orbit's state is not symmetric to the first, with its derivative."""
     symmetry = np.asarray(system.symmetry)
     after: Array = np.linalg.solve(symmetry, x).astype(np.float64)
