@@ -167,7 +167,7 @@ class _Finder:
 
     def _idle(self, places: Array, event: CircleEvent) -> int:
         """Number of factors of an event's function that vanish at all values of the parameter."""
-        nu = self.spectra.at(places)
+        few, nu = places.size < _PROBES, self.spectra.at(places)
         here = np.isfinite(nu).all(axis=1)
         places, nu = places[here], nu[here]
         if self._factors(event) == 0:
@@ -185,6 +185,8 @@ class _Finder:
             if errors[0] <= _TELLING:
                 numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
         if len(numbers) < _FEWEST_TELLING:
+            if few and self.spectra.left > _PROBES:  # errors are estimates: more places may tell
+                return self._idle(np.linspace(self.a, self.b, _PROBES), event)
             self.report.leave(LOST)
             return 0
         return int(sorted(numbers)[int(_MOSTLY * len(numbers))])
