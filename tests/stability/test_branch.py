@@ -296,3 +296,33 @@ def test_no_branch_meets_a_family_by_energy_near_its_separatrix():
     branch = follow(family, begin(family, 0.0, [0.5, 0.0]), (-0.1, 0.1), points=20)
     assert branch.points[-1].orbit[0] > 0.9999
     assert not branch.special_points
+
+
+def flat(power):
+    return lambda a: from_rhs(lambda t, x: -a - x**power, 1, PERIOD)
+
+
+def beside(distance):
+    """Branches -a = x^2 and a = d + x / 2, which meet at a near -4 d^2, beside the fold at 0."""
+    return lambda a: from_rhs(lambda t, x: (-a - x**2) * (-a + distance + 0.5 * x), 1, PERIOD)
+
+
+@pytest.mark.parametrize("power", [6, 8])
+def test_a_flat_fold_is_no_branch_point(power):
+    """The multiplier is +1 within its error for a while: a fold is reported with its bound, or a remark."""
+    start = begin(flat(power), -0.5, [0.5 ** (1.0 / power)])
+    branch = follow(flat(power), start, (-0.52, 1.0))
+    assert len(branch.special_points) <= 1
+    assert branch.special_points or any("passes +1" in remark for remark in branch.remarks)
+    for fold in branch.special_points:
+        assert fold.special is Kind.FOLD
+        assert abs(fold.value) <= fold.bifurcation.error_bound
+
+
+@pytest.mark.parametrize("distance", [1e-4, 1e-5])
+def test_a_branch_that_passes_close_to_a_fold_is_found_or_remarked(distance):
+    branch = follow(beside(distance), begin(beside(distance), -0.5, [0.5**0.5]), (-1.0, 1.0))
+    kinds = [point.special for point in branch.special_points]
+    missing = 3 - len(kinds)
+    assert kinds == [Kind.FOLD] + [Kind.TRANSCRITICAL] * (2 - missing)
+    assert missing == sum("beside the fold is another bifurcation" in remark for remark in branch.remarks) <= 1

@@ -206,11 +206,14 @@ Bounded = Callable[[float, Array, Array, float], Orbit]
 
 @dataclass(frozen=True, eq=False)
 class Regular(ReadOnlyArrays):
-    """An interpolated singular orbit: place, error bound, ``orbit`` of a sample there, and the orbit itself."""
+    """An interpolated singular orbit: place, error bound, ``orbit`` of a sample there with its error, distance of the
+    samples, and the orbit itself."""
 
     place: float
     error_bound: float
     sampled: Array
+    sampled_error: Array
+    reach: float
     orbit: Orbit
 
 
@@ -245,7 +248,8 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
         return None  # the polynomials do not separate two crossings
     errors[0] += distances[0]  # rounding at the places, larger than at the zero where another multiplier is near
     uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(errors)))
-    return Regular(place, bound + SAFETY * uncertain * reach / found.slope, found.orbit, orbit)
+    bound += SAFETY * uncertain * reach / found.slope
+    return Regular(place, bound, found.orbit, found.orbit_error, reach, orbit)
 
 
 def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:

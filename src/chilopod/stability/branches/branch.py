@@ -309,8 +309,23 @@ def followed(
             reason = _GRAZES
         if moved is not None:
             remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
-    said = tuple(dict.fromkeys(remarks))
+    said = tuple(dict.fromkeys([*remarks, *_unpaired_folds(found)]))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
+
+
+def _unpaired_folds(points: list[BranchPoint]) -> list[str]:
+    """Sentences for folds across which an even number of multipliers passes 1: at a fold one passes, so another
+    event is too near to be told apart."""
+    remarks = []
+    for before, fold, after in zip(points, points[1:], points[2:], strict=False):
+        beyond = []
+        for each in (before, after):
+            nu, error = each.multipliers, each.error_bound
+            if fold.special is Kind.FOLD and each.special is None and bool((np.abs(nu - 1.0) > error).all()):
+                beyond.append(int(((nu.imag == 0.0) & (nu.real > 1.0)).sum()))
+        if len(beyond) == 2 and (beyond[0] - beyond[1]) % 2 == 0:
+            remarks.append(f"near {fold.value:.9g}: beside the fold is another bifurcation, too near to be told apart")
+    return remarks
 
 
 def find_fold(

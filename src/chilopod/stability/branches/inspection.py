@@ -75,10 +75,13 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
     found: list[tuple[float, BranchPoint]] = []
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event
-        touch = event is CircleEvent.PLUS and place.crossing.change == 0 and not place.crossing.collision
         breaking = place.block is not None and not place.block.trivial
-        if touch and not (place.branching or place.fold or breaking):
-            remarks += (f"near {near:.9g}: a multiplier comes to +1 and goes back, and no other orbit is near",)
+        lone = event is CircleEvent.PLUS and not (place.crossing.collision or place.branching or place.fold or breaking)
+        if lone:
+            if place.crossing.change == 0:
+                remarks += (f"near {near:.9g}: a multiplier comes to +1 and goes back, and no other orbit is near",)
+            elif not any(each.fold for each in places):  # else it is that of the fold, uncertain because it is flat
+                remarks += (f"near {near:.9g}: a multiplier passes +1, but no fold and no other orbit is near",)
             continue
         if (sure or (leaving and event is CircleEvent.PLUS)) and not _confirmed(within, place):
             remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which does not count",)

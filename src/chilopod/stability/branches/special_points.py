@@ -21,7 +21,7 @@ from chilopod.stability.continuation.tracer import Parts
 from chilopod.stability.crossing_place import SAFETY, Course, Sample, orbit_blocks, past_singular, place_error
 from chilopod.stability.orbits.orbit import Orbit, searched_orbit, with_bounds
 from chilopod.stability.points import Kind, described
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, distances
 
@@ -161,6 +161,12 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
         value, error = _turn(within, crossing.value)
     else:
         value, error = point.value, _value_error(within, place, along, orbit.image)
+        if not place.fold:
+            # The orbits beside a singular one, from which it is interpolated, are the less certain the closer they are.
+            reach = regular.reach if regular else _BESIDE * (high - low)
+            beside = max(crossing.value - reach, low), min(crossing.value + reach, high)
+            error += max(_noise(curve, within.at(each), within.step.start.section) for each in beside)
+            error += curve.scale * float(regular.sampled_error[-1]) if regular else 0.0
     point = replace(point, value=value)
     kind = Kind.FOLD if place.fold else None
     found = described(curve.system(value), (value, error), orbit, crossing, block, kind=kind)
@@ -222,13 +228,27 @@ def _turn(within: Within, at: float) -> tuple[float, float]:
     return start + scale * turned[0], scale * abs(turned[0] - turned[1]) + SAFETY * noise
 
 
+def _noise(curve: Curve, here: Step[Anchor, OnCurve], section: Section | None) -> float:
+    """Error of the parameter of a regular orbit at a place along the curve, due to the errors of its return."""
+    image = curve.image(here.found.x, here.found.value, section, with_error=True)
+    try:
+        share = np.abs(np.linalg.inv(here.matrix)[-1, :-1])
+    except np.linalg.LinAlgError:
+        return np.inf
+    return curve.scale * SAFETY * float(share @ _off(curve, here.found.x, image))
+
+
+def _off(curve: Curve, x: Array, image: ReturnMap) -> Array:
+    """Distance by which an orbit may miss its return, in units of the states' sizes, shape (n,)."""
+    sizes = curve.units(x.size)[:-1]
+    wrong = np.broadcast_to(image.error, image.jacobian.shape)
+    return np.asarray((np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes)
+
+
 def _fold_error(curve: Curve, here: Step[Anchor, OnCurve], image: ReturnMap) -> float:
     """Error of the parameter at a fold, from left . (H - x) = 0: to first order x does not enter."""
-    x = here.found.x
-    sizes = curve.units(x.size)[:-1]
     matrix = here.matrix[:-1]
     left = np.linalg.svd(matrix[:, :-1])[0][:, -1]
-    wrong = np.broadcast_to(image.error, image.jacobian.shape)
-    off = (np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes
+    off = float(np.abs(left) @ _off(curve, here.found.x, image))
     slope = abs(float(left @ matrix[:, -1]))
-    return curve.scale * SAFETY * float(np.abs(left) @ off) / slope if slope > 0.0 else np.inf
+    return curve.scale * SAFETY * off / slope if slope > 0.0 else np.inf
