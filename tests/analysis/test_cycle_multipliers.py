@@ -99,7 +99,7 @@ def test_modes_and_the_grazing_foot_have_names(straight):
     assert printed["closes"] is True
     assert printed["multipliers"][0]["frequency_rad_s"] * PERIOD == pytest.approx(2.0 * np.pi / 36.0, rel=0.05)
     assert len(printed["multipliers"][0]["joint_components"]) == 5
-    assert "beyond which contacts change: leg" in "\n".join(straight.lines())
+    assert "changes a contact; larger ones do: leg" in "\n".join(straight.lines())
 
 
 def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
@@ -208,3 +208,60 @@ def test_a_model_without_such_a_state_and_a_walk_that_falls_are_refused():
     lying[1] = 1.5
     with pytest.raises(AnalysisError, match="the walk falls"):
         cycle(lying[None])
+
+
+SPRING = """<body pos="0 {0} 0"><joint name="p{0}" type="slide" axis="0 0 1" stiffness="4" damping=".3"/>
+  <geom type="sphere" size=".1" mass="1" contype="0" conaffinity="0"/></body>"""
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
+def test_equal_springs_have_the_multipliers_of_one(count):
+    bodies = "".join(SPRING.format(i) for i in range(count))
+    text = f'<mujoco><option gravity="0 0 0"/><worldbody>{bodies}</worldbody></mujoco>'
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(text), np.zeros((500, 0)))
+    found = cycle_multipliers("springs", cycle, np.zeros(2 * count), [f"p{i}" for i in range(count)])
+    step = np.array([[1.0 - 1.6e-5 / 1.0006, 0.002 / 1.0006], [-0.008 / 1.0006, 1.0 / 1.0006]])
+    pair = np.linalg.eigvals(step)[0] ** 500
+    assert found.stable is True
+    for mode in found.exact:
+        assert abs(mode.multiplier - complex(pair.real, abs(pair.imag))) < 1e-12
+        assert 0.0 < mode.error < 1e-12  # rounding
+
+
+SLIDE = """<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0" damping="2" stiffness="{}"/>
+  <geom size=".1" mass="1" contype="0" conaffinity="0"/></body>
+  <body><joint name="p" axis="0 1 0" stiffness="5" damping=".3"/>
+  <geom size=".1" mass="1" pos="0 0 -.3" contype="0" conaffinity="0"/></body></worldbody>
+  <actuator><motor joint="p"/></actuator></mujoco>"""
+BOX = """<mujoco><worldbody><geom type="plane" size="5 5 .1"/><site name="w"/><body pos="0 0 .1"><freejoint/>
+  <geom type="box" size=".1 .1 .1" mass="1"/><site name="s"/><body pos="0 0 .1">
+  <joint name="p" axis="0 1 0" stiffness="5" damping=".05"/>
+  <geom type="box" size=".05 .05 .05" pos="0 0 .05" mass=".5" contype="0" conaffinity="0"/></body></body></worldbody>
+  {}<actuator><motor joint="p"/></actuator></mujoco>"""
+TETHER = """<tendon><spatial stiffness="5" springlength="0"><site site="w"/><site site="s"/></spatial></tendon>"""
+PUSH = 0.05 * np.sin(2.0 * np.pi * np.arange(500) / 500)[:, None]
+
+
+@pytest.mark.parametrize("stiffness", [-0.5, 2.0])
+def test_a_place_that_matters_is_not_divided_out(stiffness):
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(SLIDE.format(stiffness)), PUSH, travel=("x",))
+    with pytest.raises(AnalysisError, match="must not depend on x, which is divided out"):
+        cycle_multipliers("slide", cycle, np.zeros(3), ["p"])
+
+
+def test_a_free_body_on_a_tether_is_refused_and_bends_that_fall_leave_the_smallest():
+    tied, free = (CycleMap(mujoco.MjModel.from_xml_string(BOX.format(each)), PUSH) for each in (TETHER, ""))
+    start = np.zeros(len(free.names))
+    start[0] = 0.1
+    with pytest.raises(AnalysisError, match="must not depend on x"):
+        cycle_multipliers("tied", tied, start, ["p"])
+    found = cycle_multipliers("box", free, start, ["p"])
+    assert found.exact
+    assert not found.finite
+    assert "only smallest ones are shown" in "\n".join(found.lines())
+
+
+def test_actuators_with_a_delay_are_refused():
+    text = SLIDE.format(0).replace('<motor joint="p"/>', '<motor joint="p" delay="0.3" nsample="200"/>')
+    with pytest.raises(ParameterError, match="state that can be put back"):
+        CycleMap(mujoco.MjModel.from_xml_string(text), PUSH)

@@ -67,6 +67,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
     spread: Array  # range of each bend at the start of consecutive cycles, (N-1,)
     contacts: tuple[str, ...]  # those that a larger bend than the reach changes, or that differ between cycles
     unit: str = "rad"  # unit of bends: rad (shown in degrees), m, rad/s, m/s, or "" if they differ
+    heading: bool = False  # whether the motion depends on the heading, which is divided out
 
     @property
     def stable(self) -> bool | None:
@@ -113,11 +114,21 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
             scatter = f"bends scatter over {self._shown(float(self.spread.max()), 2)}"
             said = f"{closes}, {scatter}, and there is no derivative. Contacts change from cycle to cycle"
         else:
-            bends = f"bends up to about {self._shown(self.reach, 1)}"
-            said = f"{closes}. The derivative holds for {bends}, beyond which contacts change"
-            if not self.contacts:
-                return [], [head, *rows], [f"{closes}. None of the {bends} changes a contact."]
-        return [], [head, *rows], [f"{said}: {', '.join(self.contacts) or 'none found'}."]
+            said = f"{closes}. No bend up to about {self._shown(self.reach, 1)} changes a contact"
+            said += "; larger ones do" if self.contacts else ""
+        contacts = f": {', '.join(self.contacts) or 'none found'}." if self.contacts or self.reach is None else "."
+        return [], [head, *rows], [said + contacts, *self._remarks(size)]
+
+    def _remarks(self, size: str) -> list[str]:
+        """Sentences about bends of the given size, in words, that differ from the smallest ones, and the heading."""
+        remarks = []
+        if not self.finite:
+            remarks += [f"With bends of {size} the walk falls, or they grow too far: only smallest ones are shown."]
+        elif self.stable and any(abs(mode.multiplier) > 1.0 + mode.error for mode in self.finite):
+            remarks += [f"Bends of {size} grow, although the smallest ones decay."]
+        if self.heading:
+            remarks += ["The motion depends on the heading, as with pyramidal cones of friction: this is for one."]
+        return remarks
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the multipliers beside the unit circle: of smallest bends as discs, of finite ones as crosses."""

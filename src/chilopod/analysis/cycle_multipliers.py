@@ -11,10 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eig
 from scipy.special import stdtrit
 
 from chilopod import units
@@ -25,7 +27,7 @@ from chilopod.errors import AnalysisError, ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
-from chilopod.stability.spectrum import eigensystem
+from chilopod.stability.spectrum import eigensystem, falling
 from chilopod.statistics import LEVEL, Interval
 
 if TYPE_CHECKING:
@@ -38,11 +40,13 @@ _LEADING = 3  # multipliers
 _SETTLING, _CLOSING, _MEMORY = 30, 30, 10  # cycles: to settle, and of Anderson's method
 _CLOSED = 1e-11  # m, rad, per second
 _STEPS = (1e-7, 1e-8)  # of the differences; the first that changes no contact
+_ROUNDING = float(np.finfo(float).eps)
 _SHORTER = 0.25  # second step over the first
 _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
 _FORGOTTEN, _BLOCK = 2, 4  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
 _NOT_BENT = 1e-9  # part of a mode
+_HEADING = "the heading"  # see CycleMap.depends_on_place
 _MOST = 8  # multipliers between the ends of an interval that has an onset
 _DRIFT, _EVEN = 0.2, 2.0  # m, rad, per second, in all cycles that are followed; largest change over the least
 
@@ -87,7 +91,7 @@ def cycle_multipliers(
     ParameterError
         If an argument is none of these.
     AnalysisError
-        If the walk falls, or moves on in a coordinate in every cycle instead of settling.
+        If the walk falls before multipliers of smallest bends are known, moves on in a coordinate in every cycle instead of settling, or depends on its place.
     """
     if not 0.0 < amplitude < 1.0:
         raise ParameterError("must be a small angle", field="amplitude", value=amplitude, allowed="above 0, below 1")
@@ -99,22 +103,33 @@ def cycle_multipliers(
         allowed = f"{len(cycle.names)} finite numbers: {', '.join(cycle.names)}"
         raise ParameterError("must be the coordinates of a state", field="start", value=x.tolist(), allowed=allowed)
     x, closes = _closed(cycle, x)
+    place = cycle.depends_on_place(x)
+    if place not in ("", _HEADING):
+        allowed = "a world that looks the same from everywhere along `travel`, and from wherever a free body stands"
+        raise AnalysisError(f"must not depend on {place}, which is divided out", field="motion", allowed=allowed)
     derivative, step = _derivative(cycle, x)
     basis, dual = _leading(derivative, at)
     exact: tuple[CycleMode, ...] = ()
     if closes and step:
         tiny = [_followed(cycle, x, size * basis, dual / size, 1)[0] for size in (step, _SHORTER * step)]
-        exact = _modes(np.concatenate(tiny), basis[at], 1)
-    found = _followed(cycle, x, amplitude * basis, dual / amplitude, _FORGOTTEN + cycles)
-    matrices, seen = (each[_FORGOTTEN:] for each in found)
+        rounding = _ROUNDING * (1.0 + np.abs(x).max() / (_SHORTER * step))
+        exact = _modes(np.concatenate(tiny), basis[at], 1, rounding)
+    try:
+        found = _followed(cycle, x, amplitude * basis, dual / amplitude, _FORGOTTEN + cycles)
+    except AnalysisError:
+        if not exact:
+            raise
+        found = np.empty((0, 0, 0)), np.array([x, cycle(x[None])[0][0]])
+    matrices, seen = found[0][_FORGOTTEN:], found[1][_FORGOTTEN if len(found[0]) else 0 :]
     if not exact:
         _check_settled(cycle, seen)
     reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(seen))
     mismatch, spread = float(np.abs(seen[-1] - seen[-2]).max()), np.ptp(seen[:, at], axis=0)
-    finite = _modes(matrices, basis[at], _BLOCK)
+    finite = _modes(matrices, basis[at], _BLOCK) if len(matrices) else ()
     units = {cycle.units[each] for each in at}
     unit = units.pop() if len(units) == 1 else ""
-    return CycleMultipliers(name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit)
+    result = CycleMultipliers(name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit)
+    return replace(result, heading=True) if place else result
 
 
 def finite_modes(
@@ -188,7 +203,10 @@ def _derivative(cycle: CycleMap, x: Array, steps: tuple[float, ...] = _STEPS) ->
 def _leading(derivative: Array, at: NDArray[np.intp]) -> tuple[Array, Array]:
     """Real basis of the leading modes, (n, r), and its dual. The largest bend of a mode is 1, or, if it has none, its
     largest entry."""
-    values, right, left = eigensystem(derivative)
+    # Left eigenvectors of their own: the inverse of the right ones is lost if any mode at all is defective.
+    values, left, right = eig(derivative, left=True)
+    order = falling(values)
+    values, left, right = values[order], left[:, order], right[:, order]
     kept = np.arange(whole_pairs(values, _LEADING))
     size = np.abs(right[:, kept])
     size[at] /= _NOT_BENT
@@ -213,15 +231,19 @@ def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int)
     return np.array(matrices), np.array(seen)
 
 
-def _modes(matrices: Array, angles: Array, block: int) -> tuple[CycleMode, ...]:
+def _modes(matrices: Array, angles: Array, block: int, rounding: float = _ROUNDING) -> tuple[CycleMode, ...]:
     """Modes of the mean of matrices (m, r, r), with half their intervals of 95 % by Student's t, from means over blocks
-    of some of them in turn; rows of ``angles`` (joints, r) are yaw joints."""
+    of some of them in turn, at least the ``rounding`` of a matrix relative to its norm; rows of ``angles`` (joints, r)
+    are yaw joints."""
     values, right, left = eigensystem(matrices.mean(axis=0))
     # To first order, a matrix changes an eigenvalue by left^H (M - mean) right.
     each = np.einsum("ji,kjl,li->ik", left.conj(), matrices, right)
     blocks = each[:, len(matrices) % block :].reshape(len(values), -1, block).mean(axis=2)
     count = blocks.shape[1]
-    errors = stdtrit(count - 1, 0.5 + 0.5 * LEVEL) * blocks.std(axis=1, ddof=1) / math.sqrt(count)
+    with np.errstate(over="ignore", invalid="ignore"):  # a nearly defective matrix
+        errors = stdtrit(count - 1, 0.5 + 0.5 * LEVEL) * blocks.std(axis=1, ddof=1) / math.sqrt(count)
+        least = rounding * np.linalg.norm(matrices.mean(axis=0)) * np.linalg.norm(left, axis=0)
+    errors = np.nan_to_num(np.fmax(errors, least), nan=np.inf, posinf=np.inf)
     turns = angles @ right
     largest = turns[np.abs(turns).argmax(axis=0), np.arange(len(values))]
     scaled = np.where(np.abs(largest) > _NOT_BENT, turns / np.where(largest == 0.0, 1.0, largest), 0.0)
@@ -235,7 +257,11 @@ def _reach(cycle: CycleMap, x: Array, basis: Array, low: float) -> tuple[float, 
     for _ in range(_HALVINGS):
         size = math.sqrt(low * high)
         states = np.concatenate([x[None], x + size * basis.T, x - size * basis.T])
-        counts = cycle(states)[1]
+        try:
+            counts = cycle(states)[1]
+        except AnalysisError:  # so large a bend falls
+            high = size
+            continue
         changed = (counts != counts[0]).any(axis=1)
         if changed.any():
             high, differ = size, states[[0, changed.argmax()]]

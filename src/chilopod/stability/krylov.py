@@ -288,11 +288,10 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> tuple[Com
 
 
 def whole_pairs(values: ComplexArray, count: int) -> int:
-    """A number of multipliers, or one more to include the conjugate of the last."""
+    """A number of multipliers, or more to include the conjugates of all; equal pairs may stand in any order."""
+    whole = np.cumsum(np.sign(values.imag)) == 0.0
     count = min(count, values.size)
-    if count < values.size and values[count - 1].imag > 0.0 and values[count].imag < 0.0:
-        count += 1
-    return count
+    return count + int(whole[count - 1 :].argmax()) if count else 0
 
 
 def _bend(

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg.lapack import dgeqrf, dorgqr
 
 from chilopod.errors import AnalysisError
@@ -92,14 +93,19 @@ def eigensystem(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray
     """Eigenvalues by falling modulus, unit right eigenvectors as columns, and left ones with left[:, i]^H right[:, i] =
     1; these are infinite for a defective matrix, whose conditions give no bound."""
     values, right = np.linalg.eig(matrix)
-    relative = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
-    # The two of a pair stand together, positive frequency first.
-    order = np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -relative))
+    order = falling(values)
     values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
     try:
         return values, right, np.linalg.inv(right).conj().T
     except np.linalg.LinAlgError:
         return values, right, np.full_like(right, np.inf)
+
+
+def falling(values: ComplexArray) -> NDArray[np.intp]:
+    """Order by falling modulus. The two of a pair stay together, positive frequency first, as the eigenvalue solver
+    returns them."""
+    relative = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
+    return np.lexsort((-np.round(np.abs(values.imag), 12), -relative))
 
 
 def spectrum(image: ReturnMap) -> Spectrum:

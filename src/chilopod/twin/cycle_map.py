@@ -22,6 +22,8 @@ _TOLERANCE = 1e-15
 
 _FREE, *_PLAIN = map(int, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
 _WHOLE = 1e-9  # of a cycle
+_ELSEWHERE = 1.0  # m or rad
+_ALIKE = 1e-7  # largest change of a coordinate by rounding
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the body has fallen
 _SPEEDS = ("ahead", "left", "up", "roll", "pitch", "yaw")
 
@@ -39,20 +41,27 @@ class CycleMap:
     Parameters
     ----------
     model
-        Model, which is copied. Joints are hinges and slides, beside one free joint in front; gravity is vertical.
-        Others are refused by a ParameterError.
+        Model, which is copied. Joints are hinges and slides, beside one free joint in front; gravity is vertical, and
+        actuators and sensors have no states and no delays. Others are refused by a ParameterError.
     control
         Controls before every step of a cycle, shape (steps, nu).
     travel
-        Names of joints along which the floor looks the same, such as the slide ahead of a planar walker.
+        Names of joints along which the world looks the same, such as the slide ahead of a planar walker. It must also
+        look the same from wherever a free body stands; :meth:`depends_on_place` tells.
     """
 
     def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: tuple[str, ...] = ()) -> None:
         self.model, self.control = copy.copy(model), np.array(control, dtype=np.float64)
         kinds = self.model.jnt_type.tolist()
         self._free = free = kinds[:1] == [_FREE]
-        if not kinds or not set(kinds[free:]) <= set(_PLAIN) or self.model.na or self.model.opt.gravity[:2].any():
-            allowed = "hinges and slides behind at most one free joint, actuators without states, vertical gravity"
+        flags, states = self.model.opt.enableflags, (self.model.na, self.model.nhistory, self.model.npluginstate)
+        asleep = flags & int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+        plain = kinds and set(kinds[free:]) <= set(_PLAIN) and not self.model.opt.gravity[:2].any()
+        if not plain or any(states) or asleep:
+            allowed = (
+                "hinges and slides behind at most one free joint, actuators and sensors without states or delays, "
+            )
+            allowed += "bodies that do not sleep, vertical gravity"
             raise ParameterError("must have a state that can be put back", field="model", allowed=allowed)
         if self.control.ndim != 2 or self.control.shape[1] != self.model.nu or not len(self.control):
             allowed = f"a row for each step, {self.model.nu} columns"
@@ -95,9 +104,12 @@ class CycleMap:
     def __call__(self, x: Array) -> tuple[Array, NDArray[np.int32]]:
         """States after a cycle, and the number of contacts in each step, shape (runs, steps), from states before it,
         shape (runs, n); AnalysisError if one falls."""
-        batch = Batch(self.model, len(x), cores())
+        return self._run(*self.full(x))
+
+    def _run(self, positions: Array, rates: Array) -> tuple[Array, NDArray[np.int32]]:
+        batch = Batch(self.model, len(positions), cores())
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
-        batch.bind("qpos")[:], batch.bind("qvel")[:] = self.full(x)
+        batch.bind("qpos")[:], batch.bind("qvel")[:] = positions, rates
         with silence():
             counts = batch.rollout(len(self.control), self.control, record=["ncon"])["ncon"]
         image = self.reduced(batch.bind("qpos"), batch.bind("qvel"))
@@ -106,7 +118,27 @@ class CycleMap:
             said = "the walk falls, or becomes too fast to follow, within a cycle"
             allowed = "a gait that walks, with steps that are short enough"
             raise AnalysisError(said, field="multipliers", allowed=allowed)
-        return image, counts.reshape(len(x), -1)
+        return image, counts.reshape(len(positions), -1)
+
+    def depends_on_place(self, x: Array) -> str:
+        """Name of a place ("x", "y" or "the heading" of a free body, or a joint of ``travel``) on which the cycle from
+        a state (n,) depends, or "": the cycle is repeated from 1 m or 1 rad away, and must end with the same
+        coordinates."""
+        travel = 7 * self._free + np.setdiff1d(np.arange(self.model.nq - 7 * self._free), self._kept)
+        places = {"x": 0, "y": 1, "the heading": 3} if self._free else {}
+        places |= {self.model.joint(int(at) - 6 * self._free).name: int(at) for at in travel}
+        positions, rates = self.full(np.repeat(x[None], len(places) + 1, axis=0))
+        for row, (name, at) in enumerate(places.items(), 1):
+            if name == "the heading":
+                turned = Rotation.from_rotvec([0.0, 0.0, _ELSEWHERE])
+                rates[row, :3] = turned.apply(rates[row, :3])
+                body = turned * Rotation.from_quat(positions[row, 3:7], scalar_first=True)
+                positions[row, 3:7] = body.as_quat(scalar_first=True)
+            else:
+                positions[row, at] += _ELSEWHERE
+        images = self._run(positions, rates)[0]
+        off = np.abs(images - images[0]).max(axis=1)
+        return next((name for name, change in zip(places, off[1:], strict=True) if change > _ALIKE), "")
 
     def changing(self, states: Array) -> tuple[str, ...]:
         """Geoms of moving bodies whose contacts differ between the cycles from states (runs, n), and when, in words;

@@ -207,7 +207,8 @@ class Estimates:
     def _constant(self, at: int, ends: Array) -> dict[str, Any]:
         value, known = float(self.values[at]), ends.tolist() if np.isfinite(ends).all() else None
         found = {"value_si": value, "text": self._text(at, value, ends), "interval_si": known}
-        return {**found, "interval_text": self.between(at, ends) or "none found"}
+        none = "none found" if np.isnan(self.ends).all() else "no end found"
+        return {**found, "interval_text": self.between(at, ends) or none}
 
     def between(self, at: int, ends: Array) -> str:
         """Range of a constant in words, and whether the data or the search end it; nothing if it is NaN."""
@@ -215,7 +216,9 @@ class Estimates:
         if not np.isfinite(ends).all():
             return ""
         remark = " (cut by the range searched)" if min(ends[0] - low, high - ends[1]) <= _AT * (high - low) else ""
-        remark = " (left open by the data)" if half > _OPEN * (high - low) else remark
+        # At the end of a range the data ask for values beyond it.
+        inside = min(self.values[at] - low, high - self.values[at]) > _AT * (high - low)
+        remark = " (left open by the data)" if inside and half > _OPEN * (high - low) else remark
         return " to ".join(self._text(at, end, ends) for end in ends.tolist()) + remark
 
     def _text(self, at: int, value: float, ends: Array) -> str:

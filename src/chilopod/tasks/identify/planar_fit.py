@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -238,7 +239,12 @@ def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array
     """
     off, scale, limits = _Residuals(robot, data), scale_of(robot, data), np.transpose(_BOUNDS)
     most = float((off(best / scale) ** 2).sum() + _RISE)
+    within = {
+        "fun": lambda x: most - float((off(x) ** 2).sum()),
+        "jac": lambda x: -2.0 * off(x) @ off.jacobian(x),
+    }
     intervals = np.full((len(FREE), 2), np.nan)
+    ends: list[Array] = []
     if not determined(off.jacobian(best / scale)):
         return intervals
     for constant, side in np.ndindex(len(FREE), 2):
@@ -254,9 +260,16 @@ def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array
                 here, before = np.clip(here + move, *limits), here
                 if np.abs(here - before).max() < _STEP:
                     break
-        more = most - (residuals(with_constants(robot, here * scale), data) ** 2).sum()
-        if abs(more) <= _ROOM or (more > 0.0 and here[constant] in limits[:, constant]):
-            intervals[constant, side] = here[constant] * scale[constant]
+        goal = (1.0, -1.0)[side] * np.eye(len(FREE))[constant]
+        # Moves do not follow a wide or strongly curved valley.
+        for place in chain([here], (_least(goal, each, _BOUNDS, within) for each in (best / scale, *ends))):
+            if place is None:
+                continue
+            more = most - (residuals(with_constants(robot, place * scale), data) ** 2).sum()
+            if abs(more) <= _ROOM or (more > 0.0 and place[constant] in limits[:, constant]):
+                intervals[constant, side] = place[constant] * scale[constant]
+                ends.append(place)
+                break
     return intervals
 
 
