@@ -108,7 +108,7 @@ def known_names(
         raise ParameterError("must be names", field=field, value=names, allowed=", ".join(known))
     for name in names:
         if name not in known:
-            near = nearest_name(name, known)
+            near = nearest_name(str(name), known)
             raise ParameterError(problem, field=field, value=name, allowed=", ".join(known), nearest=near)
     return tuple(dict.fromkeys(names))
 

@@ -61,8 +61,35 @@ def test_long_chains_are_refused_before_the_work_and_short_ones_are_not(monkeypa
     with pytest.raises(AnalysisError, match=r"body\.modules = 1000.*hours: 2001 states.*about 60 minutes"):
         straight_walk(ROBOT.with_value("body.modules", 1000))
     assert asked == [100]
-    monkeypatch.setattr(stability, "exponents", lambda model: (_ for _ in ()).throw(InterruptedError))
+    monkeypatch.setattr(stability, "exponents", lambda model, **_: (_ for _ in ()).throw(InterruptedError))
     with pytest.raises(InterruptedError):  # it begins
         straight_walk(ROBOT.with_value("body.modules", 30))
     with pytest.raises(AnalysisError, match=r"2\.49 minutes"):
         straight_walk(ROBOT.with_value("body.modules", 30), longest=60.0)
+
+
+SIDES_ALIKE = [
+    *("body.modules=8", "springs.damping[1]=0.3 N*m*s/rad", "springs.damping[2]=0.5 N*m*s/rad"),
+    *("gait.side_phase=0 deg", "body.length=0.53 m", "gait.stance=0.42 s", "gait.swing=0.84 s"),
+    *("ground.friction=1350 N*s/m", "gait.stride=24 mm", "gait.module_phase=300 deg", "legs.half_width=18 mm"),
+    "legs.forward_offset=0 mm",
+]
+UNEVEN = [
+    *("body.modules=8", "body.length=8.6 m", "body.mass=0.16 kg", "springs.damping[2]=3 N*m*s/rad"),
+    *("springs.damping[3]=5 N*m*s/rad", "springs.damping[4]=4 N*m*s/rad", "springs.damping[5]=2 N*m*s/rad"),
+    *("springs.damping[6]=0 N*m*s/rad", "gait.swing=10 ms", "ground.friction=27 N*s/m", "gait.stride=58 cm"),
+]
+
+
+@pytest.mark.parametrize(("texts", "stable"), [(SIDES_ALIKE, True), (UNEVEN, False)])
+def test_modes_that_die_out_too_fast_do_not_hide_the_others(texts, stable):
+    robot = load_robot("aoi2022-planar").set_from_text(texts)
+    found = straight_walk(robot)
+    assert found.stable is stable
+    assert 0 < len(found.exponents.values) < found.exponents.multipliers.values.size
+    assert np.isfinite(found.exponents.values).all()
+    leading = found.exponents.multipliers.values[: len(found.moduli)]
+    np.testing.assert_allclose(found.moduli, np.abs(leading), rtol=1e-6)
+    assert "modes that die out faster are not resolved" in "\n".join(found.lines())
+    with pytest.raises(AnalysisError, match="contracts too strongly"):
+        stability.exponents(PlanarModel(robot))

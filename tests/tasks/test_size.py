@@ -170,3 +170,25 @@ def test_curved_walks_beside_a_stable_straight_one_are_said_not_to_be_searched()
     assert any("subcritical" in reason for reason in found.reasons)
     other = size(ROBOT, {"radius": "0.6 m"}, [("springs.stiffness[0]", "13 N*mm/deg", "14 N*mm/deg")], budget=12)
     assert not any("subcritical" in reason for reason in other.reasons)
+
+
+def test_an_onset_that_is_met_is_the_first_one():
+    """Along the interval the multiplier of the spring is critical more than once: the wish is for the first loss."""
+    texts = ["body.modules=4", "body.length=20 mm", "body.mass=2 g", "legs.half_width=2 mm", "legs.forward_offset=1 mm"]
+    texts += ["gait.stride=1 mm", "gait.stance=0.05 s", "gait.swing=0.05 s", "ground.friction=0.05 N*s/m"]
+    tiny = ROBOT.set_from_text([*texts, "springs.stiffness=1e-8 N*m/rad"])
+    onset, (low, high) = stiffness(2e-5), (stiffness(3e-6), stiffness(3e-5))
+    found = size(tiny, {"onset": onset}, [("legs.forward_offset", 0.0, 0.003)], onset=Onset(K1, (low, high)))
+    assert found.outcome is not Outcome.MET or found.values[0] == pytest.approx(onset, rel=1e-5)
+    assert found.outcome is Outcome.UNMET  # where 2e-5 is critical, the walk is unstable at both ends
+    found = size(tiny, {"onset": onset}, [("legs.forward_offset", 0.0, 0.003)], onset=Onset(K1, (low, 1.25 * onset)))
+    assert found.values[0] == pytest.approx(onset, rel=1e-5)
+    assert found.bound < 1e-12
+
+
+def test_an_onset_that_jumps_is_no_crash():
+    """Over the phase between modules the first loss jumps from 74 to 121 degrees as the spring rises."""
+    number = Onset("gait.module_phase", tuple(np.radians([60.0, 130.0])))
+    found = size(ROBOT, {"onset": np.radians(90.0)}, [(K1, "11.5 N*mm/deg", "13 N*mm/deg")], onset=number)
+    assert found.outcome is Outcome.UNMET
+    assert np.isfinite(found.values[0])

@@ -48,7 +48,7 @@ class CycleMode(ReadOnlyArrays):
         turn = abs(float(np.angle(self.multiplier)))
         shown = number(self.multiplier, 6).replace("+", " ± ")
         shape = self.shape + (f" of {2.0 * math.pi / turn:.3g} cycles" if turn else "")
-        angles = "  ".join(number(angle, 2) for angle in self.angles)
+        angles = "  ".join(number(angle, 2) for angle in np.round(self.angles, 12))
         return which, shown, f"{self.error:.1e}", f"{abs(self.multiplier):.6f}", shape, angles
 
 

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
 from chilopod.engine import Engine, engine_named
 from chilopod.engine.arguments import as_array
 from chilopod.errors import AnalysisError, ParameterError, known_names
+from chilopod.flows.arguments import checked_count
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
@@ -43,7 +45,7 @@ _STEPS = (1e-7, 1e-8)  # of the differences; the first that changes no contact
 _ROUNDING = float(np.finfo(float).eps)
 _SHORTER = 0.25  # second step over the first
 _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
-_FORGOTTEN, _BLOCK = 2, 4  # cycles
+_FORGOTTEN, _BLOCK, _MOST_CYCLES = 2, 4, 10_000  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
 _NOT_BENT = 1e-9  # part of a mode
 _HEADING = "the heading"  # see CycleMap.depends_on_place
@@ -91,12 +93,14 @@ def cycle_multipliers(
     ParameterError
         If an argument is none of these.
     AnalysisError
-        If the walk falls before multipliers of smallest bends are known, moves on in a coordinate in every cycle instead of settling, or depends on its place.
+        If the walk falls before multipliers of smallest bends are known, moves on in a coordinate in every cycle, or
+        depends on its place.
     """
-    if not 0.0 < amplitude < 1.0:
-        raise ParameterError("must be a small angle", field="amplitude", value=amplitude, allowed="above 0, below 1")
-    if cycles < 3 * _BLOCK:
-        raise ParameterError("must be more", field="cycles", value=cycles, allowed=f"{3 * _BLOCK} or more")
+    if not (isinstance(amplitude, Real) and 0.0 < amplitude < 1.0):
+        allowed = "above 0, below 1, in the unit of the bends (rad)"
+        raise ParameterError("must be a small number", field="amplitude", value=amplitude, allowed=allowed)
+    if checked_count("cycles", cycles, _MOST_CYCLES) < 3 * _BLOCK:
+        raise ParameterError("must be more", field="cycles", value=cycles, allowed=f"{3 * _BLOCK} to {_MOST_CYCLES}")
     at = _indices(cycle, bends)
     x = as_array("start", start)
     if x.shape != (len(cycle.names),) or not np.isfinite(x).all():
@@ -156,7 +160,7 @@ def finite_modes(
 
 def _indices(cycle: CycleMap, bends: Sequence[str]) -> NDArray[np.intp]:
     """Indices of coordinates with these names."""
-    if isinstance(bends, str) or not len(bends):
+    if not bends or isinstance(bends, str):
         raise ParameterError("must be a list of names", field="bends", value=bends, allowed=", ".join(cycle.names))
     known_names(bends, cycle.names, "bends", "must be a coordinate")
     return np.array([cycle.names.index(each) for each in bends])

@@ -140,7 +140,8 @@ class Onset:
 
 
 class Measured:
-    """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before.
+    """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before,
+    but onsets are searched in the whole interval if not ``similar``.
 
     Each of :data:`QUANTITIES` is a method of a robot, and raises AnalysisError where the robot has no such quantity.
 
@@ -152,8 +153,8 @@ class Measured:
         Number of branches of curved walks that were followed so far, which take a second or more each.
     """
 
-    def __init__(self, number: Onset) -> None:
-        self.number, self.branches = number, 0
+    def __init__(self, number: Onset, similar: bool = True) -> None:
+        self.number, self.branches, self._similar = number, 0, similar
         self._critical: float | None = None
         self._near: tuple[Array, Array] | None = None  # state of a curved walk, inverse of the slope of what it lacks
         self._last: tuple[Robot, WalkMeans] | None = None
@@ -164,7 +165,7 @@ class Measured:
 
     def onset(self, robot: Robot) -> float:
         """Critical value of the number."""
-        known = self._critical
+        known = self._critical if self._similar else None
         self._critical = self.number.first(robot).point.value if known is None else self.number.beside(robot, known)
         return self._critical
 

@@ -37,9 +37,10 @@ class StraightWalk(Summary, ReadOnlyArrays):
     Attributes
     ----------
     robot, exponents
-        Robot; exponents, modes and multipliers of its reduced system, 2N+1 of each.
+        Robot; exponents, modes and multipliers of its reduced system, 2N+1 of each, but fewer exponents and modes
+        where the fastest die out too fast to be resolved.
     joint_components
-        Joint angles of every mode, shape (2N+1, N-1), see :func:`joint_components`.
+        Joint angles of every mode, shape (modes, N-1), see :func:`joint_components`.
     """
 
     robot: Robot
@@ -58,7 +59,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
 
     @property
     def moduli(self) -> NDArray[np.float64]:
-        """Growth factor of every mode over one period, shape (2N+1,)."""
+        """Growth factor of every mode over one period, shape (modes,)."""
         return read_only(np.exp(self.exponents.values.real * self.robot.gait.period))
 
     def as_json(self) -> dict[str, Any]:
@@ -93,7 +94,10 @@ class StraightWalk(Summary, ReadOnlyArrays):
         ):
             rows.append((f"{modulus:.6g}", _in_words(exponent, 6), "  ".join(map(_in_words, components))))
         nearer = "; the largest is nearer to 1 than that" if self.stable is None else ""
-        return [], rows, [f"multipliers are within {self.exponents.multipliers.error_bound:.1e}{nearer}"]
+        said = [f"multipliers are within {self.exponents.multipliers.error_bound:.1e}{nearer}"]
+        if faster := self.exponents.multipliers.values.size - len(self.moduli):
+            said.append(f"{faster} modes that die out faster are not resolved")
+        return [], rows, said
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the multipliers beside the unit circle, see :meth:`chilopod.stability.Multipliers.plot`."""
@@ -201,7 +205,7 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
         )
         allowed = f"about {_duration(longest)}: fewer modules, or longer and heavier ones"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules, allowed=allowed)
-    found = stability.exponents(model)
+    found = stability.exponents(model, resolved=True)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
     return StraightWalk(robot, found, components)
 

@@ -29,13 +29,16 @@ if TYPE_CHECKING:
     from chilopod.robot import Robot
 
 
+_AMPLITUDE = "1 deg"
+
+
 @with_options
 def stability(
     options: RobotOptions,
     engine: EngineOption = "planar",
     amplitude: Annotated[
         str, typer.Option(metavar="ANGLE", help='Size of the bends that the twin is given, such as "1 deg".')
-    ] = "1 deg",
+    ] = _AMPLITUDE,
     onset: Annotated[
         tuple[str, str, str] | None,
         typer.Option(metavar="PATH LOW HIGH", help="Number of the robot, and values between which bends set in."),
@@ -62,6 +65,12 @@ def stability(
         size = units.parse(amplitude, "rad")
     if engine == "planar" and onset:
         raise ParameterError("must be 'twin' for --onset", field="engine", value=engine, allowed="chilopod bifurcation")
+    if engine == "planar" and amplitude != _AMPLITUDE:
+        raise ParameterError("must be 'twin' for --amplitude", field="engine", value=engine)
+    if not 0.0 < size < 1.0:
+        raise ParameterError(
+            "must be a small angle", field="amplitude", value=amplitude, allowed="above 0, below 1 rad"
+        )
     with progress_bar("stability") as show:
         if engine == "planar":
             from chilopod.analysis import straight_walk

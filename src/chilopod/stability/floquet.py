@@ -22,7 +22,15 @@ from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import return_maps
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
-from chilopod.stability.spectrum import VERDICTS, phased, spectrum, split_return, stable_within
+from chilopod.stability.spectrum import (
+    SAFETY,
+    VERDICTS,
+    ContractionError,
+    phased,
+    spectrum,
+    split_return,
+    stable_within,
+)
 from chilopod.stability.system import PeriodicSystem
 
 if TYPE_CHECKING:
@@ -31,6 +39,7 @@ if TYPE_CHECKING:
 
 
 _RESOLVED = 1e-6  # modulus of a multiplier below which the error bound of an eigenvalue is invalid
+_TELLING = 0.1  # relative error of a multiplier whose exponent is reported alone
 _SAME_ANGLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
 
@@ -210,15 +219,27 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
         return [_multipliers(from_known(system, state, image=image)) for system, state, image in known]
 
 
-def exponents(system: SystemLike, orbit: ArrayLike | None = None, *, seconds: float = math.inf) -> Exponents:
-    """All Floquet exponents and modes, including strongly damped ones; arguments as for :func:`multipliers`.
+def exponents(
+    system: SystemLike, orbit: ArrayLike | None = None, *, resolved: bool = False, seconds: float = math.inf
+) -> Exponents:
+    """All Floquet exponents and modes, including strongly damped ones; other arguments as for :func:`multipliers`.
 
     The state space is split along factors of the period: a multiplier of 1e-60 is relatively as accurate as one of 0.5.
+    Where a flow contracts too strongly for that, an AnalysisError says so; with ``resolved`` the exponents of the
+    multipliers that are resolved without it are returned, those of largest modulus.
     """
     with Deadline(seconds):
         found = find_orbit(system, orbit)
         image = found.image
-        log_nu, modes, moved = split_return(system, found.state, image)
+        try:
+            log_nu, modes, moved = split_return(system, found.state, image)
+        except ContractionError:
+            spec = spectrum(image)
+            kept = spec.error < _TELLING * np.abs(spec.values)
+            if not resolved or not kept.any():
+                raise
+            log_nu, modes = np.log(spec.values[kept]), spec.right[:, kept]
+            moved = SAFETY * (spec.error[kept] / np.abs(spec.values[kept]))
     bound = image.returns * (moved + 4.0 * _EPSILON * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k, with the imaginary part in (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))

@@ -163,6 +163,10 @@ def phased(vectors: ComplexArray) -> ComplexArray:
     return np.asarray(vectors * (np.abs(peaks) / peaks))
 
 
+class ContractionError(AnalysisError):
+    """The flow contracts some directions too strongly for their growth to be resolved."""
+
+
 _WORST_CONDITION = 1e6
 _FEWEST, _MOST, _MOST_STIFF = 8, 32768, 4096  # numbers of parts of moderate condition; steps of a stiff flow are costly
 _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, above which the flow has no parts
@@ -253,7 +257,7 @@ def _moderate_parts(system: SystemLike, x: Array, parts: list[_Part], units: Arr
         middle = 0.5 * (part.start + part.end)
         asked += 2
         if asked > most or not part.start < middle < part.end:
-            raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+            raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
         first = _part(system, done[-1].state if done else x, part.start, middle, units)
         left += [_part(system, first.state, middle, part.end, units), first]
     return done
@@ -282,7 +286,7 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
         with contextlib.suppress(np.linalg.LinAlgError):
             inverses = np.linalg.inv(np.array(factors[::-1]))
     if not np.isfinite(inverses).all():
-        raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+        raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
     growth = np.log(stretches).sum(axis=0) / _AVERAGED
     fast, _, fast_motion = _iterate(inverses, n)
     # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
@@ -302,6 +306,8 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
         logarithms.append(values)
         vectors.append(bases[0] @ columns)
     log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
+    if not np.isfinite(log_all).all():  # directions that could not be separated
+        raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
     order = np.argsort(-log_all.real, kind="stable")
     moved = _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, logarithms)
     return log_all[order], vec_all[:, order], moved[order]
@@ -343,11 +349,12 @@ def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
     product, scale = np.eye(factors[0].shape[1]), 0.0
     for factor in factors:
         product = factor @ product
-        size = float(np.abs(product).max())
+        size = float(np.abs(product).max()) or 1.0
         product /= size
         scale += float(np.log(size))
     values, columns = np.linalg.eig(product)
-    return np.log(np.abs(values)) + scale + 1j * np.angle(values), columns
+    with np.errstate(divide="ignore"):  # what has vanished beside the others
+        return np.log(np.abs(values)) + scale + 1j * np.angle(values), columns
 
 
 def _moved(factors: Array, errors: Array, groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]) -> Array:
@@ -410,4 +417,4 @@ def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
                 return np.asarray(right[slow:].T)
             break
         duration *= 0.5
-    raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+    raise ContractionError("the flow contracts too strongly to be resolved", field="flow")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from chilopod.cores import cores
+from chilopod.engine.arguments import as_array
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
@@ -51,7 +52,7 @@ class CycleMap:
     """
 
     def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: tuple[str, ...] = ()) -> None:
-        self.model, self.control = copy.copy(model), np.array(control, dtype=np.float64)
+        self.model, self.control = copy.copy(model), np.array(as_array("control", control))
         kinds = self.model.jnt_type.tolist()
         self._free = free = kinds[:1] == [_FREE]
         flags, states = self.model.opt.enableflags, (self.model.na, self.model.nhistory, self.model.npluginstate)

@@ -84,14 +84,18 @@ def test_a_series_of_ones_own_is_fitted_as_well(tmp_path, monkeypatch):
     [
         ('"1.7 N*mm/deg"', '"0 N*mm/deg"', "onset[1] = '0 N*mm/deg': must be positive"),
         ('onset = ["34', 'onset = ["24', "onset = '24 N*mm/deg': must lie above all springs of curves (28 N*mm/deg)"),
-        ('"28 N*mm/deg", "21 N*mm/deg", ', "", "curved = 2: must have 3 springs or more"),
+        ('"28 N*mm/deg", "21 N*mm/deg", ', "", "curved: must have 3 springs or more, not 2"),
         ('["0.88 m", "0.044 m"]', '["0.88 m"]', "radii[21 N*mm/deg] = ['0.88 m']: must be a number and its"),
         ('["0.88 m", "0.044 m"]', '["0.88 rad", "0.044 m"]', "radii[21 N*mm/deg][0] = '0.88 rad': is an angle"),
         ('"legs.half_width"', '"legs.half_wide"', "did you mean 'legs.half_width'?"),
         ('["50 mm", "100 mm"]', '["100 mm", "50 mm"]', "free[legs.half_width] = ['100 mm', '50 mm']: must be a rising"),
         ('["0.02 s"', '["0.02 m"', "free[twin.servo_damping/twin.servo_stiffness] = '0.02 m': is a length"),
         ('"70 mm"]', '"70 mm"]\n"springs.stiffness" = [1, 2]', "free[springs.stiffness]: must not be k1"),
-        ("/twin.servo_stiffness", "/body.mass", "= 'body.mass': must be the ratio to a constant above it"),
+        (
+            "/twin.servo_stiffness",
+            "/body.mass",
+            "= 'body.mass': must be the ratio to a constant that stands above it in [free]",
+        ),
     ],
 )
 def test_wrong_data_are_refused_in_one_line(tmp_path, old, new, complaint):

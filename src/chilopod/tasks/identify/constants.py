@@ -136,7 +136,7 @@ def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
     if path in before:
         raise ParameterError("must be given once")
     if slash and per not in before:
-        raise ParameterError("must be the ratio to a constant above it", value=per)
+        raise ParameterError("must be the ratio to a constant that stands above it in [free]", value=per)
     if not is_list(ends) or len(ends) != 2:
         raise ParameterError("must be two ends of a range", value=ends)
     quantity = place_of(path).quantity

@@ -129,8 +129,8 @@ class BaseSeries(Description):
     @model_validator(mode="after")
     def _is_a_series(self) -> Self:
         for name, least in (("curved", 3), ("straight", 1), ("radii", 1)):
-            if len(set(getattr(self, name))) < least:
-                raise ParameterError(f"must have {least} springs or more", field=name, value=len(getattr(self, name)))
+            if (count := len(set(getattr(self, name)))) < least:
+                raise ParameterError(f"must have {least} springs or more, not {count}", field=name)
         for name, allowed in (("onset", (2,)), ("law", (0, 2))):
             if len(getattr(self, name)) not in allowed:
                 raise ParameterError("must be two numbers", field=name, value=getattr(self, name))

@@ -82,14 +82,14 @@ class RecordedIdentification(Identified):
 
 
 def identify_recorded(
-    robot: Robot, data: RecordedWalks, folder: Path, progress: Progress = silent
+    robot: Robot, data: RecordedWalks, folder: str | Path, progress: Progress = silent
 ) -> RecordedIdentification:
     """Fit the free constants of a robot to recorded walks from files in a folder.
 
     Intervals are those of linear residuals with the scatter that is left. Directions that the data leave open end near
     the constants of the robot. Errors are those of :func:`read_recordings`.
     """
-    walks = _Walks(robot, data.free, read_recordings(robot, data, folder))
+    walks = _Walks(robot, data.free, read_recordings(robot, data, Path(folder)))
     unknown, count = _fit(walks, progress), len(data.free.each)
     measured = [each.angles for each in walks.recordings]
     fitted = [each[:, 0] for each in walks.computed(unknown[None])]

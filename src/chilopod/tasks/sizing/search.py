@@ -165,11 +165,7 @@ class Search:
             raise _SpentError
         self._robots += 1
         self.progress(min(0.99, 0.5 * self.evaluations / self._budget), f"{self._robots} robots")
-        try:
-            robot = self.at(place)
-            found = np.array([wish.searched(self._measured, robot) for wish in self.wishes])
-        except ChilopodError:
-            found = np.full(len(self.wishes), FAILED)
+        found = self._found(place, self._measured)
         self._seen.append(found)
         # Far from all wishes, a robot that has every quantity is nearer than one that has not.
         sizes = [(norm(self._missed(each)), norm(each)) for each in (found, self._least)]
@@ -177,11 +173,28 @@ class Search:
             self.best, self._least = place, found
         return found
 
+    def _found(self, place: Array, measured: Measured) -> Array:
+        try:
+            robot = self.at(place)
+            return np.array([wish.searched(measured, robot) for wish in self.wishes])
+        except ChilopodError:
+            return np.full(len(self.wishes), FAILED)
+
     def _missed(self, deviations: Array) -> Array:
         return np.array([w.missed(d) for w, d in zip(self.wishes, deviations.tolist(), strict=True)])
 
     def run(self) -> Outcome:
-        """Find the best place."""
+        """Find the best place; what meets the wishes is computed anew without its neighbours."""
+        outcome = self._searched()
+        if outcome is Outcome.MET and not self._met(self._found(self.best, Measured(self._measured.number))):
+            # Onsets of neighbours have led to another bifurcation of the robot than its first.
+            branches, self._measured = self._measured.branches, Measured(self._measured.number, similar=False)
+            self._measured.branches, self._limit = branches, self.evaluations + self._budget
+            self._least = np.full(len(self.wishes), np.inf)
+            outcome = self._searched()
+        return outcome
+
+    def _searched(self) -> Outcome:
         try:
             if len(self.axes) == len(self.wishes) == 1 and not self.wishes[0].sense:
                 self._root()
@@ -208,8 +221,13 @@ class Search:
         values[values == FAILED] = np.nan
         own = float(self._starts[0][0])
         brackets = [i for i in range(_SCANNED) if values[i] * values[i + 1] <= 0.0]
+        known = dict(zip(grid.tolist(), values.tolist(), strict=True))  # which another path to them may change
+
+        def deviation(x: float) -> float:
+            return known[x] if x in known else float(self.deviations(np.array([x]))[0])
+
         for i in sorted(brackets, key=lambda i: abs(grid[i : i + 2].mean() - own)):
-            brentq(lambda x: self.deviations(np.array([x]))[0], grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15)
+            brentq(deviation, float(grid[i]), float(grid[i + 1]), xtol=1e-15, rtol=1e-15)
             if self._met(self._least):
                 return
         self._starts.insert(0, np.clip(self.best, _AT_END, 1.0 - _AT_END))
