@@ -550,3 +550,44 @@ def test_the_brusselator_over_decades(between):
     assert found.complete
     assert found.searched == between
     assert [abs(point.value - 2.0) <= point.error_bound < 1e-9 for point in found] == [True]
+
+
+def uncoupled(p, other):
+    """Three oscillators of the frequencies 1, 1.7 and 2.3 with Hopf points at 1, 1 and another value."""
+
+    def rhs(t, x):
+        rates = []
+        for k, (at, frequency) in enumerate(((1.0, 1.0), (1.0, 1.7), (other, 2.3))):
+            a, b = x[2 * k], x[2 * k + 1]
+            growth = p - at - a * a - b * b
+            rates += [growth * a - frequency * b, frequency * a + growth * b]
+        return rates
+
+    return from_rhs(rhs, 6, None, guess_period=6.0)
+
+
+@pytest.mark.parametrize("other", [1.1, 1.3, 1.6])
+def test_two_pairs_that_cross_together_hide_no_third(other):
+    found = locate_hopf(lambda p: uncoupled(p, other), (0.3, 2.0), np.zeros(6))
+    assert found.complete
+    assert [point.value for point in found] == pytest.approx([1.0, other], abs=1e-12)
+    assert all(point.error_bound < 1e-12 for point in found)
+    assert [point.multiplicity for point in found] == [4, 2]
+
+
+def test_hopf_points_of_a_ring_of_36():
+    """Lorenz 96 at rest: F = 1 / (cos a - cos 2a) at a = 2 pi j / 36, of which two are 1."""
+
+    def ring(force):
+        return from_rhs(
+            lambda t, x: (np.roll(x, -1) - np.roll(x, 2)) * np.roll(x, 1) - x + force, 36, None, guess_period=2.0
+        )
+
+    angles = 2.0 * np.pi * np.arange(1, 18) / 36.0
+    rates = np.cos(angles) - np.cos(2.0 * angles)
+    expected = sorted({round(1.0 / rate, 12) for rate in rates if rate > 0.5})
+    found = locate_hopf(ring, (0.3, 2.0), np.full(36, 0.3))
+    assert found.complete
+    for point, value in zip(found, expected, strict=True):
+        assert abs(point.value - value) <= point.error_bound + 1e-12
+        assert point.error_bound < 1e-10

@@ -128,6 +128,8 @@ def critical_multipliers(spec: Spectrum, crossing: Crossing) -> NDArray[np.intp]
     # The requested one of a pair comes first.
     nu = crossing.multiplier
     distance = np.minimum(np.abs(spec.values - nu), np.abs(spec.values - nu.conjugate()))
+    if crossing.multiplicity > 2:  # pairs of any frequency that cross together
+        distance = distances(spec.values, crossing.event)
     return np.lexsort((np.abs(spec.values - nu), np.round(distance, 12)))[: crossing.multiplicity]
 
 

@@ -41,6 +41,7 @@ _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, rel
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
 _KEPT = 64  # cached systems
 _WIDE, _SHORTER = 3.7, 0.25  # ratio of the ends of a piece, on no round number, and factor on its width after a failure
+_SAME = 1e-9  # distance of values of one point on the border of two pieces, relative to the interval
 _NARROWEST = 1e-6  # width, relative to the interval, below which a piece is not made shorter
 _LEAST = 50  # least budget of a piece
 _WORDS = (
@@ -109,8 +110,11 @@ def locate_hopf(
         remarks.append(f"{limited} spent before the orbit was followed beyond {at:.9g}")
     points: list[BifurcationPoint] = []
     for each in pieces:  # a point on the border of two is found in both
+        near = _SAME * (high - low)
         points += [
-            new for new in each if all(new.value - old.value > new.error_bound + old.error_bound for old in points)
+            new
+            for new in each
+            if all(new.value - old.value > min(near, new.error_bound + old.error_bound) for old in points)
         ]
     said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(pieces[-1].ending)
     return Located(tuple(points), status, said, budget - left, (low, pieces[-1].searched[1]), ending)
