@@ -175,7 +175,13 @@ def samples_of(fits: Sequence[Fit]) -> Samples:
 
 
 def evaluate(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None = None) -> Fit:
-    """Walk the series with a set of constants, in parts of their ranges, or read an earlier result."""
+    """Residuals of a set of constants, in parts of their ranges."""
+    given, found = walked(robot, parts, data, folder)
+    return Fit(parts, residuals(given, found, data))
+
+
+def walked(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None = None) -> tuple[Robot, Series]:
+    """The robot with a set of constants, in parts of their ranges, and its series of walks, or an earlier result."""
     constants = data.free.values_at(parts)
     given = data.free.robot_with(robot, constants)
     series = [data.springs, data.law, data.shape, data.start(robot, data.springs).tolist()]
@@ -183,8 +189,7 @@ def evaluate(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None =
     path = (folder or Path()) / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
     with suppress(OSError, ValueError, KeyError):
         kept = json.loads(path.read_text()) if folder else {}
-        found = Series(*(np.array(kept[each.name], dtype=np.float64) for each in fields(Series)))
-        return Fit(parts, residuals(given, found, data))
+        return given, Series(*(np.array(kept[each.name], dtype=np.float64) for each in fields(Series)))
     try:
         found = base_series(given, data)
     except ChilopodError:  # legs too short, for example
@@ -193,7 +198,7 @@ def evaluate(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None =
     if folder:
         kept = {name: each.tolist() for name, each in vars(found).items()}
         write_atomic(path, json.dumps({"constants": constants.tolist(), **kept}))
-    return Fit(parts, residuals(given, found, data))
+    return given, found
 
 
 def known(free: FreeConstants = FITTED) -> list[Fit]:
