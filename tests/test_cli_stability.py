@@ -145,6 +145,7 @@ def test_bad_input_is_one_line_that_names_it(parameter, between, expected):
         (("aoi2022", "--engine", "twin", "--amplitude", "3 deg/s"), "--amplitude"),
         (("aoi2022", "--engine", "twin", "--amplitude", "3 rad"), "must be a small angle"),
         ((PRESET, "--onset", K1, "5 N*mm/deg", "30 N*mm/deg"), "must be 'twin' for --onset"),
+        ((PRESET, "--amplitude", "2 deg"), "must be 'twin' for --amplitude"),
     ],
 )
 def test_an_engine_without_multipliers_is_one_line_that_names_it(arguments, expected, monkeypatch):

@@ -91,10 +91,16 @@ def curved_walks(
     AnalysisError
         If there is no pitchfork in the interval.
     """
-    forks = [each for each in bifurcations(robot, parameter, between) if each.point.kind is Kind.PITCHFORK]
+    found = bifurcations(robot, parameter, between)
+    forks = [each for each in found if each.point.kind is Kind.PITCHFORK]
     if not forks:
-        searched = interval_text(robot, parameter, between)
-        raise AnalysisError("the straight walk has no pitchfork in this interval", field=parameter, value=searched)
+        problem, searched = (
+            "the straight walk has no pitchfork in this interval",
+            interval_text(robot, parameter, between),
+        )
+        others = [f"{each.point.kind.label} at {units.format(each.point.value, each.unit, digits=6)}" for each in found]
+        allowed = f"a pitchfork; here are: {', '.join(others)}" if others else None
+        raise AnalysisError(problem, field=parameter, value=searched, allowed=allowed)
     fork = forks[-1]
     # The positive side of the mode is that of positive joint angles.
     angles = fork.point.mode.real[3 : robot.body.modules + 2]
