@@ -249,6 +249,13 @@ def test_a_place_that_matters_is_not_divided_out(stiffness):
         cycle_multipliers("slide", cycle, np.zeros(3), ["p"])
 
 
+def test_a_joint_without_a_name_is_not_divided_out_either():
+    model = mujoco.MjModel.from_xml_string(SLIDE.format(2).replace('name="x"', ""))
+    cycle = CycleMap(model, PUSH, travel=("joint 0",))
+    with pytest.raises(AnalysisError, match="must not depend on joint 0"):
+        cycle_multipliers("slide", cycle, np.zeros(3), ["p"])
+
+
 def test_a_free_body_on_a_tether_is_refused_and_bends_that_fall_leave_the_smallest():
     tied, free = (CycleMap(mujoco.MjModel.from_xml_string(BOX.format(each)), PUSH) for each in (TETHER, ""))
     start = np.zeros(len(free.names))

@@ -94,10 +94,8 @@ def curved_walks(
     found = bifurcations(robot, parameter, between)
     forks = [each for each in found if each.point.kind is Kind.PITCHFORK]
     if not forks:
-        problem, searched = (
-            "the straight walk has no pitchfork in this interval",
-            interval_text(robot, parameter, between),
-        )
+        problem = "the straight walk has no pitchfork in this interval"
+        searched = interval_text(robot, parameter, between)
         others = [f"{each.point.kind.label} at {units.format(each.point.value, each.unit, digits=6)}" for each in found]
         allowed = f"a pitchfork; here are: {', '.join(others)}" if others else None
         raise AnalysisError(problem, field=parameter, value=searched, allowed=allowed)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -120,20 +119,20 @@ def cycle_multipliers(
         exact = _modes(np.concatenate(tiny), basis[at], 1, rounding)
     try:
         found = _followed(cycle, x, amplitude * basis, dual / amplitude, _FORGOTTEN + cycles)
-    except AnalysisError:
+        matrices, seen = (each[_FORGOTTEN:] for each in found)
+        finite = _modes(matrices, basis[at], _BLOCK)
+    except AnalysisError:  # so large bends fall
         if not exact:
             raise
-        found = np.empty((0, 0, 0)), np.array([x, cycle(x[None])[0][0]])
-    matrices, seen = found[0][_FORGOTTEN:], found[1][_FORGOTTEN if len(found[0]) else 0 :]
+        finite, seen = (), np.array([x, cycle(x[None])[0][0]])
     if not exact:
         _check_settled(cycle, seen)
     reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(seen))
     mismatch, spread = float(np.abs(seen[-1] - seen[-2]).max()), np.ptp(seen[:, at], axis=0)
-    finite = _modes(matrices, basis[at], _BLOCK) if len(matrices) else ()
     units = {cycle.units[each] for each in at}
     unit = units.pop() if len(units) == 1 else ""
-    result = CycleMultipliers(name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit)
-    return replace(result, heading=True) if place else result
+    found_at = name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit
+    return CycleMultipliers(*found_at, heading=bool(place))
 
 
 def finite_modes(

@@ -59,10 +59,8 @@ class CycleMap:
         asleep = flags & int(mujoco.mjtEnableBit.mjENBL_SLEEP)
         plain = kinds and set(kinds[free:]) <= set(_PLAIN) and not self.model.opt.gravity[:2].any()
         if not plain or any(states) or asleep:
-            allowed = (
-                "hinges and slides behind at most one free joint, actuators and sensors without states or delays, "
-            )
-            allowed += "bodies that do not sleep, vertical gravity"
+            allowed = "hinges and slides behind at most one free joint, actuators and sensors without states or "
+            allowed += "delays, bodies that do not sleep, vertical gravity"
             raise ParameterError("must have a state that can be put back", field="model", allowed=allowed)
         if self.control.ndim != 2 or self.control.shape[1] != self.model.nu or not len(self.control):
             allowed = f"a row for each step, {self.model.nu} columns"
@@ -72,7 +70,7 @@ class CycleMap:
             raise ParameterError("must be finite", field="control", value=wrong)
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.model.opt.tolerance, self.period = _TOLERANCE, len(self.control) * float(self.model.opt.timestep)
-        joints = [self.model.joint(i).name or f"joint {i}" for i in range(free, len(kinds))]
+        self._joints = joints = [self.model.joint(i).name or f"joint {i}" for i in range(free, len(kinds))]
         self._kept = np.array([i for i, name in enumerate(joints) if name not in travel], dtype=np.intp)
         if len(self._kept) != len(joints) - len(travel):
             raise ParameterError("must name joints", field="travel", value=travel, allowed=", ".join(joints))
@@ -125,9 +123,8 @@ class CycleMap:
         """Name of a place ("x", "y" or "the heading" of a free body, or a joint of ``travel``) on which the cycle from
         a state (n,) depends, or "": the cycle is repeated from 1 m or 1 rad away, and must end with the same
         coordinates."""
-        travel = 7 * self._free + np.setdiff1d(np.arange(self.model.nq - 7 * self._free), self._kept)
         places = {"x": 0, "y": 1, "the heading": 3} if self._free else {}
-        places |= {self.model.joint(int(at) - 6 * self._free).name: int(at) for at in travel}
+        places |= {name: 7 * self._free + i for i, name in enumerate(self._joints) if i not in self._kept}
         positions, rates = self.full(np.repeat(x[None], len(places) + 1, axis=0))
         for row, (name, at) in enumerate(places.items(), 1):
             if name == "the heading":
