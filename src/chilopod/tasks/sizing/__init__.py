@@ -95,7 +95,7 @@ def _axes(robot: Robot, free: Sequence[Given]) -> tuple[Axis, ...]:
     taken: set[str] = set()
     for each in axes:
         if each.whole:
-            raise ParameterError("must be a continuous number", field=f"free {each.path}", value=each.path)
+            raise ParameterError("must be a continuous number, not a count", field=f"free {each.path}")
         both = taken & each.numbers(robot)
         if both:
             said = f"must not change a number that another range changes: {', '.join(sorted(both))}"
