@@ -42,10 +42,16 @@ class Samples:
         return float(1.0 / np.sum(self.weights**2)) if len(self.weights) else 0.0
 
     def interval(self, values: Array) -> tuple[float, float]:
-        """Ends of the central 90 % interval of numbers that belong to the samples, shape (samples,)."""
-        order = np.argsort(values)
+        """Ends of the central interval that holds one more draw of a number with 90 %, from its values at the samples,
+        shape (samples,).
+
+        The order statistics r and s of n draws hold one more with probability (s - r)/(n + 1), here with n the
+        effective number (Wilks 1941); below n = 19 the interval ends at the smallest and largest value.
+        """
+        order, n = np.argsort(values), self.effective
         middles = np.cumsum(self.weights[order]) - 0.5 * self.weights[order]
-        low, high = np.interp([0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], middles, values[order])
+        beyond = 0.5 * (1.0 - CONFIDENCE) * (n + 1.0) / n - 0.5 / n
+        low, high = np.interp([beyond, 1.0 - beyond], middles, values[order])
         return float(low), float(high)
 
     def drawn(self, count: int) -> Array:

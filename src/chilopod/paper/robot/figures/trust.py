@@ -22,9 +22,8 @@ from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, spring, typeset
-from chilopod.tasks.identify.constants import CONFIDENCE
 from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
-from chilopod.tasks.identify.valley import LEAST, Samples
+from chilopod.tasks.identify.valley import LEAST
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
@@ -168,13 +167,15 @@ def spread(data: xr.Dataset) -> Panel:
     for valley, found in sets.items():
         opened = [path for path in data.constant.values if valley == _FREED or path in FITTED.paths]
         effective = float(data.effective.sel({"from": valley}))
+        count = found.sizes["set"]
         few = ", too few for reliable intervals" if effective < LEAST else ""
         within = listing(_range(data, path, found.constants.sel(constant=path)) for path in opened)
         text.append(
             f"{valley.capitalize()} the samples count as {number(effective, 2)} of equal weight{few}. "
-            f"{100.0 * CONFIDENCE:g} % of the sets have (A) {within}. Onsets that they predict (B), mean and "
-            f"{100.0 * CONFIDENCE:g} % interval, in {SPRING_UNIT}: {_predicted(found)}. They come nearest to the "
-            f"target in {_nearest(found)}\u00a0{SPRING_UNIT}."
+            f"The {count} sets drawn from them have (A) {within}. Onsets that they predict (B), mean, smallest and "
+            f"largest, in {SPRING_UNIT}: {_predicted(found)}. They come nearest to the target in {_nearest(found)}"
+            f"\u00a0{SPRING_UNIT}. A further set lies between the smallest and largest of {count} with probability "
+            f"{number((count - 1.0) / (count + 1.0), 2)}."
         )
     text.append(
         "These walks are undisturbed: the intervals are those of the valleys alone. The standard errors in the table "
@@ -192,14 +193,8 @@ def spread(data: xr.Dataset) -> Panel:
 
 def _range(data: xr.Dataset, path: str, values: xr.DataArray) -> str:
     unit = str(data.unit.sel(constant=path).values)
-    low, high = (units.format(each, unit, digits=2) for each in _interval(values))
+    low, high = (units.format(float(each), unit, digits=2) for each in (values.min(), values.max()))
     return f"{path} {low} to {high}".replace("*", "·")
-
-
-def _interval(values: xr.DataArray) -> tuple[float, float]:
-    """Ends of the interval of a number over the sets that have one."""
-    found = values.values[np.isfinite(values.values)]
-    return Samples(found[:, None], np.full(found.size, 1.0 / max(found.size, 1))).interval(found)
 
 
 def _points(found: xr.Dataset) -> dict[str, xr.DataArray]:
@@ -212,7 +207,7 @@ def _predicted(found: xr.Dataset) -> str:
     said = []
     for name, values in _points(found).items():
         if count := int(np.isfinite(values).sum()):
-            mean, low, high = (number(float(each), 3) for each in (values.mean(), *_interval(values)))
+            mean, low, high = (number(float(each), 3) for each in (values.mean(), values.min(), values.max()))
             spread = f"{low} to {high}, " if count >= _FEWEST else ""
             said.append(f"{name} {mean} ({spread}{count} of {values.size} sets have one)")
     return listing(said) or "no point"
