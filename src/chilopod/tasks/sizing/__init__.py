@@ -72,10 +72,10 @@ def size(
     outcome = search.run()
     reasons, front = search.reasons(outcome)
     found = search.at(search.best)
-    again = Measured(onset)
+    again = search.again
     values = np.array([wish.of(again, found) for wish in given])
     single = len(axes) == len(given) == 1 and not given[0].sense
-    bound = search.bound(again) if outcome is Outcome.MET and single else np.nan
+    bound = search.bound() if outcome is Outcome.MET and single else np.nan
     search.progress(1.0, "walks")
     engines = ("planar", "twin")[: 1 + twin]
     records = {name: run([bent(found, name, _duration(found, again))])[0] for name in engines}

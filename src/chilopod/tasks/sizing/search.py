@@ -125,6 +125,7 @@ class Search:
     ) -> None:  # fmt: skip
         self.robot, self.wishes, self.axes, self.progress = robot, wishes, axes, progress
         self._measured, self._budget, self._limit, self._robots = Measured(onset), budget, budget, 0
+        self.again = Measured(onset)  # for the best place alone
         scattered = Sobol(len(axes), rng=np.random.default_rng(seed)).random(_STARTS)
         own = [self._place(each) for each in axes]
         # The robot itself is the first start, so that of many answers one near it is found.
@@ -184,14 +185,14 @@ class Search:
         return np.array([w.missed(d) for w, d in zip(self.wishes, deviations.tolist(), strict=True)])
 
     def run(self) -> Outcome:
-        """Find the best place; what meets the wishes is computed anew without its neighbours."""
+        """Find the best place; what meets the wishes is computed anew without its neighbours, in ``again``."""
         outcome = self._searched()
-        if outcome is Outcome.MET and not self._met(self._found(self.best, Measured(self._measured.number))):
+        if outcome is Outcome.MET and not self._met(self._found(self.best, self.again)):
             # Onsets of neighbours have led to another bifurcation of the robot than its first.
             branches, self._measured = self._measured.branches, Measured(self._measured.number, similar=False)
             self._measured.branches, self._limit = branches, self.evaluations + self._budget
             self._least = np.full(len(self.wishes), np.inf)
-            outcome = self._searched()
+            outcome, self.again = self._searched(), Measured(self._measured.number)
         return outcome
 
     def _searched(self) -> Outcome:
@@ -243,15 +244,15 @@ class Search:
         place = found.x - 1.0
         return place, self.deviations(place)
 
-    def bound(self, again: Measured) -> float:
+    def bound(self) -> float:
         """Bound on the error of a root, SI: by its deviation in another computation, and the slope there; NaN if the
         number does not change the wish."""
         if not self._changed:
             return np.nan
-        (wish,), step, robot = self.wishes, 1e-5, self.at(self.best)
+        (wish,), step, robot, again = self.wishes, 1e-5, self.at(self.best), self.again
+        off = abs(wish.searched(again, robot)) + 1e-13
         ends = [np.clip(self.best + side * step, 0.0, 1.0) for side in (-1.0, 1.0)]
         rise = np.ptp([wish.searched(again, self.at(end)) for end in ends]) / (ends[1] - ends[0])[0]
-        off = abs(wish.searched(Measured(again.number), robot)) + 1e-13
         if wish.quantity == "radius":
             orbit = find_orbit(PlanarModel(robot, use_symmetry=False), again.state(robot))
             joints = slice(3, robot.body.modules + 2)
