@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterable
+from typing import Any
 
 _LONGEST_VALUE = 60
 _LONGEST_NAME = 200
@@ -133,9 +134,10 @@ def briefly(error: BaseException) -> str:
     return one_line(f"{type(error).__name__}: {words}" if words else type(error).__name__)
 
 
-def _brief(value: object) -> str:
+def _brief(value: Any) -> str:
     try:
-        text = repr(value)
+        # numpy's scalars as plain numbers
+        text = repr(value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value)
     except (ValueError, RecursionError):
         # An integer of more than 4300 digits or a table nested a thousand deep has no repr, but is still a bad value.
         text = f"<{type(value).__name__}>"

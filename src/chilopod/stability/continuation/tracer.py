@@ -68,7 +68,9 @@ def trace(
                 size *= tolerances.RETRY
                 if size < tolerances.SHORTEST * longest and not equations.budget.spent:
                     lost = "no orbit is found beside the last one: corrections leave the interval"
-                    return Ending.LOST, lost if isinstance(error, OutsideBoxError) else str(error), size
+                    # A guess is nothing that a user gives along a curve.
+                    said = str(error).partition("; allowed: a guess closer")[0]
+                    return Ending.LOST, lost if isinstance(error, OutsideBoxError) else said, size
         if not shortened:  # else the edge of the systems' domain would be met again at once
             few, many = step.corrections <= tolerances.FEW, step.corrections > tolerances.MANY
             size *= tolerances.GROWTH if few else tolerances.FALL if many else 1.0

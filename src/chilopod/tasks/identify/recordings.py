@@ -59,6 +59,9 @@ def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Record
             names, table = _columns(data)
         else:
             names, table = _csv(read_text(path, "recording", RobotFileError, _LARGEST))
+        for sample, at in np.argwhere(np.isinf(table))[:1].tolist():
+            said = f"must be finite, or empty in gaps: sample {sample + 1}"
+            raise ParameterError(said, field=f"column {names[at]}", value=table[sample, at])
         return Recording(given.file, given.settings, *_checked(robot, table * _sizes(names, given.unit)))
     except ChilopodError as error:
         error.source = str(path)
@@ -142,8 +145,6 @@ def _sizes(names: list[str], unit: str | None) -> Array:
 def _checked(robot: Robot, table: Array) -> tuple[Array, Array]:
     """Times from the first sample on, and joint angles."""
     joints, times, angles = robot.body.modules - 1, table[:, 0], table[:, 1:]
-    if np.isinf(table).any():
-        raise ParameterError("must be finite, or empty in gaps", field="column", value=float("inf"))
     if angles.shape[1] != joints:
         problem = f"must be {joints} besides time, one for each joint of {robot.name}"
         raise ParameterError(problem, field="columns", value=angles.shape[1])
