@@ -257,6 +257,14 @@ def test_numeric_path_refuses_too(robot):
 # -- bad files
 
 
+def test_messages_show_numbers_of_numpy_as_numbers(robot):
+    for value in (np.float64(-1.0), np.array(-1.0)):
+        assert "= -1.0: " in str(ParameterError("must be positive", field="x", value=value))
+    with pytest.raises(ParameterError) as refused:
+        robot.with_value("springs.stiffness[0]", np.float64(-1.0))
+    assert "np." not in str(refused.value)
+
+
 @pytest.mark.parametrize(
     ("path", "value", "complaint"),
     [
@@ -299,14 +307,6 @@ def test_numeric_path_refuses_too(robot):
         ("provenance", {"gait.stride": "\x1b[31m"}, "provenance.gait.stride = '\\x1b[31m'"),
     ],
 )
-def test_messages_show_numbers_of_numpy_as_numbers(robot):
-    for value in (np.float64(-1.0), np.array(-1.0)):
-        assert "= -1.0: " in str(ParameterError("must be positive", field="x", value=value))
-    with pytest.raises(ParameterError) as refused:
-        robot.with_value("springs.stiffness[0]", np.float64(-1.0))
-    assert "np." not in str(refused.value)
-
-
 def test_bad_descriptions(path, value, complaint):
     with pytest.raises(ChilopodError) as caught:
         Robot(**changed(path, value))
