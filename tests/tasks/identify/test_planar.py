@@ -110,8 +110,20 @@ def test_a_search_ends_among_robots_without_a_pitchfork(monkeypatch):
         raise AssertionError
 
     monkeypatch.setattr(planar_fit, "minimize", minimize)
-    assert np.isnan(planar_fit.allowed_ranges(ROBOT, DATA, BEST)).all()
-    assert len(tried) <= 6 * (planar_fit._MOST_LOST + 2)
+    bounds = np.array(planar_fit._BOUNDS) * planar_fit.scale_of(ROBOT, DATA)[:, None]
+    np.testing.assert_array_equal(planar_fit.allowed_ranges(ROBOT, DATA, BEST), bounds)  # no end is found
+    assert len(tried) <= 7 * (planar_fit._MOST_LOST + 2)
+
+
+@pytest.mark.parametrize("tolerance", [0.05, 0.1])
+def test_every_end_of_a_wide_valley_is_found(tolerance):
+    """Linear constraints point among robots without a pitchfork, from which no search comes back."""
+    data = CriticalMode(**{**dict(DATA), "component_tolerance": tolerance})
+    best = planar_fit.best_of(planar_fit.fits_from_every_start(ROBOT, data))[0]
+    ends = planar_fit.confidence_intervals(ROBOT, data, best)
+    assert np.isfinite(ends).all()
+    assert (ends[:, 0] < best).all()
+    assert (best < ends[:, 1]).all()
 
 
 def test_a_profile_ends_where_no_pitchfork_is_left(monkeypatch):

@@ -8,9 +8,8 @@ points farther away.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -38,9 +37,8 @@ _BOUNDS = ((0.05, 20.0), (0.02, 3.0), (-0.6, 1.2))
 """Bounds of the search, in the same units."""
 _STEP = 1e-6  # of differences, in the same units, and of springs, relative
 _OPEN = 1e-4  # singular value of an open combination, relative to all
-_MOST_MOVES, _LONGEST_MOVE = 40, 0.1  # to the end of an interval, in the same units
-_ROOM = 1e-3  # of chi-square
-_MET = 1.0 + 1e-6  # residual that counts as 1
+_FIRST_REACH, _LAST_REACH = 0.1, 1e-7  # half widths of boxes in which an end is searched, in the same units
+_ROOM, _EDGE = 1e-6, 1e-3  # residual or chi-square beyond a limit that counts as met, and below it that is at its edge
 _RISE = float(chi2.ppf(CONFIDENCE, 1))  # of chi-square at the end of an interval
 _MOST, _FOUND = 12, 1e-12  # steps of Newton's method for a critical spring, and the last one, relative
 _FARTHEST = 0.3  # relative step, and distance of the multiplier, at which it gives up
@@ -165,11 +163,11 @@ class _Residuals:
             self._values[key] = _off(found, robot, self._data)
         return self._values[key]
 
-    def both_signs(self, scaled: Array) -> Array:
-        """Residuals, then these with the other sign, for searches that end among robots without a pitchfork."""
+    def watched(self, scaled: Array) -> Array:
+        """Residuals, for searches that end among robots without a pitchfork."""
         if self.lost > _MOST_LOST:
             raise _LostError
-        return _both_signs(self(scaled))
+        return self(scaled)
 
     def jacobian(self, scaled: Array) -> Array:
         """Forward differences, shape (residuals, 3)."""
@@ -187,90 +185,81 @@ def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
 
 def allowed_ranges(robot: Robot, data: CriticalMode, best: Array) -> Array:
     """Projections of the set {max |residual| <= 1}, shape (3, 2), SI; NaN if it is empty. Where no end is found, the
-    search ends the range. So it does where a search meets robots without a pitchfork only.
+    search ends the range."""
+    start = least_largest(robot, data, best, fixed=())
+    if np.abs(residuals(with_constants(robot, start), data)).max() > 1.0 + _ROOM:
+        return np.full((len(FREE), 2), np.nan)
+    found = _ends(robot, data, start, lambda off: 1.0 - _both_signs(off), lambda _, slopes: -_both_signs(slopes))
+    return np.where(np.isnan(found), np.array(_BOUNDS) * scale_of(robot, data)[:, None], found)
 
-    Each end is a minimum of one constant within the set, by sequential quadratic programming from the best constants
-    and from the ends that were found before: the set is a curved valley. The residuals at an end are searched.
+
+def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array:
+    """Least and largest value of each constant where chi-square is at most so much above its least value as the level
+    :data:`CONFIDENCE` of one constant allows, shape (3, 2), SI; NaN where no such end is found, as where the data leave
+    a combination of constants open."""
+    off = _Residuals(robot, data)
+    here = best / scale_of(robot, data)
+    if not determined(off.jacobian(here)):
+        return np.full((len(FREE), 2), np.nan)
+    most = float((off(here) ** 2).sum() + _RISE)
+    return _ends(robot, data, best, lambda off: most - np.sum(off**2), lambda off, slopes: -2.0 * off @ slopes)
+
+
+def _ends(
+    robot: Robot, data: CriticalMode, start: Array, room: Callable[[Array], Any], slope: Callable[[Array, Array], Array]
+) -> Array:
+    """Least and largest value of each constant in a set that contains some constants, shape (3, 2), SI; NaN where none
+    is found. In the set no component of ``room(residuals)`` is negative; ``slope(residuals, their derivatives)`` is its
+    derivative.
+
+    The set is a curved valley, so each end is searched from that of the ends before which is nearest to it too. The
+    residuals at an end are searched anew. It lies on the edge of the set or of the search.
     """
-    off, scale = _Residuals(robot, data), scale_of(robot, data)
-    within = {"fun": lambda x: 1.0 - off.both_signs(x), "jac": lambda x: -_both_signs(off.jacobian(x))}
-    ends: dict[tuple[int, int], Array] = {}
+    off, scale, limits = _Residuals(robot, data), scale_of(robot, data), np.array(_BOUNDS)
+    within = {"fun": lambda x: room(off.watched(x)), "jac": lambda x: slope(off(x), off.jacobian(x))}
+    ends = np.full((len(FREE), 2, len(FREE)), np.nan)
     for constant, side in np.ndindex(len(FREE), 2):
         goal = (1.0, -1.0)[side] * np.eye(len(FREE))[constant]
-        for start in (best / scale, *ends.values()):
-            off.lost = 0
-            found = _least(goal, start, _BOUNDS, within)
-            known = ends.get((constant, side))
-            if found is None or (known is not None and goal @ found >= goal @ known):
+        known = sorted(ends[np.isfinite(ends).all(axis=2)], key=lambda end: float(goal @ end))
+        for begin in (start / scale, *known[:1]):
+            found = _farthest(goal, begin, within, off)
+            if goal @ found >= goal @ ends[constant, side]:
                 continue
-            searched_off = residuals(with_constants(robot, found * scale), data)
-            if np.abs(np.append(searched_off, off(found))).max() <= _MET:
+            both = off(found), residuals(with_constants(robot, found * scale), data)
+            left = min(float(np.min(room(each))) for each in both)
+            if left >= -_ROOM and (left <= _EDGE or found[constant] in limits[constant]):
                 ends[constant, side] = found
-    if len(ends) < 2 * len(FREE) and np.abs(off(best / scale)).max() > _MET:
-        return np.full((len(FREE), 2), np.nan)
-    ranges = np.array(_BOUNDS)
-    for place, each in ends.items():
-        ranges[place] = each[place[0]]
-    return ranges * scale[:, None]
+    return np.array([ends[i, :, i] for i in range(len(FREE))]) * scale[:, None]
 
 
 def _both_signs(off: Array) -> Array:
     return np.concatenate([off, -off])
 
 
-def _least(slopes: Array, start: Array, bounds: Any, within: dict[str, Any]) -> Array | None:
-    """Place where a linear function with these slopes is least within bounds and a constraint; None if the search ends
-    among robots without a pitchfork."""
+def _farthest(slopes: Array, start: Array, within: dict[str, Any], off: _Residuals) -> Array:
+    """Place where a linear function with these slopes is least within the bounds and a constraint, by sequential
+    quadratic programming in boxes about the last place, which grow while it succeeds: far away the linear constraint
+    misleads, or robots have no pitchfork."""
+    here, reach, off.lost = start, _FIRST_REACH, 0
     with suppress(_LostError):
-        found = minimize(
-            lambda x: slopes @ x, start, jac=lambda x: slopes, method="SLSQP", bounds=bounds,
-            constraints={"type": "ineq", **within}, options={"maxiter": 60, "ftol": 1e-8},
-        )  # fmt: skip
-        return np.asarray(found.x)
-    return None
-
-
-def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array:
-    """Least and largest value of each constant where chi-square is at most so much above its least value as the level
-    :data:`CONFIDENCE` of one constant allows, shape (3, 2), SI; NaN where no such end is found, as where the data leave
-    a combination of constants open.
-
-    Each end is the fixed point of moves to the end of the ellipsoid that linear residuals would have.
-    """
-    off, scale, limits = _Residuals(robot, data), scale_of(robot, data), np.transpose(_BOUNDS)
-    most = float((off(best / scale) ** 2).sum() + _RISE)
-    within = {
-        "fun": lambda x: most - float((off(x) ** 2).sum()),
-        "jac": lambda x: -2.0 * off(x) @ off.jacobian(x),
-    }
-    intervals = np.full((len(FREE), 2), np.nan)
-    ends: list[Array] = []
-    if not determined(off.jacobian(best / scale)):
-        return intervals
-    for constant, side in np.ndindex(len(FREE), 2):
-        here = best / scale
-        with suppress(np.linalg.LinAlgError):
-            for _ in range(_MOST_MOVES):
-                found, slopes = off(here), off.jacobian(here)
-                spread = np.linalg.inv(slopes.T @ slopes)
-                middle = -spread @ slopes.T @ found
-                room = max(most - ((found + slopes @ middle) ** 2).sum(), 0.0)
-                move = middle + (-1.0, 1.0)[side] * spread[constant] * np.sqrt(room / spread[constant, constant])
-                move *= min(1.0, _LONGEST_MOVE / np.abs(move).max())
-                here, before = np.clip(here + move, *limits), here
-                if np.abs(here - before).max() < _STEP:
-                    break
-        goal = (1.0, -1.0)[side] * np.eye(len(FREE))[constant]
-        # Moves do not follow a wide or strongly curved valley.
-        for place in chain([here], (_least(goal, each, _BOUNDS, within) for each in (best / scale, *ends))):
-            if place is None:
+        while reach > _LAST_REACH:
+            box = np.clip(here[:, None] + reach * np.array([-1.0, 1.0]), *np.split(np.array(_BOUNDS), 2, axis=1))
+            there = _least(slopes, here, box, within)
+            if np.min(within["fun"](there)) < -_ROOM or slopes @ there >= slopes @ here:
+                reach *= 0.25
                 continue
-            more = most - (residuals(with_constants(robot, place * scale), data) ** 2).sum()
-            if abs(more) <= _ROOM or (more > 0.0 and place[constant] in limits[:, constant]):
-                intervals[constant, side] = place[constant] * scale[constant]
-                ends.append(place)
-                break
-    return intervals
+            inside = bool((np.abs(there - here) < (1.0 - _ROOM) * reach).all())
+            here, reach = there, 0.0 if inside else 2.0 * reach
+    return here
+
+
+def _least(slopes: Array, start: Array, bounds: Any, within: dict[str, Any]) -> Array:
+    """Place where a linear function with these slopes is least within bounds and a constraint."""
+    found = minimize(
+        lambda x: slopes @ x, start, jac=lambda x: slopes, method="SLSQP", bounds=bounds,
+        constraints={"type": "ineq", **within}, options={"maxiter": 60, "ftol": 1e-8},
+    )  # fmt: skip
+    return np.asarray(found.x)
 
 
 def jacobian(robot: Robot, data: CriticalMode, constants: Array) -> Array:
@@ -317,13 +306,16 @@ def _fit(robot: Robot, data: CriticalMode, start: Array) -> tuple[Array, Array]:
     return answer.x * scale, np.asarray(answer.fun)
 
 
-def least_largest(robot: Robot, data: CriticalMode, start: Array) -> Array:
-    """Constants with the offset of ``start`` whose largest residual is smallest, SI, shape (3,)."""
+def least_largest(robot: Robot, data: CriticalMode, start: Array, fixed: Sequence[int] = (2,)) -> Array:
+    """Constants with the offset, or other ``fixed`` ones, of ``start`` whose largest residual is smallest, SI, shape
+    (3,); ``start`` if the search ends among robots without a pitchfork."""
     off, place = _Residuals(robot, data), start / scale_of(robot, data)
     within = {
-        "fun": lambda x: x[3] - off.both_signs(x[:3]),
+        "fun": lambda x: x[3] - _both_signs(off.watched(x[:3])),
         "jac": lambda x: np.insert(-_both_signs(off.jacobian(x[:3])), 3, 1.0, axis=1),
     }
-    bounds = [*_BOUNDS[:2], (place[2], place[2]), (0.0, None)]
-    found = _least(np.eye(4)[3], np.append(place, np.abs(off(place)).max()), bounds, within)
-    return start if found is None else found[:3] * scale_of(robot, data)
+    bounds = [(place[i],) * 2 if i in fixed else each for i, each in enumerate(_BOUNDS)]
+    with suppress(_LostError):
+        found = _least(np.eye(4)[3], np.append(place, np.abs(off(place)).max()), [*bounds, (0.0, None)], within)
+        return found[:3] * scale_of(robot, data)
+    return start
