@@ -44,6 +44,29 @@ def test_the_radius_of_the_body_axis(former):
     assert found == pytest.approx([1.095, 0.680, 0.544, 0.425, 0.318], rel=0.005)
 
 
+@pytest.mark.parametrize(("mass", "length"), [(1e-4, 3e-3), (1e3, 10.0)])
+def test_a_robot_of_another_size_has_the_same_branch(mass, length):
+    """Its fold and its verdicts too: errors are relative to the sizes of its own motion."""
+
+    def branch(mass, length):
+        robot, unit = ROBOT.with_value("legs.forward_offset", 0.02), mass * length**2
+        lengths = "body.length", "legs.forward_offset", "legs.half_width", "gait.stride"
+        for path in lengths:
+            robot = robot.with_value(path, robot.get(path) * length)
+        for path in ("body.mass", "ground.friction"):
+            robot = robot.with_value(path, robot.get(path) * mass)
+        for joint in range(5):
+            path = f"springs.stiffness[{joint}]"
+            robot = robot.with_value(path, robot.get(path) * unit)
+        return curved_walks(robot, K1, (stiffness(9.0) * unit, stiffness(20.0) * unit), points=12)
+
+    here, there = branch(1.0, 1.0), branch(mass, length)
+    assert "fold" in here.special.values
+    for name in ("special", "verdict"):
+        np.testing.assert_array_equal(there[name].values, here[name].values)
+    np.testing.assert_allclose(there.multiplier, here.multiplier, rtol=0, atol=1e-9)
+
+
 def test_the_branch_is_stable_and_turns_right(right):
     assert right.stable.values[1:].all()
     assert right.special.values[0] == "pitchfork"

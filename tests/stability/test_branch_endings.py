@@ -213,3 +213,26 @@ def test_the_end_of_a_map_is_no_event():
         branch = follow(family, begin(family, 0.1, [0.5]), (0.1, 0.5))
     assert branch.ending is Ending.LOST
     assert "event" not in branch.reason
+
+
+@pytest.mark.parametrize("width", [1e-5, 1e-3])
+def test_a_family_by_energy_has_no_branch_points_of_its_own(width):
+    """Orbits about a point of Hill's problem, by the parameter of a term that vanishes: H' - 1 is nearly singular along
+    the whole family, more so in a narrow interval."""
+
+    def hill(value):
+        def rhs(t, x):
+            cube = (x[0] ** 2 + x[1] ** 2) ** 1.5
+            gx, gy = x[0] / cube - 3.0 * x[0], x[1] / cube
+            first = [x[2] + value * gx, x[3] + value * gy]
+            return [*first, 2.0 * x[3] - gx + value * x[2], -2.0 * x[2] - gy + value * x[3]]
+
+        return from_rhs(rhs, 4, None, guess_period=3.0, scale=[0.3] * 4)
+
+    rate = np.sqrt(2.0 * np.sqrt(7.0) - 1.0)
+    times = np.linspace(0.0, 2.0 * np.pi / rate, 65)
+    across, x, y = (rate**2 + 9.0) / (2.0 * rate), 0.02 * np.cos(rate * times), 0.02 * np.sin(rate * times)
+    states = np.stack([3.0 ** (-1.0 / 3.0) + x, -across * y, -rate * y, -rate * across * x], axis=1)
+    branch = follow(hill, begin(hill, 0.0, (times, states)), (-width, width), points=12)
+    assert len(branch.points) > 8
+    assert branch.special_points == ()

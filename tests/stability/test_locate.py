@@ -321,3 +321,17 @@ def test_a_branch_reports_no_point_without_a_bound(distance):
     branch = follow(close(distance), [0.0], (-0.1, 0.13))
     for point in branch.special_points:
         assert abs(abs(point.value - 0.01) - distance) <= point.bifurcation.error_bound
+
+
+def test_every_orbit_is_counted_and_the_distance_of_neighbours_is_said():
+    """The multiplier exceeds 1 between two of the first values of a search, where the orbit is looked at halfway."""
+
+    def window(p):
+        gain = -0.3 + 0.3 * (np.tanh((p - 0.32) / 0.01) - np.tanh((p - 0.48) / 0.01))
+        return from_rhs(lambda t, x: [(gain + 0.2 * np.cos(t)) * x[0] - x[0] ** 3], 1, 2.0 * np.pi)
+
+    found = locate(window, (0.0, 1.0), [0.0])
+    np.testing.assert_allclose([point.value for point in found], [0.32, 0.48], atol=1e-9)
+    assert 0.1 < found.spacing < 0.2
+    assert f"at most {found.spacing:.2g} apart" in str(found)
+    assert found.to_dataset().attrs["spacing"] == found.spacing

@@ -197,8 +197,8 @@ def uncertainty(
     tolerances
         Largest deviation of each uncertain number, SI, by its path.
     samples, seed
-        Number of samples, a power of two to 65536 (numbers + 2 evaluations of a few ms for each), and seed of their
-        scrambling.
+        Number of samples, a power of two to 65536 (numbers + 2 evaluations of a few ms for each, of half a second for
+        robots with extreme numbers), and seed of their scrambling.
     progress
         Function of the fraction done (0 to 1) and a few words.
 

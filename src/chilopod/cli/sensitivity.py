@@ -108,6 +108,7 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
     from chilopod.analysis.parameters import check_parameter, numbers_read
 
     found: dict[str, float] = {}
+    named: set[str] = set()
     others = [path for path in numbers_read(robot) if parameter not in (path, path.partition("[")[0])]
     for text in given:
         path, equals, tolerance = (each.strip() for each in text.partition("="))
@@ -120,12 +121,18 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
                 raise ParameterError("must be a share above 0 % and below 100 %", value=text)
             if equals:
                 check_parameter(robot, path)
+                if path in named or parameter in (path, path.partition("[")[0]):
+                    said = "must be given once" if path in named else "must not be the number that bends the robot"
+                    raise ParameterError(said, value=text)
+                named.add(path)
                 paths = [each for each in others if each.partition("[")[0] == path] or [path]
             else:
                 paths = [each for each in others if robot.get(each) and each not in found]
             for each in paths:
                 if share is None:
                     found[each] = units.parse(tolerance, robot.si_unit_of(each))
+                    if not found[each] > 0.0:
+                        raise ParameterError("must be positive", value=text)
                 elif robot.get(each) == 0.0:
                     raise ParameterError(f"{each} is 0, which has no share", value=text, allowed=f"{each}=VALUE")
                 else:

@@ -99,8 +99,9 @@ class PlanarModel(ReadOnlyArrays):
 
     @cached_property
     def scale(self) -> Array:
-        """Typical size of the states: one in m/s, rad/s and rad."""
-        return read_only(np.ones(self.dimension))
+        """Typical size of the states: a module's length and a radian in a period, and a radian."""
+        rate, joints = 1.0 / self.period, self.modules - 1
+        return read_only(np.repeat([self.robot.module_length * rate, rate, 1.0, rate], [2, 1, joints, joints]))
 
     @property
     def schedule(self) -> Schedule:
@@ -135,8 +136,8 @@ class PlanarModel(ReadOnlyArrays):
             return self.flow_with_error(x, t0, t1)[:2]
         return self._tangents(x, np.eye(self.dimension), t0, t1, self.tolerance)
 
-    def flow_with_error(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array, float]:
-        """:meth:`flow`, and a bound on the error of the largest entry of the derivative."""
+    def flow_with_error(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array, float | Array]:
+        """:meth:`flow`, and a bound on the error of the largest entry of the derivative, or of each entry."""
         x = self._checked(x)
         if (x == self.orbit).all():
             to_joint, from_joint = joint_rates(self.modules)
@@ -144,14 +145,16 @@ class PlanarModel(ReadOnlyArrays):
             error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
             return x, to_joint @ matrix, _ROWS_DIFFER * error
         state, derivative = self._tangents(x, np.eye(self.dimension), t0, t1, self.tolerance)
+        sizes = self.scale
+        units = sizes[:, None] / sizes
         # Against finer steps the global error stays within some tens of the tolerance per step, times the growth of the
         # motion; the derivative is that of a motion with this error, which adds the growth once more. Of a fast motion
         # of many steps the error is larger: less than the difference from a coarser computation in any direction.
-        growth = max(1.0, float(np.abs(derivative).max()))
-        along = np.cos(2.0 * np.arange(self.dimension) + 0.3)
+        growth = max(1.0, float(np.abs(derivative / units).max()))
+        along = sizes * np.cos(2.0 * np.arange(self.dimension) + 0.3)
         coarse = self._tangents(x, along[None], t0, t1, _COARSER * self.tolerance)[1][:, 0]
-        error = max(100.0 * self.tolerance * growth**2, _SPREAD * float(np.abs(coarse - derivative @ along).max()))
-        return state, derivative, error
+        off = _SPREAD * float((np.abs(coarse - derivative @ along) / sizes).max())
+        return state, derivative, max(100.0 * self.tolerance * growth**2, off) * units
 
     def _tangents(self, x: Array, directions: Array, t0: float, t1: float, tolerance: float) -> tuple[Array, Array]:
         """State at t1 and its derivative along directions of the state at t0, shape (directions, 2N+1), as columns; by

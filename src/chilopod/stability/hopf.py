@@ -117,7 +117,8 @@ def locate_hopf(
             if all(new.value - old.value > min(near, new.error_bound + old.error_bound) for old in points)
         ]
     said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(pieces[-1].ending)
-    return Located(tuple(points), status, said, budget - left, (low, pieces[-1].searched[1]), ending)
+    spacing = max(each.spacing for each in pieces)
+    return Located(tuple(points), status, said, budget - left, (low, pieces[-1].searched[1]), spacing, ending)
 
 
 def _piece(
@@ -136,7 +137,8 @@ def _piece(
         return np.stack([each.image.jacobian for each in found]), np.array(errors)
 
     def crossings(start: float, end: float) -> list[tuple[Block | None, Crossings]]:
-        return [(None, find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable))]
+        known = samples.within(start, end)
+        return [(None, find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable, known=known))]
 
     def described(crossing: Crossing, _: Block | None) -> list[Found]:
         if crossing.event is CircleEvent.PLUS:

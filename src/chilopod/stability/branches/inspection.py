@@ -39,6 +39,7 @@ _CLEAR = 4.0  # factor on the error of a polynomial for a certain sign
 _BUDGET = 400  # corrected orbits within one step
 _ERROR = 1e-10  # relative error of the return map's derivative at a corrected orbit
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a branch point
+_DIP = 0.3  # the same, relative to the larger one at the ends of the step
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
 _SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
 _TELLING = 1e-3  # step, in units, that is short enough to tell a branch from another one near by
@@ -168,7 +169,7 @@ def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[EventPlac
         places += [_placed(within, each, block) for each in found.crossings if each.value > CLOSE * step.size]
     if turned and not any(place.fold or place.branching for place in places):
         fold = fold_within(within, 0.0, step.size)
-        if _branches_meet(within.at(fold.crossing.value)):  # a branch that leaves there, or an uncertain tangent
+        if _branches_meet(within, fold.crossing.value):  # a branch that leaves there, or an uncertain tangent
             fold = replace(fold, crossing=replace(fold.crossing, change=0), fold=False, branching=True)
         places.append(fold)
     return sorted(places, key=lambda place: place.crossing.value), remarks
@@ -179,15 +180,21 @@ def _placed(within: Within, crossing: Crossing, block: Block | None) -> EventPla
     if crossing.event is not CircleEvent.PLUS:
         return EventPlace(crossing, block)
     before, after = within.sides(crossing.value)
-    branching = _branches_meet(within.at(crossing.value))
+    branching = _branches_meet(within, crossing.value)
     if float(before.tangent[-1] * after.tangent[-1]) < 0.0 and not branching:
         return fold_within(within, before.size, after.size)
     return EventPlace(crossing, block, branching=branching)
 
 
-def _branches_meet(step: Step[Anchor, OnCurve]) -> bool:
-    """True if other curves pass through the end of a step."""
-    return bool(np.linalg.svd(step.matrix[:-1], compute_uv=False)[-1] <= _BRANCHING)
+def _branches_meet(within: Within, place: float) -> bool:
+    """True if other curves pass through a place of a step: there the equations lose a rank that they have elsewhere. In
+    a narrow interval of the parameter they may be nearly singular throughout."""
+    step = within.step
+    here, *ends = (
+        float(np.linalg.svd(each[:-1], compute_uv=False)[-1])
+        for each in (within.at(place).matrix, step.start.matrix, step.matrix)
+    )
+    return here <= min(_BRANCHING, _DIP * max(ends))
 
 
 def _sign(matrix: Array) -> float:

@@ -46,7 +46,7 @@ _MERGING = 1e-4  # distance from a meeting of orbits, relative to the interval, 
 _ROUND_TOUCH = 9  # places in the surroundings of a touch
 _BETWEEN_POWERS = 0.75  # mean of the powers one half and one
 _AT_REST = 0.03  # motion, relative to the first orbit's, that counts as rest
-_PARTS = 5  # parts of a return at which the extent of the motion is sampled
+_PARTS = 64  # parts of a return at which the extent of the motion is sampled
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,10 @@ class Located(Result, Sequence[BifurcationPoint]):
         Remarks, a sentence each.
     evaluations
         Number of orbits computed.
-    searched, ending
-        Interval in which the orbit was followed and searched, and the reason for an early end, also the first remark.
+    searched, spacing, ending
+        Interval in which the orbit was followed and searched, largest distance of neighbouring orbits in it, and the
+        reason for an early end, also the first remark. Between two orbits the multipliers are interpolated: what they
+        do within less than the spacing alone may be missed.
     """
 
     points: tuple[BifurcationPoint, ...]
@@ -188,6 +190,7 @@ class Located(Result, Sequence[BifurcationPoint]):
     remarks: tuple[str, ...]
     evaluations: int
     searched: tuple[float, float]
+    spacing: float
     ending: str = ""
 
     @property
@@ -210,7 +213,8 @@ class Located(Result, Sequence[BifurcationPoint]):
         table = rows(point.row for point in self.points)
         first = f"Located: {many}, {self.status.label}: {self.status.sentence}"
         low, high = self.searched
-        return [first, f"searched: {low:.9g} to {high:.9g}, {self.evaluations} orbits", *table, *said(self.remarks)]
+        orbits = f"{self.evaluations} orbits, at most {self.spacing:.2g} apart"
+        return [first, f"searched: {low:.9g} to {high:.9g}, {orbits}", *table, *said(self.remarks)]
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the kinds of bifurcations over the parameter, on axes of matplotlib or on new ones."""
@@ -230,7 +234,7 @@ class Located(Result, Sequence[BifurcationPoint]):
         more = ("multiplier", "multiplicity", "frequency", "period", "orbit", "mode")
         about = {"status": self.status.label, "remarks": "; ".join(self.remarks), "ending": self.ending}
         low, high = self.searched
-        searched = {"low": low, "high": high, "evaluations": self.evaluations}
+        searched = {"low": low, "high": high, "evaluations": self.evaluations, "spacing": self.spacing}
         return dataset("point", columns(self.points, *names, *more), **about, **searched)
 
 
@@ -323,7 +327,9 @@ def located(
     points = sorted((each for each in results if isinstance(each, BifurcationPoint)), key=lambda point: point.value)
     remarks += [each for each in results if isinstance(each, str)] + samples.family.remarks
     searched_part = here.start, max(here.start, here.end)
-    return Located(tuple(points), status, tuple(dict.fromkeys(remarks)), samples.count, searched_part, here.ending)
+    spacing = float(np.diff([here.start, *samples.within(*searched_part), searched_part[1]]).max())
+    notes = tuple(dict.fromkeys(remarks))
+    return Located(tuple(points), status, notes, samples.count, searched_part, spacing, here.ending)
 
 
 def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[tuple[Block | None, Crossings]]:
@@ -347,7 +353,8 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
         return np.stack([each.image.jacobian for each in found]), errors
 
     def search(matrices: Matrices) -> Crossings:
-        found = find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable)
+        known = samples.within(start, end)
+        found = find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable, known=known)
         return replace(found, remarks=(*remarks, *found.remarks))
 
     return [(block, crossings_in(block, partial(whole, block), search)) for block in blocks]

@@ -112,6 +112,10 @@ class Samples:
         self._taken += self._allowed - self.budget.left
         self._allowed = self.budget.left = returns
 
+    def within(self, low: float, high: float) -> list[float]:
+        """Values with a sample between two others."""
+        return self._values[bisect.bisect_left(self._values, low) : bisect.bisect_right(self._values, high)]
+
     def affordable(self) -> int:
         """Number of further orbits, at the mean cost of those so far."""
         if self.budget.late:
@@ -328,7 +332,10 @@ class Samples:
             middle = self._sampled(0.5 * (last.value + found.value), last.orbit + 0.5 * change, last)
         except AnalysisError:
             return False
-        return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
+        connected = bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
+        if connected and middle.value not in self._by_value:
+            self._keep(middle)  # no orbit is left out of the counts
+        return connected
 
     def _goes_through(self, left: Sample, right: Sample) -> bool:
         """True if one orbit has a multiplier that passes +1 between two samples, which come together there: two orbits

@@ -7,7 +7,7 @@ matrix, must change by the crossings in between: if not, the crossing multiplier
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -78,20 +78,23 @@ def find_crossings(
     budget: int = BUDGET,
     affordable: Callable[[], int] | None = None,
     shown: Callable[[float], float] = float,
+    known: Sequence[float] = (),
 ) -> Crossings:
     """Every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
-    Matrices are evaluated at up to ``budget`` values, or ``affordable()`` more if their cost decides. Remarks show a
-    value as ``shown(value)``. A ParameterError refuses an empty or infinite interval.
+    Matrices are evaluated at up to ``budget`` values, or ``affordable()`` more if their cost decides; those at
+    ``known`` values, which cost nothing, count too. Remarks show a value as ``shown(value)``. A ParameterError refuses
+    an empty or infinite interval.
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")
     if budget < (least := 2 * first_places(0.0, 1.0).size):
         return Crossings((), SearchStatus.BUDGET, (f"a search takes {least} matrices or more (`budget`)",), 0)
-    a, b, parameter = _coordinate(low, high)
+    a, b, parameter, place = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
-    (status, found), crossings = finder.search(), []
+    within = np.clip(place(np.array([each for each in known if low <= each <= high])), a, b)
+    (status, found), crossings = finder.search(within), []
     for each in found:
         value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
         crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
@@ -100,12 +103,13 @@ def find_crossings(
 
 def first_values(low: float, high: float) -> Array:
     """First values of the parameter at which a search of an interval evaluates matrices, in order."""
-    a, b, parameter = _coordinate(low, high)
+    a, b, parameter, _ = _coordinate(low, high)
     return np.sort(parameter(first_places(a, b)))
 
 
-def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any]]:
-    """Ends of an interval in an even coordinate, over decades the logarithm, and the parameter at places there."""
+def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any], Callable[[Any], Any]]:
+    """Ends of an interval in an even coordinate, over decades the logarithm, the parameter at places there, and the
+    inverse."""
     inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
     a, b = float(inward(low)), float(inward(high))
 
@@ -114,7 +118,7 @@ def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], 
         inner = np.clip(outward(places), low, high)
         return np.where(places <= a, low, np.where(places >= b, high, inner))
 
-    return a, b, parameter
+    return a, b, parameter, inward
 
 
 @dataclass(frozen=True)
@@ -127,8 +131,8 @@ class _Finder:
     shown: Callable[[float], float]
     report: Report = field(default_factory=Report)
 
-    def search(self) -> tuple[SearchStatus, list[Crossing]]:
-        """Find the crossings."""
+    def search(self, known: Array) -> tuple[SearchStatus, list[Crossing]]:
+        """Find the crossings; matrices at ``known`` places are counted too."""
         report, spectra = self.report, self.spectra
         first = first_places(self.a, self.b)
         spectra.at(first)
@@ -137,6 +141,7 @@ class _Finder:
                 return SearchStatus.BUDGET, []
             report.leave("there is no matrix anywhere")
             return SearchStatus.INCOMPLETE, []
+        spectra.at(known)
         self._rest(first)
         events = [event for event in CircleEvent if spectra.idle[event] < self._factors(event) <= _MANY]
         if self._factors(CircleEvent.PAIR) > _MANY:
