@@ -318,3 +318,21 @@ def test_another_multiplier_like_the_critical_one(sign):
     (found,) = curve.special
     assert found.kind is CodimensionTwo.SEVERAL_CRITICAL
     np.testing.assert_allclose(found.values, 0.0, atol=1e-14)
+
+
+def test_a_pole_of_a_coefficient_is_no_zero():
+    """(x, y) -> (y, p - q x - y^2 - 0.3 x y): the coefficient of its period doublings has a pole at a fold-flip,
+    where its sign changes."""
+
+    def family2(p, q):
+        def image(state):
+            x, y = state
+            return [y, p - q * x - y * y - 0.3 * x * y], [[0.0, 1.0], [-q - 0.3 * y, -2.0 * y - 0.3 * x]]
+
+        return from_map(image, 2)
+
+    (located,) = locate(lambda p: family2(p, 0.3), (0.0, 3.0), [0.0, 0.0])
+    curve = follow2(family2, located, ((-3.0, 6.0), (-2.0, 3.0)), second=0.3, points=None)
+    first, second = curve.special
+    assert (first.kind, second.kind) == (CodimensionTwo.FOLD_FLIP, CodimensionTwo.RESONANCE_1_2)
+    assert (np.abs(first.values - [0.0, -1.0]) <= first.error_bound).all()

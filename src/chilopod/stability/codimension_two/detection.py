@@ -34,6 +34,7 @@ _SAFETY = 1.5
 _BESIDE = 1e-3  # step of the differences of a test function, relative to the curve's step
 _AROUND = 0.001, 0.01, 0.1  # distances, in steps, from a place without a test function
 _POLE = 0.1  # value at a sign change, relative to those at the ends of a step, above which it is a pole
+_JUMP = 0.5  # the same for values beside it, which are at most 0.2 at a simple zero
 _MEETING = 1e-4  # smallest singular value of the equations, in units, where curves of orbits meet
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
@@ -212,13 +213,16 @@ class Detector:
         bound = off + along + 4.0 * _EPSILON * np.abs(spot.values)
         if not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
             return None
+        low, high = test(root - beside)[0], test(root + beside)[0]
+        # A pole grows towards the place, also where it hides the value there; an end may be nearer than these.
+        ends = [abs(test(end)[0]) for end in (0.0, length) if abs(end - root) > beside]
         there = Critical(curve.target, parts.at(root + beside).found)
         kind = self._named(signal, spot, here, there)
-        if kind is None:
+        if kind is None or max(abs(low), abs(high)) > _JUMP * max(ends):
             return None
         point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
         if signal is Own.COEFFICIENT:
-            slope = abs(test(root + beside)[0] - test(root - beside)[0]) / 2.0
+            slope = abs(high - low) / 2.0
             point = self._with_next_term(point, here, there, _SAFETY * (abs(value) + error + unsure) / slope)
         return root, spot, point
 
