@@ -265,3 +265,74 @@ def test_states_at_zero_are_followed_as_others_are(shift):
     (special,) = curve.special
     assert special.kind is CodimensionTwo.FOLD_FLIP
     assert (np.abs(special.values) <= special.error_bound).all()
+
+
+def meeting(oblique):
+    """x -> x (1 + p + y) - x^3, y -> y + q + y^2 + 0.8 x^2: a fold of y at q = 0, pitchforks of x at p = -y. In oblique
+    coordinates the modes of both are not at right angles."""
+    axes = np.array([[1.0, 0.4], [-0.7, 1.2]]) if oblique else np.eye(2)
+    back = np.linalg.inv(axes)
+
+    def family2(p, q):
+        def image(state):
+            x, y = axes @ state
+            slopes = np.array([[1.0 + p + y - 3.0 * x * x, x], [1.6 * x, 1.0 + 2.0 * y]])
+            return back @ [x * (1.0 + p + y) - x**3, y + q + y * y + 0.8 * x * x], back @ slopes @ axes
+
+        return from_map(image, 2, spatial_symmetry=back @ np.diag([-1.0, 1.0]) @ axes)
+
+    return family2, back
+
+
+@pytest.mark.parametrize("oblique", [False, True])
+@pytest.mark.parametrize(("kind", "values", "y"), [(Kind.PITCHFORK, (0.3, -0.09), -0.3), (Kind.FOLD, (-0.3, 0.0), 0.0)])
+def test_pitchfork_and_fold_meet(oblique, kind, values, y):
+    """Also where the return map has two equal multipliers, and the equations of one are singular."""
+    family2, back = meeting(oblique)
+    mode = back[:, 0 if kind is Kind.PITCHFORK else 1].astype(complex)
+    start = BifurcationPoint(kind, values[0], 0.0, back @ [0.0, y], mode, 1.0 + 0j, 0.0)
+    curve = follow2(family2, start, ((-0.5, 0.35), (-0.2, 0.1)), second=values[1])
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    (found,) = curve.special
+    assert found.kind is CodimensionTwo.PITCHFORK_FOLD
+    assert (np.abs(found.values) <= found.error_bound).all()
+    assert found.error_bound.max() < 1e-12
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_another_multiplier_like_the_critical_one(sign):
+    """Two flips, or a pitchfork and a transcritical bifurcation of another state, which are not coupled at first."""
+
+    def family2(p, q):
+        def image(state):
+            x, y = state
+            slopes = [[sign * (1.0 + p) - 3.0 * x * x + 0.2 * y, 0.2 * x], [0.2 * x, sign * (1.0 + q) - 2.0 * y]]
+            return [sign * (1.0 + p) * x - x**3 + 0.2 * x * y, sign * (1.0 + q) * y - y * y + 0.1 * x * x], slopes
+
+        return from_map(image, 2, spatial_symmetry=np.diag([-1.0, 1.0]) if sign > 0.0 else None)
+
+    kind = Kind.PITCHFORK if sign > 0.0 else Kind.PERIOD_DOUBLING
+    start = BifurcationPoint(kind, 0.0, 0.0, np.zeros(2), np.eye(2, dtype=complex)[0], sign + 0j, 0.0)
+    curve = follow2(family2, start, ((-0.5, 0.5), (-0.4, 0.4)), second=-0.3, coefficients=False)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    (found,) = curve.special
+    assert found.kind is CodimensionTwo.SEVERAL_CRITICAL
+    np.testing.assert_allclose(found.values, 0.0, atol=1e-14)
+
+
+def test_a_pole_of_a_coefficient_is_no_zero():
+    """(x, y) -> (y, p - q x - y^2 - 0.3 x y): the coefficient of its period doublings has a pole at a fold-flip,
+    where its sign changes."""
+
+    def family2(p, q):
+        def image(state):
+            x, y = state
+            return [y, p - q * x - y * y - 0.3 * x * y], [[0.0, 1.0], [-q - 0.3 * y, -2.0 * y - 0.3 * x]]
+
+        return from_map(image, 2)
+
+    (located,) = locate(lambda p: family2(p, 0.3), (0.0, 3.0), [0.0, 0.0])
+    curve = follow2(family2, located, ((-3.0, 6.0), (-2.0, 3.0)), second=0.3, points=None)
+    first, second = curve.special
+    assert (first.kind, second.kind) == (CodimensionTwo.FOLD_FLIP, CodimensionTwo.RESONANCE_1_2)
+    assert (np.abs(first.values - [0.0, -1.0]) <= first.error_bound).all()

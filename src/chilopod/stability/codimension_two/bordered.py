@@ -25,7 +25,7 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step
+from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step, inverted
 from chilopod.stability.continuation.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 from chilopod.stability.interface import SystemLike, offers, returns_per_period, sizes, system_of
 from chilopod.stability.orbits.orbit import from_known, known_state
@@ -37,6 +37,8 @@ Family2 = Callable[[float, float], SystemLike]
 
 _AT_ZERO = 1e6  # change over the box, relative to the sizes of the states, of an orbit at zero
 _STEP = 1e-6  # step of differences, in units of the frame: it affects only the speed of Newton's method
+_APART = 0.3  # overlap of v and w above which v and w are the borders b and c
+_DOUBLE = 1e-13  # singular value, relative to the largest, of a bordered matrix that is singular: G errs as much
 _STALLED = 3  # corrections that did not halve a small residual, as Broyden's method may stall that long
 
 
@@ -285,6 +287,9 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             units = size[:, None] / before.size[:, None]
             row, column, _ = _bordered(critical, before.column / units, before.row * units)
         column, row = _orthonormal(column), _orthonormal(row)
+        # g then stays smooth where another multiplier becomes critical; w and v are regular at a double one.
+        if k == 1 and abs(overlap := float((column.T @ row).item())) > _APART:
+            column, row = row * np.sign(overlap), column * np.sign(overlap)
         frame = Frame(size, self.widths, basis, column, row, np.eye(k, k * k), section)
         if k == 1:
             return frame
@@ -343,7 +348,8 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 def _bordered(matrix: Array, column: Array, row: Array) -> tuple[Array, Array, Array]:
     """v and w of the bordered matrix, shape (n, k) each, and its inverse, with G in its last corner."""
     n, k = column.shape
-    inverse = np.linalg.inv(np.block([[matrix, column], [row.T, np.zeros((k, k))]]))
+    whole = np.block([[matrix, column], [row.T, np.zeros((k, k))]])
+    inverse, _ = inverted(whole, _DOUBLE)  # where another multiplier is critical, v and w of the shortest solution
     return inverse[:n, n:], inverse[n:, :n].T, inverse
 
 

@@ -34,6 +34,8 @@ _SAFETY = 1.5
 _BESIDE = 1e-3  # step of the differences of a test function, relative to the curve's step
 _AROUND = 0.001, 0.01, 0.1  # distances, in steps, from a place without a test function
 _POLE = 0.1  # value at a sign change, relative to those at the ends of a step, above which it is a pole
+_JUMP = 0.5  # the same for values beside it, which are at most 0.2 at a simple zero
+_MEETING = 1e-4  # smallest singular value of the equations, in units, where curves of orbits meet
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
@@ -206,16 +208,21 @@ class Detector:
             value, error = 0.0, max(test(root - beside)[1], test(root + beside)[1])
         if not unsure and abs(value) > _POLE * max(abs(test(0.0)[0]), abs(test(length)[0])):
             return None
-        kind = self._named(signal, here)
         along = _along(test, parts, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
         bound = off + along + 4.0 * _EPSILON * np.abs(spot.values)
-        if kind is None or not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
+        if not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
+            return None
+        low, high = test(root - beside)[0], test(root + beside)[0]
+        # A pole grows towards the place, also where it hides the value there; an end may be nearer than these.
+        ends = [abs(test(end)[0]) for end in (0.0, length) if abs(end - root) > beside]
+        there = Critical(curve.target, parts.at(root + beside).found)
+        kind = self._named(signal, spot, here, there)
+        if kind is None or max(abs(low), abs(high)) > _JUMP * max(ends):
             return None
         point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
         if signal is Own.COEFFICIENT:
-            slope = abs(test(root + beside)[0] - test(root - beside)[0]) / 2.0
-            there = Critical(curve.target, parts.at(root + beside).found)
+            slope = abs(high - low) / 2.0
             point = self._with_next_term(point, here, there, _SAFETY * (abs(value) + error + unsure) / slope)
         return root, spot, point
 
@@ -230,8 +237,8 @@ class Detector:
         error += share * (abs(other - value) + error + unsure)
         return replace(point, next_coefficient=value, next_coefficient_error=error) if np.isfinite(error) else point
 
-    def _named(self, signal: Signal, here: Critical) -> CodimensionTwo | None:
-        """Kind of the point at a zero of a test function; None for a zero without meaning."""
+    def _named(self, signal: Signal, spot: Spot, here: Critical, there: Critical) -> CodimensionTwo | None:
+        """Kind of the point at a zero of a test function, by a place beside it; None for a zero without meaning."""
         target = self._curve.target
         if isinstance(signal, CodimensionTwo):
             return signal
@@ -251,12 +258,15 @@ class Detector:
         sign = TARGETS[signal]
         if sign == target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier
-        mode = here.spectrum.right[:, here.others[int(np.abs(nu - sign).argmin())]]
+        # At the point itself the modes of two equal multipliers are any combinations of both.
+        nearest = int(np.abs(there.spectrum.values[there.others] - sign).argmin())
+        mode = there.spectrum.right[:, there.others[nearest]]
         if reverses(self._curve.system(here.at.place.values), mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
         if sign < 0:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
-        return together(self._kind, Kind.BRANCH_POINT if self._curve.known else Kind.FOLD)
+        meets = self._curve.known or np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING
+        return together(self._kind, Kind.BRANCH_POINT if meets else Kind.FOLD)
 
 
 def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.nan, np.nan)) -> Point2:

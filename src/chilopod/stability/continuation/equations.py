@@ -222,7 +222,7 @@ class Equations(ABC, Generic[A, S, R]):
             raise OutsideBoxError(j, float(values[j]), float(wanted[j]))
 
 
-def inverted(matrix: Array) -> tuple[Array, bool]:
+def inverted(matrix: Array, singular: float = tolerances.SINGULAR) -> tuple[Array, bool]:
     """Inverse of the matrix of a curve, shape (N+1, N+1), or that for shortest solutions, and True for the latter.
 
     At a branch point rounding decides how nearly singular the matrix is, and a solution with its inverse may end on the
@@ -230,10 +230,10 @@ def inverted(matrix: Array) -> tuple[Array, bool]:
     """
     with contextlib.suppress(np.linalg.LinAlgError):
         found = np.linalg.inv(matrix)
-        if np.abs(found).max() * np.abs(matrix).max() < 1.0 / tolerances.SINGULAR:
+        if np.abs(found).max() * np.abs(matrix).max() < 1.0 / singular:
             return np.asarray(found), False
     try:
-        return np.asarray(np.linalg.pinv(matrix, rcond=tolerances.SINGULAR)), True
+        return np.asarray(np.linalg.pinv(matrix, rcond=singular)), True
     except np.linalg.LinAlgError:
         raise AnalysisError("the curve has no direction here", field="step") from None
 
