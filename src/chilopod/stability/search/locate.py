@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -181,6 +181,8 @@ class Located(Result, Sequence[BifurcationPoint]):
         Number of orbits computed.
     searched, ending
         Interval in which the orbit was followed and searched, and the reason for an early end, also the first remark.
+    dimension
+        Number of states.
     """
 
     points: tuple[BifurcationPoint, ...]
@@ -189,6 +191,7 @@ class Located(Result, Sequence[BifurcationPoint]):
     evaluations: int
     searched: tuple[float, float]
     ending: str = ""
+    dimension: int = 0
 
     @property
     def complete(self) -> bool:
@@ -231,7 +234,10 @@ class Located(Result, Sequence[BifurcationPoint]):
         about = {"status": self.status.label, "remarks": "; ".join(self.remarks), "ending": self.ending}
         low, high = self.searched
         searched = {"low": low, "high": high, "evaluations": self.evaluations}
-        return dataset("point", columns(self.points, *names, *more), **about, **searched)
+        table: dict[str, Any] = columns(self.points, *names, *more)
+        if not self.points:  # a table of nothing has the same columns
+            table |= dict.fromkeys(("orbit", "mode"), np.empty((0, self.dimension)))
+        return dataset("point", table, **about, **searched)
 
 
 def locate(
@@ -323,7 +329,8 @@ def located(
     points = sorted((each for each in results if isinstance(each, BifurcationPoint)), key=lambda point: point.value)
     remarks += [each for each in results if isinstance(each, str)] + samples.family.remarks
     searched_part = here.start, max(here.start, here.end)
-    return Located(tuple(points), status, tuple(dict.fromkeys(remarks)), samples.count, searched_part, here.ending)
+    about = searched_part, here.ending, samples.family.dimension
+    return Located(tuple(points), status, tuple(dict.fromkeys(remarks)), samples.count, *about)
 
 
 def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[tuple[Block | None, Crossings]]:
