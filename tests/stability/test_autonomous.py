@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
     Ending,
+    Event,
     Kind,
     PeriodicSystem,
     begin,
@@ -96,6 +97,25 @@ def test_exponents_leave_out_the_motion_itself():
     np.testing.assert_allclose(found.values, [-2.6, -40.0], rtol=1e-11)
     assert found.modes.shape == (3, 2)
     assert found.multipliers.period == pytest.approx(np.pi, rel=1e-14)
+
+
+def test_one_state_has_nothing_beside_its_motion():
+    """Of a neuron that fires at x = 1, and of x' = x that is turned there, whose half period is a return."""
+    fire = Event(lambda t, x: x[0] - 1.0, lambda t, x: [0.0 * x[0]], direction=1)
+    turn = Event(lambda t, x: x[0] ** 2 - 1.0, lambda t, x: [-0.5 * x[0]], direction=1)
+
+    def neuron(current):
+        return from_rhs(lambda t, x: [current - x[0]], 1, None, guess_period=1.0, events=[fire])
+
+    turning = from_rhs(lambda t, x: [x[0]], 1, None, guess_period=1.4, symmetry=[[-1.0]], events=[turn])
+    for system, guess, period in ((neuron(1.5), [0.2], np.log(3.0)), (turning, [0.6], 2.0 * np.log(2.0))):
+        for found in (multipliers(system, guess), multipliers(system, guess, leading=1)):
+            assert (found.values.size, found.error_bound, found.stable, found.remarks) == (0, 0.0, True, ())
+            assert found.period == pytest.approx(period, rel=1e-13)
+        assert exponents(system, guess).modes.shape == (1, 0)
+    branch = follow(neuron, begin(neuron, 1.5, [0.2]), (1.5, 2.0))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert all(point.stable for point in branch.points)
 
 
 def test_a_bad_guess_settles_on_the_orbit_that_attracts():

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows import called
 from chilopod.stability import NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, locate, multipliers
 
 
@@ -137,6 +138,38 @@ def test_a_branch_on_the_state_is_differenced_and_warned_of():
         found = multipliers(system)
     assert found.values[0] == pytest.approx(exp(-3.0), rel=1e-8)
     assert abs(found.values[0] - exp(-3.0)) <= found.error_bound < 1e-6
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+def test_a_function_may_overwrite_its_argument_and_return_the_same_array(kind):
+    """Whether it is traced (else it branches) or not, by a complex step or by differences."""
+    kept = np.zeros(2, kind)
+
+    def overwriting(t, x):
+        x[0], x[1] = x[1], -(x[0] ** 3)
+        kept[:] = x
+        return kept
+
+    def branching(t, x):
+        return overwriting(t, x) if x[0].real < 1e9 else None
+
+    right = from_rhs(lambda t, x: [x[1], -(x[0] ** 3)], 2, 1.0).flow(np.array([0.8, 0.3]), 0.0, 0.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotAnalytic)
+        for rhs in (overwriting, branching):
+            found = from_rhs(rhs, 2, 1.0).flow(np.array([0.8, 0.3]), 0.0, 0.5)
+            for mine, other in zip(found, right, strict=True):
+                np.testing.assert_allclose(mine, other, rtol=1e-8)
+
+
+def test_a_function_that_rounds_within_is_refused(monkeypatch):
+    def rhs(t, x):
+        x, v = x.astype(np.float32).tolist()
+        return [v, -x]
+
+    monkeypatch.setattr(called, "_PATIENCE", 1000)
+    with pytest.warns(NotAnalytic), pytest.raises(ParameterError, match=r"^rhs: must be computed in double precision"):
+        from_rhs(rhs, 2, 1.0).flow(np.array([0.8, 0.3]), 0.0, 1.0)
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -315,6 +348,7 @@ REFUSED = {
     "returns nothing": (lambda t, x: None, 2, 1.0, {}, "rhs"),
     "returns a ragged list": (lambda t, x: [x, 1.0], 2, 1.0, {}, "rhs"),
     "returns a matrix": (lambda t, x: np.eye(2), 2, 1.0, {}, "rhs"),
+    "returns single precision": (lambda t, x: np.array(oscillator(t, x), np.float32), 2, 1.0, {}, "rhs"),
     "not a function": (3.0, 2, 1.0, {}, "rhs"),
     "takes no args": (oscillator, 2, 1.0, {"args": (1.0,)}, "rhs"),
     "args no tuple": (oscillator, 2, 1.0, {"args": 1.0}, "args"),

@@ -242,6 +242,8 @@ def test_a_table_of_nothing_has_the_same_columns():
     empty, some = locate(logistic, (0.1, 0.2), orbit=[0.0]), located()
     assert empty.to_dataset().sizes["point"] == 0
     assert set(empty.to_dataset()) == set(some.to_dataset())
+    tables = [found.to_csv().partition("value,error_bound,")[2].partition("\n")[0] for found in (empty, some)]
+    assert tables[0] == tables[1]
     assert [str(each.dtype)[:2] for each in empty.to_dataset().values()] == [
         str(each.dtype)[:2] for each in some.to_dataset().values()
     ]

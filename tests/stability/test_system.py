@@ -2,6 +2,7 @@
 
 import itertools
 from math import exp, pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from chilopod.stability import (
 )
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import offers, spatial_symmetries
-from chilopod.stability.returns import whole_period
+from chilopod.stability.returns import carried, flow_with_error, whole_period
 from helpers.systems import duffing, linear
 
 
@@ -119,6 +120,26 @@ def test_error_of_a_flow_that_gives_none_is_estimated_by_splitting(noise):
     error = np.abs(np.sort_complex(found.values) - np.sort_complex(known(-0.4, 0.7))).max()
     assert noise / 1000 < error <= found.error_bound
     assert found.error_bound < 1e3 * noise
+
+
+def test_a_flow_may_return_the_same_arrays():
+    state, matrix = np.zeros(2), np.zeros((2, 2))
+    own = Own()
+
+    def flow(x, t0, t1):
+        state[:], matrix[:] = own.flow(x, t0, t1)
+        return state, matrix
+
+    def tangents(x, directions, t0, t1):
+        return flow(x, t0, t1)[0], matrix @ directions
+
+    x, systems = np.array([0.3, 0.4]), [PeriodicSystem(2, own.period, each) for each in (own.flow, flow)]
+    for mine, other in zip(*(flow_with_error(each, x, 0.0, own.period) for each in systems), strict=True):
+        np.testing.assert_array_equal(mine, other)
+    states = [
+        carried(each, np.array([x, 2.0 * x]), 0.0, 1.0) for each in (own, SimpleNamespace(flow_tangents=tangents))
+    ]
+    np.testing.assert_array_equal(*states)
 
 
 def test_half_period_squares_to_the_full_period():

@@ -121,9 +121,9 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
                 raise ParameterError("must be a share above 0 % and below 100 %", value=text)
             if equals:
                 check_parameter(robot, path)
-                if path in named or parameter in (path, path.partition("[")[0]):
-                    said = "must be given once" if path in named else "must not be the number that bends the robot"
-                    raise ParameterError(said, value=text)
+                if path in named or path == parameter:
+                    said = "must not be the number whose critical value is searched"
+                    raise ParameterError("must be given once" if path in named else said, value=text)
                 named.add(path)
                 paths = [each for each in others if each.partition("[")[0] == path] or [path]
             else:

@@ -91,27 +91,30 @@ def shape_of(value: Any) -> tuple[int, ...] | str:
 
 
 def as_real(result: Any) -> Array:
-    """Values of a user's function as floating-point numbers; TypeError for complex ones off the real axis."""
+    """Values of a user's function as floating-point numbers, copied, as a function may return the same array at every
+    call; TypeError for complex ones off the real axis."""
     array = np.asarray(result)
     if array.dtype.kind == "c":
         if array.imag.any():
             raise TypeError("complex numbers")
         array = array.real
-    return np.asarray(array, dtype=np.float64)
+    return np.array(array, dtype=np.float64)
 
 
 def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
     """Values of a user's function as an array of the required shape."""
-    array, kind = None, ""
+    array, dtype = None, np.dtype(object)
     with suppress(TypeError, ValueError):
-        kind = np.asarray(result).dtype.kind
+        dtype = np.asarray(result).dtype
         # None would become NaN.
         array = None if result is None else as_real(result)
+    if dtype.char in "efF":  # half and single: rounding would stop the integration, with no word on its cause
+        raise ParameterError(f"must be computed in double precision, not {dtype.name}", field=field)
     wanted = f"an array of shape {shape}" if shape else "one number"
     if array is None:
         what, text = "an array of real numbers" if shape else "a real number", repr(result)
         given = text if len(text) <= _LONGEST_SHOWN else f"a {type(result).__name__}"
-        if kind == "c":
+        if dtype.kind == "c":
             given = "complex ones"
         raise ParameterError(f"must return {what}, not {given}", field=field, allowed=wanted)
     if array.shape != shape:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.arguments import Slopes, UserCode, numbers
+from chilopod.flows.arguments import Slopes, UserCode, as_real, numbers, sampled
 from chilopod.flows.carrying import TooManySteps, longest_step, pieces, state_beside
 from chilopod.frozen import Array
 
@@ -32,6 +32,8 @@ _SMALL = 1e-4
 _DISAGREES = 1e-5
 _MOST_CALLS = 2_000_000
 _PATIENCE, _HOPELESS = 50_000, 4.0  # calls, and factor on the largest number beyond which no more are tried
+_NEAR, _FAR = 1e-6 * np.arange(13.0), 0.1 * np.arange(-2.0, 3.0)  # places beside a state, relative to it
+_SCATTERED = 1e-13  # fourth difference between near places, relative to the values at far ones, beyond round-off
 _PROBES = 257  # samples over the period at which jumps show
 _SETTLED = 3  # zooms that leave only the jump of a change with smooth parts
 _DISAGREEMENT = (
@@ -131,7 +133,17 @@ class CalledFlow:
 
     def _slope(self, t: float, x: Array) -> Array:
         with UserCode("rhs"):
-            return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
+            return numbers(self.rhs(t, x.copy(), *self.args), x.shape, "rhs")  # it may write into its argument
+
+    def _check_precision(self, t: float, x: Array) -> None:
+        """Refuse a function whose values scatter beside a state: no step is short enough for them."""
+        places = x[:, None] * (1.0 + np.cos(3.0 * np.arange(x.size) + 1.0)[:, None] * np.append(_NEAR, _FAR))
+        near, far = np.split(sampled(self.rhs, self.args, x.size)(np.full(places.shape[1], t), places), [_NEAR.size], 1)
+        # Terms that cancel here do not do so far away. A jump is in less than half of the fourth differences.
+        rough = np.median(np.abs(np.diff(near, n=4)), axis=1)
+        if (rough > _SCATTERED * np.abs(far).max(axis=1)).any():
+            said = "must be computed in double precision throughout: beside a state its values scatter"
+            raise ParameterError(said, field="rhs")
 
     def _gradient(self, x: Array, sizes: Array) -> tuple[Gradient, float]:
         """The derivative of f near a state, by the best method for f, and its error relative to its largest entry."""
@@ -172,12 +184,13 @@ class CalledFlow:
             calls += 1
             ahead = calls * (b - a) > _HOPELESS * _MOST_CALLS * (t - a)  # at the mean length of the steps so far
             if calls > _MOST_CALLS or (calls > _PATIENCE and ahead):
+                self._check_precision(t, y[:n])
                 said = f"takes too many steps: the integration stopped at t = {t:g}"
                 allowed = "a less stiff right-hand side, or one without branches, which can be traced"
                 raise TooManySteps(said, field="rhs", allowed=allowed)
             if ended[0] != 0.0:
                 raise deadline.over()
-            t, state = min(max(t, inner_a), inner_b), y[:n].copy()
+            t, state = min(max(t, inner_a), inner_b), y[:n]
             slope = self._slope(t, state)
             if gradient is not None:
                 slope = np.concatenate([slope, (gradient(t, state) @ y[n:].reshape(n, n)).ravel()])
@@ -212,8 +225,8 @@ def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array,
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                tilted = np.asarray(rhs(t, probe + 1j * _COMPLEX_STEP * step, *args))
-                up, down = (np.asarray(rhs(t, probe + h * step, *args), dtype=np.float64) for h in (1e-6, -1e-6))
+                tilted = np.array(rhs(t, probe + 1j * _COMPLEX_STEP * step, *args))
+                up, down = (as_real(rhs(t, probe + h * step, *args)) for h in (1e-6, -1e-6))
         except Exception:  # any exception on complex input means that the function does not accept it
             return False
         if not np.iscomplexobj(tilted):

@@ -89,4 +89,4 @@ def longest_step(fast: Array, period: float, a: float, b: float) -> float:
 
 def numerical_balance(matrix: Array) -> Array:
     """Sizes d with rows and columns of ``matrix[i, j] * d[j] / d[i]`` of similar norms, for bounds on round-off."""
-    return np.asarray(dgebal(matrix, scale=1, permute=0)[3])
+    return np.asarray(dgebal(matrix, scale=1, permute=0)[3]) if matrix.size else np.empty(0)

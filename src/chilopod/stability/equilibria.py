@@ -190,7 +190,7 @@ def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> A
 def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
     """Taylor coefficients of f(x(s)) along x(s) = c0 + c1 s + ..., shape (curves, orders, n), and bounds of errors."""
     if offers(system, "velocity_series"):
-        found = system.velocity_series(curves)
+        found = np.array(system.velocity_series(curves))  # it may return the same array at every call
         return found, np.zeros_like(found)
     orders = curves.shape[1]
     best, error = np.full(curves.shape, np.nan), np.full(curves.shape, np.inf)

@@ -145,11 +145,11 @@ def full_period(nu: ComplexArray, error: Array, k: int, state: Array, period: fl
     """The multipliers mu = nu^k of the full period from those of the return map, with their errors."""
     modulus = np.abs(nu)
     resolved = modulus > _RESOLVED
-    bound = float(error[resolved].max()) if resolved.any() else float(error.max())
+    bound = float((error[resolved] if resolved.any() else error).max(initial=0.0))
     if k == 1:
         return Multipliers(nu, None, bound, error, state, period)
     # By the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.
-    largest = max(float(modulus[0]), 0.5)
+    largest = float(modulus.max(initial=0.5))
     errors = error * k * (modulus + error) ** (k - 1)
     return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), errors, state, period)
 
@@ -175,7 +175,7 @@ def multipliers(
         if leading is None:
             return _multipliers(find_orbit(system, orbit))
         check_system(system)
-        count = checked_count("leading", leading, system.dimension - (system.period is None))
+        count = checked_count("leading", leading, max(1, system.dimension - (system.period is None)))
         if offers(system, "flow_tangents") and system.dimension >= LARGE:
             image, size = find_large_orbit(system, orbit)
             found, error, following = leading_multipliers(image, size, count)

@@ -117,8 +117,8 @@ def locate_hopf(
             if all(new.value - old.value > min(near, new.error_bound + old.error_bound) for old in points)
         ]
     said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(pieces[-1].ending)
-    spacing = max(each.spacing for each in pieces)
-    return Located(tuple(points), status, said, budget - left, (low, pieces[-1].searched[1]), spacing, ending)
+    about = (low, pieces[-1].searched[1]), max(each.spacing for each in pieces), ending, last.orbit.size
+    return Located(tuple(points), status, said, budget - left, *about)
 
 
 def _piece(

@@ -140,6 +140,8 @@ def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error:
     usual = type(state) is type(derivative) is np.ndarray and state.dtype == derivative.dtype == np.float64
     if not (usual and state.shape == (n,) and derivative.shape == (n, n)):
         state, derivative = numbers(state, (n,), name), numbers(derivative, (n, n), name)
+    else:  # the function may return the same arrays at every call
+        state, derivative = state.copy(), derivative.copy()
     if is_new(function) and _is_long(system, t1 - t0):
         compare(function, lambda x: checked_flow(system, x, t0, t1, with_error)[0], x, state, derivative, name)
     if not with_error:

@@ -143,6 +143,7 @@ class TangentMap(ReadOnlyArrays):
             if shapes != allowed:
                 said = "gives shapes {} and {}".format(*shapes)
                 raise AnalysisError(said, field="flow_tangents", allowed="{} and {}".format(*allowed))
+            state, images = np.array(state), np.array(images)  # it may return the same arrays at every call
         check_finite(images)
         if self.system.symmetry is not None:
             state, images = self.system.symmetry @ state, self.system.symmetry @ images

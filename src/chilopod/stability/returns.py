@@ -308,7 +308,8 @@ def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
             return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
     if offers(system, "flow_tangents"):
         with UserCode("flow_tangents"):
-            return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
+            zero = np.zeros((states.shape[1], 1))
+            return np.array([np.array(system.flow_tangents(np.array(x), zero.copy(), t0, t1)[0]) for x in states])
     return np.array([checked_flow(system, x, t0, t1)[0] for x in states])
 
 

@@ -104,7 +104,7 @@ def eigensystem(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray
 def falling(values: ComplexArray) -> NDArray[np.intp]:
     """Order by falling modulus. The two of a pair stay together, positive frequency first, as the eigenvalue solver
     returns them."""
-    relative = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
+    relative = np.round(np.abs(values) / np.abs(values).max(initial=1e-300), 12)
     return np.lexsort((-np.round(np.abs(values.imag), 12), -relative))
 
 
@@ -127,7 +127,7 @@ def spectrum(image: ReturnMap) -> Spectrum:
     wrong = np.broadcast_to(image.error, image.jacobian.shape)
     error += (np.abs(left) * (wrong @ np.abs(right))).sum(axis=0)
     error = np.where(np.isfinite(error), error, np.inf)
-    if (error > FIRST_ORDER * np.abs(values[0])).any():
+    if (error > FIRST_ORDER * np.abs(values[:1])).any():
         error = np.minimum(error, eigenvalue_errors(values, jacobian, np.abs(out_of) @ wrong @ np.abs(into)))
     return Spectrum(values, right, left, error)
 
@@ -378,6 +378,8 @@ def _moved(factors: Array, errors: Array, groups: Sequence[Sequence[Array]], kno
 
 def split_return(system: SystemLike, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
     """As :func:`split_product` for a return; AnalysisError if it contracts too strongly to be resolved."""
+    if x.size == 1 and is_autonomous(system):  # nothing is left beside the motion
+        return np.empty(0, np.complex128), np.empty((1, 0), np.complex128), np.empty(0)
     if is_stiff(system, x, image.duration):
         return _split_stiff(system, x, image)
     cut = moderate_cut(system, x, image)

@@ -326,7 +326,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         spec = spectrum(replace(image, error=image.error + wrong * sizes[:, None] / sizes))
         found = full_period(spec.values, spec.error, image.returns, image.state, image.period)
         moduli = np.abs(spec.values)
-        return found.values, float(found.error_bounds[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
+        telling = found.error_bounds[moduli >= min(_NOT_SMALL, moduli.max(initial=0.0))]
+        return found.values, float(telling.max(initial=0.0))
 
     def _relative_size(self, x: Array) -> float:
         return float(np.abs(x / self.units(x.size)[:-1]).max())

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -183,6 +183,8 @@ class Located(Result, Sequence[BifurcationPoint]):
         Interval in which the orbit was followed and searched, largest distance of neighbouring orbits in it, and the
         reason for an early end, also the first remark. Between two orbits the multipliers are interpolated: what they
         do within less than the spacing alone may be missed.
+    dimension
+        Number of states.
     """
 
     points: tuple[BifurcationPoint, ...]
@@ -192,6 +194,7 @@ class Located(Result, Sequence[BifurcationPoint]):
     searched: tuple[float, float]
     spacing: float
     ending: str = ""
+    dimension: int = 0
 
     @property
     def complete(self) -> bool:
@@ -235,7 +238,10 @@ class Located(Result, Sequence[BifurcationPoint]):
         about = {"status": self.status.label, "remarks": "; ".join(self.remarks), "ending": self.ending}
         low, high = self.searched
         searched = {"low": low, "high": high, "evaluations": self.evaluations, "spacing": self.spacing}
-        return dataset("point", columns(self.points, *names, *more), **about, **searched)
+        table: dict[str, Any] = columns(self.points, *names, *more)
+        if not self.points:  # a table of nothing has the same columns
+            table |= dict.fromkeys(("orbit", "mode"), np.empty((0, self.dimension)))
+        return dataset("point", table, **about, **searched)
 
 
 def locate(
@@ -328,8 +334,8 @@ def located(
     remarks += [each for each in results if isinstance(each, str)] + samples.family.remarks
     searched_part = here.start, max(here.start, here.end)
     spacing = float(np.diff([here.start, *samples.within(*searched_part), searched_part[1]]).max())
-    notes = tuple(dict.fromkeys(remarks))
-    return Located(tuple(points), status, notes, samples.count, searched_part, spacing, here.ending)
+    about = searched_part, spacing, here.ending, samples.family.dimension
+    return Located(tuple(points), status, tuple(dict.fromkeys(remarks)), samples.count, *about)
 
 
 def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[tuple[Block | None, Crossings]]:
