@@ -50,7 +50,7 @@ def size(
     twin
         True to let the robot walk in three dimensions too.
     budget, seed
-        Most evaluations of a robot, some 30 ms each, and as many again to say what stands in the way; seed of the
+        Most evaluations of a robot, some 20 ms each, and as many again to say what stands in the way; seed of the
         scattered starts.
     progress
         Function of the fraction done (0 to 1) and a few words.

@@ -45,7 +45,7 @@ class Sizing(Summary, ReadOnlyArrays):
     walks
         Ends of a walk by the name of the engine, see :func:`chilopod.tasks.radius_law.end_of_walk`.
     evaluations
-        Number of robots that were evaluated; a branch of curved walks counts as 30.
+        Number of robots that were evaluated; a branch of curved walks counts as 20.
     """
 
     robot: Robot
