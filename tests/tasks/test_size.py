@@ -170,6 +170,9 @@ def test_curved_walks_beside_a_stable_straight_one_are_said_not_to_be_searched()
     assert any("subcritical" in reason for reason in found.reasons)
     other = size(ROBOT, {"radius": "0.6 m"}, [("springs.stiffness[0]", "13 N*mm/deg", "14 N*mm/deg")], budget=12)
     assert not any("subcritical" in reason for reason in other.reasons)
+    uneven = ROBOT.override("gait.side_phase", "150 deg")
+    found = size(uneven, {"radius": "0.6 m"}, [("springs.stiffness[0]", "9 N*mm/deg", "10 N*mm/deg")], budget=12)
+    assert any("no pitchfork (transcritical)" in reason for reason in found.reasons)
 
 
 def test_an_onset_that_is_met_is_the_first_one():

@@ -28,7 +28,7 @@ from chilopod.labels import Labelled
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress
 from chilopod.robot import Robot
-from chilopod.stability import Criticality, find_orbit
+from chilopod.stability import Criticality, Kind, find_orbit
 
 FAILED = 10.0
 """Deviation of a robot without the quantity."""
@@ -274,8 +274,8 @@ class Search:
         for wish, values in zip(self.wishes, seen.T, strict=True):
             if values.size and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
                 said.append(_unchanged(wish))
-            if wish.quantity == "radius" and self._subcritical(self.at(best)):
-                said.append("the onset is subcritical, and curved walks beside a stable straight one are not searched")
+            if wish.quantity == "radius":
+                said += self._without_walks(self.at(best))
         front: list[Array] = []
         try:
             if len(self.wishes) > 1:
@@ -289,11 +289,15 @@ class Search:
         self.best, self._least = best, least
         return said or ["no end of a range and no other wish stands in the way: the search saw none nearer"], front
 
-    def _subcritical(self, robot: Robot) -> bool:
+    def _without_walks(self, robot: Robot) -> list[str]:
+        """A sentence if no curved walk is searched at a robot because of the kind of its onset."""
         with suppress(ChilopodError):
-            found = self._measured.number.first(robot, normal_form=True)
-            return found.point.criticality is Criticality.SUBCRITICAL
-        return False
+            point = self._measured.number.first(robot, normal_form=True).point
+            if point.kind is not Kind.PITCHFORK:
+                return [f"the onset is no pitchfork ({point.kind.label}): only walks that leave one are searched"]
+            if point.criticality is Criticality.SUBCRITICAL:
+                return ["the onset is subcritical, and curved walks beside a stable straight one are not searched"]
+        return []
 
     def _left_out(self, wish: int, start: Array) -> tuple[Array, Array]:
         """Place that meets all wishes but one best, and the deviations there."""
