@@ -326,3 +326,16 @@ def test_a_branch_that_passes_close_to_a_fold_is_found_or_remarked(distance):
     missing = 3 - len(kinds)
     assert kinds == [Kind.FOLD] + [Kind.TRANSCRITICAL] * (2 - missing)
     assert missing == sum("beside the fold is another bifurcation" in remark for remark in branch.remarks) <= 1
+
+
+@pytest.mark.parametrize("between", [(0.9, 1.2), (0.5, 2.0)])
+def test_a_narrow_resonance_is_not_passed_over(between):
+    """Its two folds, as harmonic balance gives them, lie within 6e-4, and the orbit is alike on both sides."""
+
+    def forced(w):
+        rhs = lambda t, x: [x[1] / w, (-2e-4 * x[1] - x[0] - x[0] ** 3 + 1e-5 * np.cos(t)) / w]  # noqa: E731
+        return from_rhs(rhs, 2, 2.0 * np.pi)
+
+    branch = follow(forced, begin(forced, between[0], [1e-5 / (1.0 - between[0] ** 2), 0.0]), between)
+    assert [point.special for point in branch.special_points] == [Kind.FOLD, Kind.FOLD]
+    np.testing.assert_allclose([point.value for point in branch.special_points], [1.000937, 1.000379], atol=3e-6)

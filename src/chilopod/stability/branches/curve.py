@@ -149,6 +149,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         other = in_parts(system, x, image.duration)
         return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
 
+    def size(self, step: Step[Anchor, OnCurve]) -> float:
+        x = step.found.x
+        return float(np.linalg.norm(x / self.units(x.size)[:-1]))
+
     def stretches(self, step: Step[Anchor, OnCurve]) -> bool:
         """True unless short steps are wanted, or the system gives the sizes of its states."""
         return self.long_steps and not offers(self.system(step.found.value), "scale")

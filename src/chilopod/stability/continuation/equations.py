@@ -167,6 +167,10 @@ class Equations(ABC, Generic[A, S, R]):
         """True if a step to the first point, by these coordinates, ends at it."""
         return True
 
+    def size(self, step: Step[A, S]) -> float:
+        """Size of the orbit at the end of a step, in units; infinite if its own size does not count."""
+        return np.inf
+
     def stretches(self, step: Step[A, S]) -> bool:
         """True if the units of a curve are estimates, so that steps along straight parts may be longer."""
         return False

@@ -33,6 +33,12 @@ class Ending(Labelled):
     LOST = "lost", "the step became too small: the curve could not be followed further"
 
 
+_CHANGE, _PART = (
+    0.3,
+    0.1,
+)  # change of an orbit, relative to its own size, that counts where it is a small part of a step
+_LEAST = 1e3  # missed prediction of it, relative to the precision, that counts
+
 F = TypeVar("F")
 
 
@@ -130,9 +136,17 @@ def _taken(equations: Equations[A, S, R], anchor: A, size: float, count: int) ->
     length = float(np.linalg.norm(step.moved))
     if not step.size >= tolerances.STRAIGHT * length:
         raise AnalysisError("the step went astray", field="step")
-    if step.missed > tolerances.SURPRISE * length:
+    missed = step.moved - predicted(anchor, step.size).moved
+    states = np.delete(np.arange(missed.size), equations.parameters(anchor)[0])
+    # Units may be much larger than an orbit that passes a narrow resonance: its own change counts too.
+    own = max(float(np.linalg.norm(each[states])) for each in (step.moved, step.size * anchor.tangent))
+    of_orbit = _CHANGE * equations.size(step) < own < _PART * length
+    of_orbit &= float(np.linalg.norm(missed[states])) > max(tolerances.SURPRISE * own, _LEAST * equations.precision)
+    if of_orbit or step.missed > tolerances.SURPRISE * length:
         half = Parts(equations, step).at(0.5 * step.size)
-        if not float(np.linalg.norm(half.moved - step.between(half.size).moved)) <= tolerances.AWAY * length:
+        away = half.moved - step.between(half.size).moved
+        smooth = not of_orbit or float(np.linalg.norm(away[states])) <= tolerances.AWAY * own
+        if not (smooth and float(np.linalg.norm(away)) <= tolerances.AWAY * length):
             raise AnalysisError("the curve is not smooth within the step", field="step")
     closed = _closed(equations, step) if ending is None and count > 2 else None
     return (step, ending) if closed is None else (closed, Ending.CLOSED)
