@@ -339,3 +339,20 @@ def test_a_narrow_resonance_is_not_passed_over(between):
     branch = follow(forced, begin(forced, between[0], [1e-5 / (1.0 - between[0] ** 2), 0.0]), between)
     assert [point.special for point in branch.special_points] == [Kind.FOLD, Kind.FOLD]
     np.testing.assert_allclose([point.value for point in branch.special_points], [1.000937, 1.000379], atol=3e-6)
+
+
+def test_a_doubling_is_left_with_the_period_that_its_point_knows():
+    """The family's own guess belongs to the start of another branch."""
+
+    def roessler(c, guess):
+        return from_rhs(
+            lambda t, x: [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - c)], 3, None, guess_period=guess
+        )
+
+    def near(c):
+        return roessler(c, 6.0)
+
+    branch = follow(near, begin(near, 2.5, [0.0, -3.5, 0.1]), (2.5, 3.0))
+    (point,) = branch.special_points
+    (start,) = switch(lambda c: roessler(c, 0.7), point)
+    assert start.period == pytest.approx(2.0 * point.period, rel=1e-9)

@@ -88,7 +88,8 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     orbit
         State on the critical orbit at time 0, or the equilibrium, shape (n,).
     mode
-        Unit critical eigenvector, shape (n,), complex for Neimark-Sacker and Hopf.
+        Critical eigenvector, shape (n,), complex for Neimark-Sacker and Hopf, of unit length; where the period belongs
+        to the orbit, the mean square of the disturbance across the motion over a period is 1.
     multiplier
         Critical multiplier of the return map; at a Hopf point the eigenvalue i omega.
     frequency
@@ -97,7 +98,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
         Verdict of the coefficient, or the reason for a missing one.
     coefficient, coefficient_error
         Cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period doubling over
-        two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None if it has no
+        two; a is the amplitude along ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None if it has no
         meaning or without a normal form. At a Hopf point the first Lyapunov coefficient l1 (Kuznetsov, section 3.5).
     rotation, rotation_error
         Change of the phase per period with the amplitude (Neimark-Sacker), rad per amplitude^2.

@@ -28,7 +28,7 @@ from chilopod.stability.interface import (
 )
 from chilopod.stability.orbits.orbit import Orbit, known_state, searched_orbit, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import Section, carried, returned_states, whole_period
+from chilopod.stability.returns import Section, carried, returned_states, section_at, whole_period
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
@@ -200,7 +200,9 @@ def switch(
         periods = known if periods is None else int(periods)
         if is_autonomous(system):
             whole = whole_period(system, periods)
-            period = searched_orbit(whole, point.orbit, with_error=False, shortest=periods == 1).period
+            # The point knows its period better than the family's guess.
+            section = section_at(whole, point.orbit, duration=point.period * periods / known)
+            period = searched_orbit(whole, point.orbit, with_error=False, section=section).period
     axial = point.symmetry is not None and bool(point.symmetry.branches)
     modes = point.mode.real[None]
     if point.modes is not None and (axial or kind is not Kind.COLLISION):  # two that meet have one eigenvector
