@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import Kind, PeriodicSystem, from_map, from_rhs, locate
+from chilopod.stability import Kind, PeriodicSystem, from_map, from_rhs, locate, multipliers
 from chilopod.stability.branches.branch import Ending, begin, follow, switch
 from helpers.systems import henon, of_map
 
@@ -356,3 +356,21 @@ def test_a_doubling_is_left_with_the_period_that_its_point_knows():
     (point,) = branch.special_points
     (start,) = switch(lambda c: roessler(c, 0.7), point)
     assert start.period == pytest.approx(2.0 * point.period, rel=1e-9)
+
+
+def test_bounds_along_a_doubled_branch_do_not_grow_with_the_width_of_the_interval():
+    """The orbit's change with the parameter, in units of the interval, is no error of its derivative."""
+    period = 2.0 * np.pi / 0.7
+
+    def junction(force):
+        rhs = lambda t, x: [x[1], -0.4 * x[1] - np.sin(x[0]) + 0.3 + force * np.cos(0.7 * t)]  # noqa: E731
+        return from_rhs(rhs, 2, period)
+
+    branch = follow(junction, begin(junction, 0.05, [0.3, 0.0]), (0.05, 2.0))
+    (start,) = switch(junction, branch.special_points[1])
+    last = follow(junction, start, (0.05, 2.0), points=16).points[-1]
+    assert last.stable
+    force = last.value
+    twice = from_rhs(lambda t, x: [x[1], -0.4 * x[1] - np.sin(x[0]) + 0.3 + force * np.cos(0.7 * t)], 2, 2.0 * period)
+    own = np.abs(multipliers(twice, last.orbit).values)
+    assert np.abs(np.sort(np.abs(last.multipliers)) - np.sort(own)).max() < last.error_bound < 1e-2

@@ -246,7 +246,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         # Units may be much larger than the orbit.
         reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
         length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
-        bend = float(np.linalg.norm(matrix[:n] - anchor.matrix[:n])) / length
+        bend = float(np.linalg.norm(matrix[:n, :n] - anchor.matrix[:n, :n])) / length
         # The flow's error relative to its magnification is a bound already.
         sizes = self.units(n)[:-1]
         error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
