@@ -12,6 +12,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
     Criticality,
     Ending,
+    Event,
     Kind,
     PeriodicSystem,
     begin,
@@ -22,6 +23,7 @@ from chilopod.stability import (
     locate_hopf,
     switch,
 )
+from chilopod.stability.equilibria import has_centre
 from helpers.systems import in_units, lorenz, lorenz_rhs
 
 LORENZ_HOPF = 470.0 / 19.0
@@ -591,3 +593,14 @@ def test_hopf_points_of_a_ring_of_36():
     for point, value in zip(found, expected, strict=True):
         assert abs(point.value - value) <= point.error_bound + 1e-12
         assert point.error_bound < 1e-10
+
+
+def test_a_small_cycle_surrounds_an_equilibrium_that_oscillates_with_its_period():
+    """Not so a spiking motion that is slow where no equilibrium is, or near one of another kind."""
+    oscillator = from_rhs(lambda t, x: [x[1], 0.02 * x[1] - 4.0 * x[0] - x[0] ** 3], 2, None, guess_period=3.0)
+    assert has_centre(oscillator, np.array([1e-3, 0.0]), np.pi)
+    assert not has_centre(oscillator, np.array([1e-3, 0.0]), 6.0)
+    fire = Event(lambda t, x: x[0] - 10.0, lambda t, x: [0.0 * x[0] - 10.0], 1)
+    for drive in (1e-4, -1e-4):
+        neuron = from_rhs(lambda t, x, drive=drive: [x[0] ** 2 + drive], 1, None, guess_period=300.0, events=[fire])
+        assert not has_centre(neuron, np.array([0.0]), 300.0)

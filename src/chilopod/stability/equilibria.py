@@ -36,6 +36,7 @@ _SINGULAR = 1e-13  # singular value, relative to the largest, that counts as zer
 _ANGLES = 8  # angles on a circle, which separate harmonics up to the third
 _SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # spans of samples of f for differences, relative to the sizes of the states
 _FIRST = 1e-4, 1e-6  # cubic terms of the first cycle, relative to the frequency: amplitudes of 1/100 and 1/1000
+_TURNS = 0.1  # largest difference of turns within the period of a small cycle from one
 _MISSED = 0.3  # largest error of the predicted first cycle, relative to its amplitude
 
 
@@ -103,6 +104,15 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     values = values[np.lexsort((-values.imag, -values.real))]
     off = np.inf if singular else matrix_error(checked, x, matrix, error)
     return Equilibrium(x, error, matrix, values, eigenvalue_errors(values, matrix, np.zeros_like(matrix) + off))
+
+
+def has_centre(system: SystemLike, state: Array, period: float) -> bool:
+    """True if an equilibrium near a state oscillates with a period, as where small cycles surround it."""
+    try:
+        turns = find_equilibrium(system, state).eigenvalues.imag * period / (2.0 * np.pi)
+    except AnalysisError:
+        return False
+    return bool((np.abs(turns - 1.0) <= _TURNS).any())
 
 
 def equilibrium_at(family: Family, value: float, guess: ArrayLike) -> tuple[Autonomous, Equilibrium]:

@@ -26,6 +26,7 @@ from chilopod.stability.branches.branch_points import (
 )
 from chilopod.stability.continuation.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.continuation.tolerances import SETTLED, SHARPEST_TURN
+from chilopod.stability.equilibria import has_centre
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import checked_flow, is_autonomous, offers
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
@@ -290,7 +291,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         path = self._path(found.x, found.value, found.image.duration)
         extent = float(np.linalg.norm((path - found.x) / self.units(velocity.size)[:-1], axis=1).max())
         said = "the motion nearly stops in the section, and the next step has no direction"
-        raise AnalysisError(_SHRINKS if extent <= motion else said, field="orbit")
+        shrinks = extent <= motion and has_centre(self.system(found.value), found.x, found.image.period)
+        raise AnalysisError(_SHRINKS if shrinks else said, field="orbit")
 
     def _path(self, x: Array, value: float, duration: float) -> Array:
         """States on an orbit, at even times over some duration, shape (times, n)."""

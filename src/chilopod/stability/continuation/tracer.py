@@ -33,11 +33,9 @@ class Ending(Labelled):
     LOST = "lost", "the step became too small: the curve could not be followed further"
 
 
-_CHANGE, _PART = (
-    0.3,
-    0.1,
-)  # change of an orbit, relative to its own size, that counts where it is a small part of a step
-_LEAST = 1e3  # missed prediction of it, relative to the precision, that counts
+_CHANGE = 0.3  # change of an orbit within a step, relative to its own size, that counts
+_PART = 0.1  # part of a step below which that change hardly shows in the step
+_LEAST = 1e3  # missed prediction of an orbit, relative to the precision, that counts
 
 F = TypeVar("F")
 

@@ -170,7 +170,7 @@ def searched_orbit(
         found = near_orbit(system, Nodes(x[None], duration), with_error, budget, section)
         return _shortest(system, found, with_error, budget) if shortened else found
     except TooManySteps as error:
-        allowed = f"a guess closer to the orbit and its period, {error.allowed}"
+        allowed = ", ".join(filter(None, ("a guess closer to the orbit and its period", error.allowed)))
         said = f"the motion from the guess {error.problem}"
         raise TooManySteps(said, field="orbit", allowed=allowed) from error
     except AnalysisError as failed:

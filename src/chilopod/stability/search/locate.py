@@ -20,6 +20,7 @@ from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
 from chilopod.stability.crossing_place import Course, Sample, crossings_in, orbit_blocks, past_singular, place_error
+from chilopod.stability.equilibria import has_centre
 from chilopod.stability.interface import Family, checked_flow, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
@@ -46,7 +47,7 @@ _MERGING = 1e-4  # distance from a meeting of orbits, relative to the interval, 
 _ROUND_TOUCH = 9  # places in the surroundings of a touch
 _BETWEEN_POWERS = 0.75  # mean of the powers one half and one
 _AT_REST = 0.03  # motion, relative to the first orbit's, that counts as rest
-_PARTS = 64  # parts of a return at which the extent of the motion is sampled
+_PARTS = 5  # parts of a return at which the extent of the motion is sampled
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,8 @@ def _comes_as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, r
 
 
 def _at_rest(samples: Samples, value: float, state: Array, period: float) -> bool:
-    """True if the motion nearly vanishes at the end of an orbit: past a fold there the same orbit comes again."""
+    """True if the motion nearly vanishes at the end of an orbit, around an equilibrium, as spikes may lie between the
+    samples of a motion: past a fold there the same orbit comes again."""
 
     def moved(value: float, state: Array, period: float) -> float:
         """Extent of the motion within a return, relative to the sizes of the states."""
@@ -151,7 +153,8 @@ def _at_rest(samples: Samples, value: float, state: Array, period: float) -> boo
         return float((np.ptp(np.array(path), axis=0) / samples.size).max())
 
     first = samples.low, samples.first.state, samples.first.period
-    return not samples.family.timed and moved(value, state, period) < _AT_REST * moved(*first)
+    small = not samples.family.timed and moved(value, state, period) < _AT_REST * moved(*first)
+    return small and has_centre(samples.family(value), state, period)
 
 
 _DESCRIBING = 400  # budget of return maps for the orbits beside a point

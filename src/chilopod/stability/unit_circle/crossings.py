@@ -82,8 +82,8 @@ def find_crossings(
 ) -> Crossings:
     """Every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
-    Matrices are evaluated at up to ``budget`` values, or ``affordable()`` more if their cost decides; those at
-    ``known`` values, which cost nothing, count too. Remarks show a value as ``shown(value)``. A ParameterError refuses
+    Matrices are evaluated at up to ``budget`` values, or ``affordable()`` more if their cost decides, and at ``known``
+    values of the interval, where they cost nothing. Remarks show a value as ``shown(value)``. A ParameterError refuses
     an empty or infinite interval.
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
@@ -91,10 +91,9 @@ def find_crossings(
     if budget < (least := 2 * first_places(0.0, 1.0).size):
         return Crossings((), SearchStatus.BUDGET, (f"a search takes {least} matrices or more (`budget`)",), 0)
     a, b, parameter, place = _coordinate(low, high)
-    spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
+    spectra = Spectra(lambda places: matrices(parameter(places)), budget + len(known), affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
-    within = np.clip(place(np.array([each for each in known if low <= each <= high])), a, b)
-    (status, found), crossings = finder.search(within), []
+    (status, found), crossings = finder.search(np.clip(place(np.array(known)), a, b)), []
     for each in found:
         value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
         crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
@@ -132,7 +131,7 @@ class _Finder:
     report: Report = field(default_factory=Report)
 
     def search(self, known: Array) -> tuple[SearchStatus, list[Crossing]]:
-        """Find the crossings; matrices at ``known`` places are counted too."""
+        """Find the crossings; eigenvalues outside are counted at ``known`` places too."""
         report, spectra = self.report, self.spectra
         first = first_places(self.a, self.b)
         spectra.at(first)

@@ -186,8 +186,12 @@ def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
 def allowed_ranges(robot: Robot, data: CriticalMode, best: Array) -> Array:
     """Projections of the set {max |residual| <= 1}, shape (3, 2), SI; NaN if it is empty. Where no end is found, the
     search ends the range."""
-    start = least_largest(robot, data, best, fixed=())
-    if np.abs(residuals(with_constants(robot, start), data)).max() > 1.0 + _ROOM:
+
+    def largest(constants: Array) -> float:
+        return float(np.abs(residuals(with_constants(robot, constants), data)).max())
+
+    start = min(best, least_largest(robot, data, best, fixed=()), key=largest)
+    if largest(start) > 1.0 + _ROOM:
         return np.full((len(FREE), 2), np.nan)
     found = _ends(robot, data, start, lambda off: 1.0 - _both_signs(off), lambda _, slopes: -_both_signs(slopes))
     return np.where(np.isnan(found), np.array(_BOUNDS) * scale_of(robot, data)[:, None], found)

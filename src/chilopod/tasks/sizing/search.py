@@ -125,7 +125,7 @@ class Search:
     ) -> None:  # fmt: skip
         self.robot, self.wishes, self.axes, self.progress = robot, wishes, axes, progress
         self._measured, self._budget, self._limit, self._robots = Measured(onset), budget, budget, 0
-        self.again = Measured(onset)  # for the best place alone
+        self.again = Measured(onset, similar=False)  # for the best place alone
         scattered = Sobol(len(axes), rng=np.random.default_rng(seed)).random(_STARTS)
         own = [self._place(each) for each in axes]
         # The robot itself is the first start, so that of many answers one near it is found.
@@ -192,7 +192,7 @@ class Search:
             branches, self._measured = self._measured.branches, Measured(self._measured.number, similar=False)
             self._measured.branches, self._limit = branches, self.evaluations + self._budget
             self._least = np.full(len(self.wishes), np.inf)
-            outcome, self.again = self._searched(), Measured(self._measured.number)
+            outcome, self.again = self._searched(), Measured(self._measured.number, similar=False)
         return outcome
 
     def _searched(self) -> Outcome:
