@@ -231,7 +231,8 @@ def _ends(
                 continue
             both = off(found), residuals(with_constants(robot, found * scale), data)
             left = min(float(np.min(room(each))) for each in both)
-            if left >= -_ROOM and (left <= _EDGE or found[constant] in limits[constant]):
+            at_limit = np.abs(found[constant] - limits[constant]).min() <= _STEP  # to rounding
+            if left >= -_ROOM and (left <= _EDGE or at_limit):
                 ends[constant, side] = found
     return np.array([ends[i, :, i] for i in range(len(FREE))]) * scale[:, None]
 
