@@ -81,7 +81,11 @@ UNEVEN = [
 ]
 
 
-@pytest.mark.parametrize(("texts", "stable"), [(SIDES_ALIKE, True), (UNEVEN, False)])
+def test_a_robot_whose_fastest_modes_are_barely_resolved_is_stable():  # on some processors they are not
+    assert straight_walk(load_robot("aoi2022-planar").set_from_text(SIDES_ALIKE)).stable
+
+
+@pytest.mark.parametrize(("texts", "stable"), [([*UNEVEN, "springs.stiffness=75 N*mm/deg"], True), (UNEVEN, False)])
 def test_modes_that_die_out_too_fast_do_not_hide_the_others(texts, stable):
     robot = load_robot("aoi2022-planar").set_from_text(texts)
     found = straight_walk(robot)

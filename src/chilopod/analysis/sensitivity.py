@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 DEFAULT = ("onset", "growth", "frequency")
 """Quantities that take little time."""
 
-_ROUND_OFF = {"friction": 100.0 * ROUND_OFF}  # that is a difference of onsets, over 2 %
 _RELATIVE = "onset", "radius"  # shown in % per %; the others may be near zero
 
 
@@ -275,9 +274,19 @@ def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) ->
     }
 
 
+def _round_off(name: str, robot: Robot, onset: Onset) -> float:
+    """Error of a quantity, relative to it."""
+    if name != "friction":
+        return ROUND_OFF
+    # A difference of two onsets over 2 %, each as exact as the multiplier that passes the unit circle there.
+    value = onset.first(robot).point.value
+    of = _Leading(robot.with_value(onset.parameter, value))
+    return 100.0 * ROUND_OFF / abs(of.slope(onset.parameter, True)[0].real * value * of.mode(True).duration)
+
+
 def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
     function, found = getattr(Measured(onset), name), []
-    value = function(robot)
+    value, round_off = function(robot), _round_off(name, robot, onset)
     for done, path in enumerate(paths):
         show(done / len(paths), f"{name} by {path}")
 
@@ -285,7 +294,7 @@ def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str],
             return np.array(function(robot.with_value(path, value)))
 
         try:
-            found.append(derivative(at, robot.get(path), size_of(robot, path), _ROUND_OFF.get(name, ROUND_OFF)))
+            found.append(derivative(at, robot.get(path), size_of(robot, path), round_off))
         except AnalysisError:  # neighbours lack the quantity, as the coefficient without the symmetry of half a period
             found.append((np.array(np.nan), np.array(np.nan)))
     return {name: (value, [float(slope) for slope, _ in found], [float(error) for _, error in found])}

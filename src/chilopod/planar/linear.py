@@ -143,13 +143,14 @@ def system_matrices(
 def solve(matrix: Any, right: Any) -> Array:
     """Solve with a matrix in extended precision: inverse in double, and two refinements.
 
+    The inverse is refined, not the solution: it has fewer columns, and products in extended precision are slow.
     LAPACK's solver would share a few columns between threads, which takes milliseconds where other work keeps a core.
     """
-    inverse = np.linalg.inv(matrix.astype(np.float64))
-    solution = (inverse @ right.astype(np.float64)).astype(right.dtype)
+    double = np.linalg.inv(matrix.astype(np.float64))
+    inverse = double.astype(right.dtype)
     for _ in range(2):
-        solution += inverse @ (right - matrix @ solution).astype(np.float64)
-    rounded: Array = solution.astype(np.float64)
+        inverse += double @ (np.eye(len(matrix)) - matrix @ inverse).astype(np.float64)
+    rounded: Array = (inverse @ right).astype(np.float64)
     return rounded
 
 
