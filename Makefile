@@ -78,7 +78,7 @@ run-tests: $(DEV)
 
 # OpenBLAS does not look whether the processor has what its kernels need.
 KERNELS ?= Haswell Zen Nehalem $(shell grep -qs avx512vl /proc/cpuinfo && echo SkylakeX)
-NUMERIC := tests/flows tests/stability tests/truth tests/analysis tests/planar tests/test_examples.py
+NUMERIC := tests/flows tests/stability tests/truth tests/analysis tests/planar tests/tasks tests/test_examples.py
 
 test-processors: $(DEV)  ## the numeric tests with the arithmetic of other processors; half an hour; some in KERNELS="Zen"
 	@failed=; for kernel in $(KERNELS); do \
