@@ -128,3 +128,40 @@ def test_orbits_that_are_none_are_one_line(guess):
     with pytest.raises(ParameterError) as error:
         find_orbit(duffing(), guess)
     assert "\n" not in str(error.value)
+
+
+def lunar(t, x):
+    """The restricted problem of Earth and Moon in space."""
+    m = 0.01215058560962404
+    far, near = (((x[0] + at) ** 2 + x[1] ** 2 + x[2] ** 2) ** -1.5 for at in (m, m - 1.0))
+    p, q = (1.0 - m) * far, m * near
+    along, across = p * (x[0] + m) + q * (x[0] - 1.0 + m), p + q
+    return [*x[3:], 2.0 * x[4] + x[0] - along, -2.0 * x[3] + x[1] - across * x[1], -across * x[2]]
+
+
+@pytest.mark.parametrize(("size", "period"), [(0.006, 2.698895840405), (0.02, None)])
+def test_an_orbit_in_a_plane_of_a_system_in_space(size, period):
+    # Of the states across the plane corrections leave 1e-32, which was taken for their size. The period is that of
+    # DOP853 with tolerances of 1e-13; the larger guess leads to the point of libration.
+    t = np.linspace(0.0, 2.0 * np.pi / 2.33438588529, 65)
+    c, s = size * np.cos(2.33438588529 * t), size * np.sin(2.33438588529 * t)
+    rates = -2.33438588529 * s, -3.58641603 * 2.33438588529 * c
+    states = np.stack([0.836915125772357 + c, -3.58641603 * s, 0.0 * t, *rates, 0.0 * t], axis=1)
+    system = from_rhs(lunar, 6, None, guess_period=2.7)
+    if period is None:
+        with pytest.raises(AnalysisError, match="found an equilibrium near the guess"):
+            find_orbit(system, (t, states))
+    else:
+        assert find_orbit(system, (t, states)).period == pytest.approx(period, abs=1e-10)
+
+
+@pytest.mark.filterwarnings("error")
+def test_states_moved_by_rounding_alone_give_no_size():
+    def toda(t, x):
+        a = 2.0 * np.sqrt(3.0)
+        e, f, g = np.exp(a * x[0] + 2.0 * x[1]), np.exp(-a * x[0] + 2.0 * x[1]), np.exp(-4.0 * x[1])
+        return [x[2], x[3], -a * (e - f) / 24.0, -(2.0 * e + 2.0 * f - 4.0 * g) / 24.0]
+
+    found = multipliers(from_rhs(toda, 4, None, guess_period=6.26), [0.0, 0.1, 0.0, 0.0])
+    assert found.period == pytest.approx(6.263459706114258, abs=1e-10)
+    np.testing.assert_allclose(found.values, 1.0, atol=1e-4)

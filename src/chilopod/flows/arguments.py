@@ -166,9 +166,9 @@ class Claim:
         here, there = slopes[:, :half], slopes[:, half:]
         with np.errstate(invalid="ignore"):  # values beyond double precision
             off = np.abs(self.matrix @ here - there)
+            terms = np.abs(self.matrix) @ np.abs(here) + np.abs(there)
         if off.max() < np.inf and (off <= _SAME * np.abs(there)).all():
             return
-        terms = np.abs(self.matrix) @ np.abs(here) + np.abs(there)
         largest = np.where(np.isfinite(terms), terms, 0.0).reshape(self._alike).max(axis=(1, 3), keepdims=True)
         wrong = (off.reshape(self._alike) > _SAME * largest).reshape(off.shape)
         if self.shift > 0.0:  # a right-hand side may be round-off of terms that cancel

@@ -191,6 +191,8 @@ def system_of(family: Callable[..., SystemLike], *values: float) -> SystemLike:
 
 
 _PART = 1.0 / 16.0  # part of a return
+_TINY = 1e-12  # size, relative to the largest, that may be rounding
+_ERRORS = 100.0  # factor on the error of a flow and its derivative below which they may be rounding
 _SWEEPS = 3
 
 
@@ -218,11 +220,24 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
             derivative = checked_flow(system, x, 0.0, duration)[1]
             check_finite(derivative)
         return numerical_balance(derivative)
+    size = _coupled(size, derivative)
+    if size[size > 0.0].min() < _TINY * size.max() and offers(system, "flow_with_error"):
+        # Of a state that rests at zero the flow may compute nothing but rounding.
+        with UserCode("flow_with_error"):
+            later, derivative, error = system.flow_with_error(x.copy(), 0.0, _PART * duration)
+        error = _ERRORS * np.broadcast_to(error, derivative.shape)
+        later = np.where(np.abs(later) > error @ np.abs(x), np.abs(later), 0.0)
+        size = _coupled(np.maximum(np.abs(x), later), np.where(np.abs(derivative) > error, derivative, 0.0))
+    return np.where(size > 0.0, size, size[size > 0.0].min())
+
+
+def _coupled(size: Array, derivative: Array) -> Array:
+    """Sizes of states, shape (n,), no smaller than their changes when the others change by their sizes."""
     coupling = np.abs(derivative)
     np.fill_diagonal(coupling, 0.0)
     for _ in range(_SWEEPS):
         size = np.maximum(size, (coupling * size).max(axis=1))
-    return np.where(size > 0.0, size, size[size > 0.0].min())
+    return size
 
 
 _ROUNDING = 8.0 * float(np.finfo(float).eps)

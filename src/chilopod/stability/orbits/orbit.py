@@ -45,6 +45,7 @@ from chilopod.stability.symmetry.groups import symmetric_basis
 
 _RESTS = 1e-8  # motion, relative to the sizes at the guess, that counts as rest
 _RETURNED = 1e-12  # relative residual of a known orbit that is exact
+_MISSES = 1e-6  # error of a state, relative to its size, with which a return does not close
 _SINGULAR = 1e-13  # singular value of H - 1, relative to the largest, that counts as zero
 _KNOWN = 1e-4  # largest relative residual of a known orbit, which is then corrected
 _SETTLING = 100  # cost of settling in return maps, without derivatives
@@ -329,6 +330,9 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
     if error is None:
         # The state's error is that of the flow, from the derivative's error or, where that is coarse, from two
         # computations, multiplied by the inverse of H - 1.
+        if _relative(image.state - x, size) > _MISSES * max(1.0, float(np.abs(scaled).max())):
+            said = f"the motion misses itself by {_relative(image.state - x, size):.1e} of its size"
+            raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit and its period")
         flow = _matrix(image.error, size) @ size
         stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():

@@ -152,6 +152,8 @@ def shot(problem: Problem, start: Nodes, sizes: Array, section: Section | None) 
             correction = equations.correction(equations, cutoff)
         else:
             break
+    if free is None and best <= rule.settled:  # no step comes nearer: an equilibrium, or the equations' accuracy
+        return equations.closed()
     said = f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size){obstacle}"
     raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
 
@@ -329,7 +331,7 @@ class _Equations:
             return self
         states = np.vstack([np.where(small, 0.0, x), self.nodes.states[1:]])
         there = _Equations(self._problem, self.nodes._replace(states=states), self.frame)
-        return there if there.residual <= max(RETURN.round_off, self.residual) else self
+        return there if there.residual <= max(RETURN.round_off, 2.0 * self.residual) else self
 
 
 def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, sizes: Array) -> Array:
