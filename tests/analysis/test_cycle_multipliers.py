@@ -210,6 +210,22 @@ def test_a_model_without_such_a_state_and_a_walk_that_falls_are_refused():
         cycle(lying[None])
 
 
+LIMITED = """<mujoco><option timestep="0.002" integrator="RK4"/><worldbody>
+  <body><joint name="h" axis="0 1 0" damping="0.05" limited="true" range="-10 60"/>
+  <geom size=".05" pos="0 0 -.5" mass="1" contype="0" conaffinity="0"/></body>
+</worldbody><actuator><motor joint="h"/></actuator></mujoco>"""
+
+
+def test_bends_that_decay_are_no_stable_motion():
+    # Differences of mj_step round the periodic motion give a multiplier of 1.67; the motion beside it never repeats.
+    push = 2.5 * np.sin(2.0 * np.pi * np.arange(500) / 500)[:, None]
+    found = cycle_multipliers("lim", CycleMap(mujoco.MjModel.from_xml_string(LIMITED), push), np.zeros(2), ["h"])
+    assert not found.exact
+    assert found.stable is None
+    assert found.title == "lim: bends of 1° decay; no periodic motion was found"
+    assert any(words.startswith("limit of h at 0.9") for words in found.contacts)
+
+
 SPRING = """<body pos="0 {0} 0"><joint name="p{0}" type="slide" axis="0 0 1" stiffness="4" damping=".3"/>
   <geom type="sphere" size=".1" mass="1" contype="0" conaffinity="0"/></body>"""
 

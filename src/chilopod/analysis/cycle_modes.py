@@ -52,6 +52,15 @@ class CycleMode(ReadOnlyArrays):
         return which, shown, f"{self.error:.1e}", f"{abs(self.multiplier):.6f}", shape, angles
 
 
+_GROWTH = {True: "decay", False: "grow", None: "neither decay nor grow for certain"}
+
+
+def _verdict(modes: Sequence[CycleMode]) -> bool | None:
+    """True if all modes decay, False if one grows, None where errors leave it undecided or there are none."""
+    errors = np.array([mode.error for mode in modes])
+    return stable_within(np.array([mode.multiplier for mode in modes]), float(errors.max()), errors) if modes else None
+
+
 @dataclass(frozen=True, eq=False)
 class CycleMultipliers(Summary, ReadOnlyArrays):
     """Leading multipliers and modes of a walk in MuJoCo."""
@@ -71,15 +80,16 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """Stability by the derivative, or without one by bends of finite size; None where errors leave it undecided."""
-        modes = self.exact or self.finite
-        errors = np.array([mode.error for mode in modes])
-        return stable_within(np.array([mode.multiplier for mode in modes]), float(errors.max()), errors)
+        """Stability of the periodic motion by the derivative; None without one, or where errors leave it undecided."""
+        return _verdict(self.exact)
 
     @property
     def title(self) -> str:
-        """Verdict in words."""
-        return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
+        """Verdict in words, without a derivative on bends of finite size."""
+        if self.exact:
+            return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
+        size = self._shown(self.amplitude, 3)
+        return f"{self.name}: bends of {size} {_GROWTH[_verdict(self.finite)]}; no periodic motion was found"
 
     def as_json(self) -> dict[str, Any]:
         """The result as plain numbers; complex ones as [real, imaginary]."""

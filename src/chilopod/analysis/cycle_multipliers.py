@@ -128,7 +128,8 @@ def cycle_multipliers(
     if not exact:
         _check_settled(cycle, seen)
     reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(seen))
-    mismatch, spread = float(np.abs(seen[-1] - seen[-2]).max()), np.ptp(seen[:, at], axis=0)
+    ahead, here = (cycle(x[None])[0][0], x) if exact else (seen[-1], seen[-2])  # beside an unstable walk others wander
+    mismatch, spread = float(np.abs(ahead - here).max()), np.ptp(seen[:, at], axis=0)
     units = {cycle.units[each] for each in at}
     unit = units.pop() if len(units) == 1 else ""
     found_at = name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit

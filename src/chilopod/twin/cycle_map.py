@@ -101,8 +101,8 @@ class CycleMap:
         return positions, rates
 
     def __call__(self, x: Array) -> tuple[Array, NDArray[np.int32]]:
-        """States after a cycle, and the number of contacts in each step, shape (runs, steps), from states before it,
-        shape (runs, n); AnalysisError if one falls."""
+        """States after a cycle, and the number of contacts and joint limits that act in each step, shape (runs, steps),
+        from states before it, shape (runs, n); AnalysisError if one falls."""
         return self._run(*self.full(x))
 
     def _run(self, positions: Array, rates: Array) -> tuple[Array, NDArray[np.int32]]:
@@ -110,14 +110,14 @@ class CycleMap:
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         batch.bind("qpos")[:], batch.bind("qvel")[:] = positions, rates
         with silence():
-            counts = batch.rollout(len(self.control), self.control, record=["ncon"])["ncon"]
+            seen = batch.rollout(len(self.control), self.control, record=["ncon", "nl"])
         image = self.reduced(batch.bind("qpos"), batch.bind("qvel"))
         fallen = self._free and (np.cos(image[:, 1]) * np.cos(image[:, 2]) < _UPRIGHT).any()
         if fallen or batch.warning.any() or not np.isfinite(image).all():
             said = "the walk falls, or becomes too fast to follow, within a cycle"
             allowed = "a gait that walks, with steps that are short enough"
             raise AnalysisError(said, field="multipliers", allowed=allowed)
-        return image, counts.reshape(len(positions), -1)
+        return image, (seen["ncon"] + seen["nl"]).reshape(len(positions), -1)
 
     def depends_on_place(self, x: Array) -> str:
         """Name of a place ("x", "y" or "the heading" of a free body, or a joint of ``travel``) on which the cycle from
@@ -139,20 +139,28 @@ class CycleMap:
         return next((name for name, change in zip(places, off[1:], strict=True) if change > _ALIKE), "")
 
     def changing(self, states: Array) -> tuple[str, ...]:
-        """Geoms of moving bodies whose contacts differ between the cycles from states (runs, n), and when, in words;
-        first those that differ for longest."""
-        touching = np.zeros((len(states), len(self.control), self.model.ngeom), dtype=np.bool_)
+        """Geoms of moving bodies whose contacts differ between the cycles from states (runs, n), and joints whose
+        limits do, and when, in words; first those that differ for longest."""
+        geoms, limit = self.model.ngeom, int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
+        touching = np.zeros((len(states), len(self.control), geoms + self.model.njnt), dtype=np.bool_)
         for one, state in zip(touching, states, strict=True):
             data = mujoco.MjData(self.model)
             data.qpos[:], data.qvel[:] = self.full(state)
             for row, data.ctrl[:] in zip(one, self.control, strict=True):
                 mujoco.mj_step(self.model, data)
                 row[data.contact.geom.ravel()] = True
-        differs = (touching != touching[0]).any(axis=0) & (self.model.geom_bodyid > 0)
+                row[geoms + data.efc_id[data.efc_type == limit]] = True
+        moving = np.append(self.model.geom_bodyid > 0, np.ones(self.model.njnt, dtype=np.bool_))
+        differs = (touching != touching[0]).any(axis=0) & moving
         found, timestep = [], float(self.model.opt.timestep)
         for geom in sorted(np.flatnonzero(differs.any(axis=0)), key=lambda geom: -differs[:, geom].sum()):
             first, last = np.flatnonzero(differs[:, geom])[[0, -1]] * timestep
-            found.append(f"{self.model.geom(geom).name or geom} at {first:.3f} to {last + timestep:.3f} s")
+            name = (
+                self.model.geom(geom).name or geom
+                if geom < geoms
+                else f"limit of {self._joints[geom - geoms - self._free]}"
+            )
+            found.append(f"{name} at {first:.3f} to {last + timestep:.3f} s")
         return tuple(found)
 
 
