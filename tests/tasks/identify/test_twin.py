@@ -228,6 +228,10 @@ def test_a_valley_has_effective_samples_or_says_that_it_has_few():
     assert (np.diff(found.estimates.ends) > 0.0).all()
     fits = [fit for fit in found.fits if not fit.weight] + [fit for fit in found.fits if fit.weight][:10]
     assert "below 20 intervals are not reliable" in "".join(TwinIdentification(ROBOT, found.data, fits).lines())
+    few = [fit for fit in found.fits if not fit.weight] + [fit for fit in found.fits if fit.weight][:4]
+    lines = TwinIdentification(ROBOT, found.data, few).lines()
+    assert "; no more than constants give no intervals" in lines[-1]
+    assert np.isnan(TwinIdentification(ROBOT, found.data, few).estimates.ends).all()
 
 
 @pytest.mark.parametrize("spread", [1.0, 2.0])

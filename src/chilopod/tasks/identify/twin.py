@@ -113,7 +113,7 @@ class TwinIdentification(Identified):
         """The best constants, with intervals over the samples of the valley."""
         samples, free = self.samples, self.data.free
         count, best = len(free.each), free.values_at(self.fits[0].parts)
-        if not len(samples.weights):
+        if samples.effective <= count:  # so few span no region
             return Estimates(self.given, free, best, np.full((count, 2), np.nan), np.full((count, count), np.nan))
         values = np.array([free.values_at(parts) for parts in samples.parts]).T
         off = values - (values @ samples.weights)[:, None]
@@ -145,7 +145,9 @@ class TwinIdentification(Identified):
             return ["no valley: no constants come within three standard errors of every datum"]
         said = f"valley: {samples.effective:.3g} effective samples of {len(samples.weights)}; squared errors of the "
         said += f"surrogate there are {self.misjudged:.2g} times those that it expected"
-        if samples.effective < LEAST:
+        if samples.effective <= len(self.data.free.each):
+            said += "; no more than constants give no intervals: more --evaluations or --samples are needed"
+        elif samples.effective < LEAST:
             said += f"; below {LEAST:.0f} intervals are not reliable: more --evaluations or --samples are needed"
         return [said]
 
