@@ -7,12 +7,14 @@ import pytest
 from matplotlib.figure import Figure
 
 from chilopod.analysis import Onset, bifurcations, curved_walks
+from chilopod.analysis.map_axes import axis
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.quantities import Measured, leading_mode
 from chilopod.errors import ChilopodError
+from chilopod.progress import silent
 from chilopod.robot import Robot, load_robot
 from chilopod.tasks import size
-from chilopod.tasks.sizing.search import Outcome, Wish
+from chilopod.tasks.sizing.search import FAILED, Outcome, Search, Wish
 from chilopod.trials import NONE, Trial, run, summaries
 
 ROBOT = load_robot("aoi2022-planar")
@@ -195,3 +197,18 @@ def test_an_onset_that_jumps_is_no_crash():
     found = size(ROBOT, {"onset": np.radians(90.0)}, [(K1, "11.5 N*mm/deg", "13 N*mm/deg")], onset=number)
     assert found.outcome is Outcome.UNMET
     assert np.isfinite(found.values[0])
+
+
+def test_a_cliff_does_not_stop_the_search(monkeypatch):
+    """Robots below a parabola lack the quantities; the nearest one stands on it, at the root of 4 p^3 + 3.2 p - 3."""
+
+    def beyond(search, place, measured):
+        p, q = place
+        return np.array([1.5 - p, q + 0.3]) if q >= p**2 else np.full(2, FAILED)
+
+    monkeypatch.setattr(Search, "_found", beyond)
+    axes = [axis(ROBOT, each, "free") for each in (SPRING, ("legs.forward_offset", "10 mm", "60 mm"))]
+    search = Search(ROBOT, (Wish("onset", 0.1), Wish("growth", 1.0)), tuple(axes), Onset(), 600, 0, silent)
+    assert search.run() is not Outcome.MET
+    p = np.roots([4.0, 0.0, 3.2, -3.0])[-1].real
+    np.testing.assert_allclose(search.best, [p, p**2], atol=0.02)

@@ -1,8 +1,10 @@
 """Search for the free numbers at which a robot does what is wished.
 
 One wish on one free number is a root, bracketed on a scan of the range and solved by Brent's method. More are a problem
-of least squares within the ranges (scipy's trust region), from the robot itself and from scattered starts. Where wishes
-conflict, weighted sums of the squares of two of them give points of their Pareto front.
+of least squares within the ranges (scipy's trust region), from the robot itself and from scattered starts. Robots that
+lack a quantity, as those that walk straight have no radius, stop these at a cliff; there the covariance matrix adapts
+(CMA-ES) round the best robot so far. Where wishes conflict, weighted sums of the squares of two of them give points of
+their Pareto front.
 
 A radius enters as its squared curvature, which falls to zero at the onset in proportion to the growth rate, and goes on
 with that where the robot walks straight.
@@ -15,6 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
+from cmaes import CMA
 from numpy.linalg import norm
 from scipy.optimize import brentq, least_squares
 from scipy.stats.qmc import Sobol
@@ -42,6 +45,7 @@ _AT_END = 1e-3  # distance from the end of a range, relative to it
 _SHARES = 0.1, 0.3, 0.5, 0.7, 0.9  # of the second of two conflicting wishes in the sum of squares
 _FAR = 100.0  # relative deviation of a point that is left out of a front
 _OTHERS = 10.0  # weight of wishes beside those two
+_EVOLVED, _ROUND = 0.4, 0.2  # part of the budget for evolution, and its first scatter in the unit cube
 _ROUNDS = 40  # evaluations of least squares for each free number
 
 
@@ -123,7 +127,7 @@ class Search:
         self, robot: Robot, wishes: tuple[Wish, ...], axes: tuple[Axis, ...], onset: Onset, budget: int, seed: int,
         progress: Progress,
     ) -> None:  # fmt: skip
-        self.robot, self.wishes, self.axes, self.progress = robot, wishes, axes, progress
+        self.robot, self.wishes, self.axes, self.progress, self._seed = robot, wishes, axes, progress, seed
         self._measured, self._budget, self._limit, self._robots = Measured(onset), budget, budget, 0
         self.again = Measured(onset, similar=False)  # for the best place alone
         scattered = Sobol(len(axes), rng=np.random.default_rng(seed)).random(_STARTS)
@@ -196,15 +200,33 @@ class Search:
         return outcome
 
     def _searched(self) -> Outcome:
-        try:
+        limit, unmet = self._limit, Outcome.BUDGET
+        self._limit -= int(_EVOLVED * self._budget) if len(self.axes) > 1 else 0
+        with suppress(_SpentError):
             if len(self.axes) == len(self.wishes) == 1 and not self.wishes[0].sense:
                 self._root()
             for start in self._starts:
                 if not self._met(self._least):
                     self._fit(start)
-        except _SpentError:
-            return Outcome.MET if self._met(self._least) else Outcome.BUDGET
-        return Outcome.MET if self._met(self._least) else Outcome.UNMET
+            unmet = Outcome.UNMET
+        self._limit = limit
+        if len(self.axes) > 1 and not self._met(self._least) and not np.isfinite(self._lengths()).all():
+            with suppress(_SpentError):
+                self._evolve()
+        return Outcome.MET if self._met(self._least) else unmet
+
+    def _lengths(self) -> Array:
+        """Sizes of the deviations of all robots so far, shape (robots,); infinite for those without a quantity."""
+        return np.array([np.inf if FAILED in found else float(norm(self._missed(found))) for found in self._seen])
+
+    def _evolve(self) -> None:
+        """Search round the best place by evolution, which no cliff stops."""
+        ends = np.tile([0.0, 1.0], (len(self.axes), 1))
+        found = CMA(np.clip(self.best, _AT_END, 1.0 - _AT_END), _ROUND, bounds=ends, seed=self._seed)
+        while not (found.should_stop() or self._met(self._least)):
+            places = [found.ask() for _ in range(found.population_size)]
+            missed = [float(norm(self._missed(self.deviations(place)))) for place in places]
+            found.tell([(place, min(each, _FAR)) for place, each in zip(places, missed, strict=True)])
 
     @staticmethod
     def _met(deviations: Array) -> bool:
