@@ -321,6 +321,11 @@ def test_walks_are_kept_and_not_walked_again(tmp_path):
     assert (folder / f"{one}.aside").exists()
 
 
+def test_a_walk_whose_angles_are_shown_as_zero_is_straight(capsys):
+    assert main(["walk", ROBOT, "--set", "body.modules=2", "--seed", "1", "--duration", "20 s"]) == 0
+    assert capsys.readouterr().out.splitlines()[2].split()[-2:] == ["straight", "+0.00"]
+
+
 def test_a_walk_that_nothing_bends_says_why(capsys):
     why = "nothing disturbed it, so nothing bends it"
     arguments = ["walk", ROBOT, *SOFT, "--duration", "3 s"]

@@ -23,6 +23,7 @@ from chilopod.trials import NONE, Trial, WalkSummary, as_now, run, run_each, str
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_SHOWN = 0.005  # deg, smallest joint angle that is not shown as zero
 _MOST = 12  # walks that are drawn in a notebook
 
 
@@ -186,7 +187,8 @@ class Ends(Runs):
                 rows.append((label, "-", "-", "-", end.sentence))
                 continue
             bends = "  ".join(f"{angle:+7.2f}" for angle in end.joint_angles_deg)
-            radius = f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight"
+            shown = np.abs(end.joint_angles_deg).max() >= _SHOWN and np.isfinite(end.axis_radius)
+            radius = f"{end.axis_radius:.4g}" if shown else "straight"
             rows.append((label, f"{end.x:.3f}", f"{end.y:.3f}", radius, bends))
         return [], rows, []
 
