@@ -19,7 +19,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.interface import SystemLike, spatial_symmetries
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.returns import ReturnMap
-from chilopod.stability.spectrum import Spectrum, disturbed, return_multipliers, spectrum
+from chilopod.stability.spectrum import EPSILON, Spectrum, disturbed, return_multipliers, spectrum
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings
@@ -70,7 +70,6 @@ _SHORTER = 0.25
 _AGREES = 1e-6  # largest difference of two interpolations, relative to the reach
 _TOGETHER = 0.1  # distance of a multiplier from +1, relative to the next one's, at which both cross together
 _AT_HOME = 0.01  # largest distance from the root finder's place, relative to the reach
-_EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +180,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     """Error of the place where two multipliers meet. They move as a square root, but their product is smooth: det(H' -
     nu), or the squared difference of nu + 1/nu of two pairs, gives the error by its own over its slope."""
     matrix = image.jacobian
-    error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
+    error = np.broadcast_to(image.error, matrix.shape) + 4.0 * EPSILON * np.abs(matrix)
     here = _collision(matrix, crossing)
     moved = max(abs(_collision(other, crossing) - here) for other in disturbed(matrix, error))
     before, after, apart = course.jacobians(crossing)

@@ -19,7 +19,7 @@ from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormSt
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.returns import returned_states, velocity_at
 from chilopod.stability.shown import Shown, bounded, number
-from chilopod.stability.spectrum import Spectrum, phased, spectrum
+from chilopod.stability.spectrum import EPSILON, Spectrum, phased, spectrum
 from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.symmetry.isotypic import Block, SymmetricCrossing, SymmetricKind, symmetric_crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossing
@@ -183,7 +183,6 @@ def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationP
     return point
 
 
-_EPSILON = float(np.finfo(float).eps)
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
 _SETTLED = 1e-7  # change of the mean from half as many parts; its error is about the square of that
 
@@ -250,7 +249,7 @@ def described(
             kind, symmetry = _by_quadratic_term(system, orbit, modes, symmetry)
     verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
     about: dict[str, Any] = {"criticality": verdict, "multiplicity": critical.size, "symmetry": symmetry}
-    error_bound += 4.0 * _EPSILON * abs(value)
+    error_bound += 4.0 * EPSILON * abs(value)
     period = orbit.period
     point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, period=period, **about)
     if not simple:

@@ -38,6 +38,7 @@ _CROSSING_ROUNDS = 30
 _BENT = 0.5  # largest part of a correction of the time that the change of the speed adds
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
 _ENDS = 1e-3, 1e-4  # parts of a return, at its ends
+BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _FALLING = 0.5  # least fall of the residual that is progress
 
 CUTS = (0.0, 0.0477, 0.382)

@@ -42,7 +42,7 @@ FIRST_ORDER = 1e-6  # error, relative to the largest eigenvalue, up to which fir
 VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
 """Words for the results of :func:`stable_within`."""
 
-_EPSILON = float(np.finfo(float).eps)
+EPSILON = float(np.finfo(float).eps)
 
 
 def stable_within(values: ComplexArray, bound: float, bounds: Array | float | None = None) -> bool | None:
@@ -66,7 +66,7 @@ def _signs(shape: tuple[int, ...]) -> Array:
 
 def eigenvalue_errors(values: ComplexArray, matrix: Array, error: Array) -> Array:
     """Bounds on the errors of the eigenvalues of a matrix whose entries have errors, shape (n,)."""
-    error = error + 4.0 * _EPSILON * np.abs(matrix)
+    error = error + 4.0 * EPSILON * np.abs(matrix)
     if not np.isfinite(error).all():
         return np.full(values.size, np.inf)
     others = np.linalg.eigvals(disturbed(matrix, error))
@@ -117,7 +117,7 @@ def spectrum(image: ReturnMap) -> Spectrum:
     scaled = jacobian * units / units[:, None]
     values, right, left = eigensystem(scaled)
     # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
-    error = 4.0 * _EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
+    error = 4.0 * EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
     right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
     # Squares of tiny entries vanish; a power of 2 as a unit is exact.
     size = np.exp2(np.floor(np.log2(np.abs(right).max(axis=0))))

@@ -26,7 +26,7 @@ from chilopod.stability.normal_forms.manifold import CriticalOrbit, ReturnedStat
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.returns import returned_states
-from chilopod.stability.spectrum import spectrum
+from chilopod.stability.spectrum import EPSILON, spectrum
 from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent
 
@@ -39,7 +39,6 @@ _MEETING = 1e-4  # smallest singular value of the equations, in units, where cur
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
-_EPSILON = float(np.finfo(float).eps)
 
 
 class Own(enum.Enum):
@@ -121,7 +120,7 @@ class Detector:
         here = Critical(self._curve.target, spot)
         form = self.form(here) if self._coefficients and abs(spot.place.cosine) < 1.0 else None
         signals = {signal: self._measured(signal, here, form) for signal in self._signals}
-        bound = across(spot) + 4.0 * _EPSILON * np.abs(spot.values)
+        bound = across(spot) + 4.0 * EPSILON * np.abs(spot.values)
         return Station(_point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
 
     def events(self, step: Step[Spot, Evaluated], before: Signals, after: Signals) -> list[tuple[Spot, SpecialPoint2]]:
@@ -210,7 +209,7 @@ class Detector:
             return None
         along = _along(test, parts, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
-        bound = off + along + 4.0 * _EPSILON * np.abs(spot.values)
+        bound = off + along + 4.0 * EPSILON * np.abs(spot.values)
         if not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
             return None
         low, high = test(root - beside)[0], test(root + beside)[0]
@@ -303,7 +302,7 @@ def across(spot: Spot) -> Array:
     response = np.linalg.pinv(spot.matrix[:-1])[frame.parameters]
     tangent = spot.tangent[frame.parameters]
     length = float(np.linalg.norm(tangent))
-    if length > np.sqrt(_EPSILON):  # at a cusp the curve has no direction
+    if length > np.sqrt(EPSILON):  # at a cusp the curve has no direction
         normal = np.array([-tangent[1], tangent[0]]) / length
         response = np.outer(normal, normal @ response)
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))

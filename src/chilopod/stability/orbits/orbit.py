@@ -15,19 +15,12 @@ from chilopod.flows.arguments import check_arguments, finite_array
 from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
-from chilopod.stability.interface import (
-    Capabilities,
-    SystemLike,
-    check_system,
-    is_autonomous,
-    is_stiff,
-    offers,
-    sizes,
-)
-from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
+from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
+from chilopod.stability.krylov import LARGE, RESTS, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, shot
 from chilopod.stability.returns import (
+    BESIDE,
     REPEATED,
     ReturnMap,
     Section,
@@ -43,7 +36,6 @@ from chilopod.stability.returns import (
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.groups import symmetric_basis
 
-_RESTS = 1e-8  # motion, relative to the sizes at the guess, that counts as rest
 _RETURNED = 1e-12  # relative residual of a known orbit that is exact
 _SINGULAR = 1e-13  # singular value of H - 1, relative to the largest, that counts as zero
 _KNOWN = 1e-4  # largest relative residual of a known orbit, which is then corrected
@@ -54,7 +46,6 @@ _COARSE = 1e-11  # error, relative to the sizes of the states, from which a seco
 _CHANCE = 1e-13  # difference, relative to the sizes of the states, of two computations that may agree by chance
 _SYMMETRIC = 1e-12  # residual, relative to the sizes of the states, of a symmetry of the orbit
 _ALIKE = 1e-6  # distance of a return, relative to the sizes and its growth, from the symmetric one
-_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +283,7 @@ def near_orbit(
             start = start._replace(states=start.states / size @ basis @ basis.T * size)
         found = shot(Problem(lambda _: system, None, shared, budget, careful), start, size, section)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
-    if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= _RESTS:
+    if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
@@ -339,8 +330,8 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative belongs to a state with this error: along the orbit's least certain direction.
     weakest = size * np.linalg.svd(scaled)[2][-1]
-    beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
-    bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / _BESIDE)
+    beside = return_map(system, x + BESIDE * weakest, with_error=False, section=section)
+    bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / BESIDE)
     return Orbit(x, replace(image, error=_matrix(image.error, size) + bend), error)
 
 

@@ -17,7 +17,7 @@ from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, SystemLike, sizes
 from chilopod.stability.orbits.orbit import from_known, known_state, near_orbit, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
+from chilopod.stability.returns import BESIDE, ReturnMap, Section, return_duration, return_map, return_maps, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -32,7 +32,6 @@ _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit a
 _DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
 _ATTEMPTS = 24  # largest number of steps to a value from the sample beside it: ten halvings, then more
 _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as accurate as the flow
-_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
 _SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
 _HALVED, _CLOSER = 13, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
@@ -135,9 +134,9 @@ class Samples:
             if sample.value not in self._bends:
                 system, duration = self.family(sample.value), sample.image.duration
                 section = section_at(system, sample.orbit, self.size, duration)
-                beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[i, -1], False, section)
+                beside = return_map(system, sample.orbit + BESIDE * self.size * rows[i, -1], False, section)
                 change = (beside.jacobian - sample.image.jacobian) * units
-                self._bends[sample.value] = float(np.linalg.norm(change)) / _BESIDE
+                self._bends[sample.value] = float(np.linalg.norm(change)) / BESIDE
             # Where H - 1 vanishes along a direction, the rest is of third order, except in special cases.
             off = min(of_flow / max(float(values[i, -1]), of_flow), of_flow ** (1.0 / 3.0))
             result[i] = min(1.0, of_flow + self._bends[sample.value] * off)

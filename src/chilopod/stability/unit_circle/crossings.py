@@ -16,6 +16,7 @@ import numpy as np
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
+from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
 from chilopod.stability.unit_circle.spectra import (
     TARGETS,
@@ -43,7 +44,7 @@ _PROBES = 65
 _FINEST_PROBE = 1e-6  # finest spacing of probes, relative to the interval
 _OF_ERROR = 1e-4  # width of a root's enclosure, relative to its error from those of all entries
 _NARROW = 1e-13  # narrowest enclosure of a root, relative to its value
-_DIGITS = 4.0 * float(np.finfo(float).eps)  # rounding of a root's place, relative to its value
+_DIGITS = 4.0 * EPSILON  # rounding of a root's place, relative to its value
 _CLOSE = 0.25  # predicted approach to the circle, relative to the nearer end, that calls for a probe
 
 

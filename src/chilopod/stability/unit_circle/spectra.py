@@ -17,21 +17,20 @@ from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
-from chilopod.stability.spectrum import DRAWS, SAFETY, disturbed
+from chilopod.stability.spectrum import DRAWS, EPSILON, SAFETY, disturbed
 
 Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
 entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, for a missing matrix,
 and may be called twice for a value."""
 
-_ROUNDING = 2.0 * np.finfo(float).eps
+_ROUNDING = 2.0 * EPSILON
 _SMALLEST = -1e300  # logarithm of zero
 _LARGEST = 1e150  # modulus to which larger multipliers are reduced
 _TURNING = 1e-6  # least imaginary part of a complex multiplier, relative to its size
 _SMALL = 1e-3  # modulus of multipliers that are far inside the circle
 _SPARE = 8  # number of factors, beside the idle ones, in the sum over factors to leave out
 UNKNOWN = 1.0  # error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined
-_EPSILON = float(np.finfo(float).eps)
 _ULPS = 64.0
 _TELLING = 0.01  # error of a margin, from -1 to 1, that determines the multiplier's side
 _FILL = 1e-30  # value in place of zeros, relative to the largest entry, for the balance of a triangular matrix
@@ -266,8 +265,8 @@ class Spectra:
         """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
         most = min(200, max(self.left, 1))
         finest = max(within, 5e-324)
-        place = float(brentq(function, a, b, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
-        reach = within + 4.0 * _EPSILON * abs(place)
+        place = float(brentq(function, a, b, xtol=finest, rtol=4 * EPSILON, maxiter=most, disp=False))
+        reach = within + 4.0 * EPSILON * abs(place)
         return Root(place, max(place - reach, a), min(place + reach, b), event, known=(a, b))
 
     def tolerances(self, root: Root) -> Array:
