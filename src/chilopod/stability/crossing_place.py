@@ -27,8 +27,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossin
 
 
 def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...], tuple[str, ...]]:
-    """The blocks of the symmetries of an orbit, a single None for the whole return map, and a sentence if it has none
-    of the system's."""
+    """Blocks of an orbit's symmetries, None for the whole return map, and a sentence if it has none of the system's."""
     generators = spatial_symmetries(system)
     if not generators:
         return (None,), ()

@@ -17,7 +17,7 @@ from chilopod.flows.arguments import UserCode, finite_array, numbers
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import Autonomous, Family, SystemLike, check_system, is_autonomous, offers, system_of
-from chilopod.stability.normal_forms.manifold import radii, series
+from chilopod.stability.normal_forms.manifold import RADII, series
 from chilopod.stability.orbits.orbit import Orbit, near_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint, Criticality
@@ -206,7 +206,7 @@ def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
     for curve, value, bound in zip(curves, best, error, strict=True):
         value[0], bound[0] = _velocity(system, curve[0]), 0.0
         for span in _SPANS:
-            powers = (span * np.concatenate([radii(), -radii()]))[:, None] ** np.arange(orders)
+            powers = (span * np.concatenate([RADII, -RADII]))[:, None] ** np.arange(orders)
             samples = np.array([_velocity(system, x) for x in powers @ curve])
             ahead, back = np.split(samples, 2)
             for order in range(1, orders) if np.isfinite(samples).all() else ():

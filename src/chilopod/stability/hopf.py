@@ -149,7 +149,7 @@ def _piece(
         reason = f"{point.multiplicity // 2} pairs are critical at once"
         if point.multiplicity <= 2:
             try:
-                return [_hopf_point(family, between, point, duration)]
+                return [_of_f(family, between, point, duration)]
             except AnalysisError as error:
                 reason = error.problem
         return [f"no coefficient at {point.value:.9g}: {reason}", replace(point, multiplier=1j * point.frequency)]
@@ -250,9 +250,7 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
     )
 
 
-def _hopf_point(
-    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
-) -> BifurcationPoint:
+def _of_f(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> BifurcationPoint:
     """A Hopf point from that of the map, with value, error, rate and coefficient from f."""
     low, high = between
     value, state = point.value, point.orbit

@@ -19,18 +19,18 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, shape_of
+from chilopod.flows.carrying import REPEATED
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import Capabilities, check_finite, is_autonomous, returns_per_period
 from chilopod.stability.returns import (
     BESIDE,
     CUTS,
-    REPEATED,
     RETURN,
     Section,
     carried,
+    crossing,
     return_duration,
-    return_time,
     section_at,
     turned,
     velocity_at,
@@ -161,7 +161,9 @@ class TangentMap(ReadOnlyArrays):
 def tangent_map(system: Capabilities, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
     velocity, across = None, None
-    duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
+    duration = return_duration(system)
+    if is_autonomous(system) and section is not None:
+        duration = sum(crossing(system, x, section, derived=False)[:2])
     state = turned(system, carried(system, x[None], 0.0, duration))[0]
     check_finite(state)
     if is_autonomous(system) and section is not None:

@@ -20,6 +20,7 @@ import numpy as np
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers
+from chilopod.flows.carrying import REPEATED
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.stability.interface import (
     Autonomous,
@@ -44,9 +45,6 @@ _FALLING = 0.5  # least fall of the residual that is progress
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
 errors."""
-
-REPEATED = 10.0
-"""Factor on the difference of two computations with different steps for a bound on the error of one."""
 
 
 class Rule(NamedTuple):
@@ -239,11 +237,6 @@ def on_section(
 def _projection(velocity: Array, normal: Array) -> Array:
     """Projection along a motion onto the section with a normal, shape (n, n)."""
     return np.asarray(np.eye(normal.size) - np.outer(velocity, normal) / float(normal @ velocity))
-
-
-def return_time(system: Autonomous, x: Array, section: Section) -> float:
-    """Duration of a motion from a state, shape (n,), back to the section."""
-    return sum(crossing(system, x, section, derived=False)[:2])
 
 
 def crossing(system: Autonomous, x: Array, section: Section, derived: bool = True) -> tuple[float, float, Array, Array]:

@@ -102,8 +102,7 @@ def eigensystem(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray
 
 
 def falling(values: ComplexArray) -> NDArray[np.intp]:
-    """Order by falling modulus. The two of a pair stay together, positive frequency first, as the eigenvalue solver
-    returns them."""
+    """Order by falling modulus; the two of a pair stay together, positive frequency first, as the solver has them."""
     relative = np.round(np.abs(values) / np.abs(values).max(initial=1e-300), 12)
     return np.lexsort((-np.round(np.abs(values.imag), 12), -relative))
 

@@ -102,11 +102,6 @@ class Evaluated(ReadOnlyArrays):
     left: Array
     reach: float  # norm of the inverse of the bordered matrix
 
-    @property
-    def shift(self) -> Array | None:
-        """Bounds on the errors of the coordinates, shape (m + k + 1,); None if not computed."""
-        return None
-
 
 @dataclass(frozen=True, eq=False)
 class Spot(Evaluated):

@@ -62,6 +62,7 @@ _COSINES = {
 }
 
 
+_Parts = Parts[Spot, Evaluated, Evaluated]
 Test = Callable[[float], tuple[float, float]]
 """A test function and its error at a distance along a step; NaN where undefined."""
 
@@ -138,9 +139,9 @@ class Detector:
 
     def form(self, here: Critical) -> NormalForm:
         """The normal form at a place."""
-        at, shift, orbit_error = here.at, here.at.shift, 0.0
-        if shift is not None:
-            state = at.frame.size * (np.abs(at.frame.basis) @ shift[: at.frame.parameters.start])
+        at, orbit_error = here.at, 0.0
+        if isinstance(at, Spot):
+            state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
             orbit_error = float(np.abs(here.left) @ state)
         return normal_form(*self.sampled(here), scale=at.frame.size, orbit_error=orbit_error)
 
@@ -168,8 +169,8 @@ class Detector:
     def _measured(self, signal: Signal, here: Critical, form: NormalForm | None = None) -> tuple[float, float]:
         """A test function and its error, which needs an image with error bounds, and errors of the coordinates."""
         if isinstance(signal, CodimensionTwo):
-            shift = here.at.shift
-            return here.at.place.cosine - _COSINES[signal], 0.0 if shift is None else float(shift[-1])
+            error = float(here.at.shift[-1]) if isinstance(here.at, Spot) else 0.0
+            return here.at.place.cosine - _COSINES[signal], error
         if signal is Own.DOUBLE:
             return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.at.error))
         if signal is Own.COEFFICIENT:
@@ -186,9 +187,7 @@ class Detector:
             return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], off)
         return _product(nu - TARGETS[signal], 1.0 + np.abs(nu), errors)
 
-    def _located(
-        self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
-    ) -> tuple[float, Spot, SpecialPoint2] | None:
+    def _located(self, signal: Signal, parts: _Parts) -> tuple[float, Spot, SpecialPoint2] | None:
         """Point where a test function vanishes within a step, with its distance along the step."""
         curve, start, length = self._curve, parts.step.start, parts.step.size
 
@@ -308,7 +307,7 @@ def across(spot: Spot) -> Array:
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))
 
 
-def _along(test: Test, parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float) -> Array:
+def _along(test: Test, parts: _Parts, root: float, h: float, error: float) -> Array:
     """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
     with contextlib.suppress(AnalysisError):
         slope = abs(test(root + h)[0] - test(root - h)[0]) / (2.0 * h)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import check_arguments, finite_array
-from chilopod.flows.carrying import TooManySteps
+from chilopod.flows.carrying import REPEATED, TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
@@ -21,7 +21,6 @@ from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, shot
 from chilopod.stability.returns import (
     BESIDE,
-    REPEATED,
     ReturnMap,
     Section,
     carried,

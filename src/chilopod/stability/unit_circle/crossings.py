@@ -108,8 +108,7 @@ def first_values(low: float, high: float) -> Array:
 
 
 def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any], Callable[[Any], Any]]:
-    """Ends of an interval in an even coordinate, over decades the logarithm, the parameter at places there, and the
-    inverse."""
+    """Ends of an interval in an even coordinate, over decades the logarithm; the parameter at places; the inverse."""
     inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
     a, b = float(inward(low)), float(inward(high))
 
@@ -257,8 +256,9 @@ class _Finder:
             if event is CircleEvent.PAIR and not spectra.conservative and spectra.without_pair(left, right):
                 continue
             if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
-                if not spectra.clear(left):  # or two real multipliers have product 1
-                    report.leave(f"{LOST}, at {self.shown(left):.9g}")  # zero only by rounding
+                # Zero only by rounding, or two real multipliers have product 1.
+                if (np.abs(spectra.margins(left)) <= spectra.margin_errors(left)).any():
+                    report.leave(f"{LOST}, at {self.shown(left):.9g}")
                 continue
             roots.append(Root(left, left, left, event) if left == right else self._root(event, left, right))
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]

@@ -217,10 +217,6 @@ class Spectra:
         moved = margins(self.disturbed(np.array([value]))[0]) - self.margins(value)
         return np.asarray(SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
 
-    def clear(self, value: float) -> bool:
-        """True if the distance of all multipliers from the circle exceeds their errors."""
-        return bool((np.abs(self.margins(value)) > self.margin_errors(value)).all())
-
     def factor_sizes(self, value: float, event: CircleEvent) -> tuple[Array, Array]:
         """Rising sizes of the factors of an event's function, and their errors."""
         sizes = np.sort(np.abs(factors(self.at(np.array([value])), event)), axis=-1)
