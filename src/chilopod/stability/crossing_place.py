@@ -166,10 +166,9 @@ def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
 def _touch_error(course: Course, crossing: Crossing, uncertain: float) -> float:
     """Error of the place where a multiplier touches the circle and turns back: its distance is a parabola."""
     step = _TOUCH_STEP * course.width
-    away = []
-    for each in course.at(np.clip(crossing.value + step * np.array([-1.0, 0.0, 1.0]), course.low, course.high)):
-        values = np.linalg.eigvals(each.image.jacobian)
-        away.append(float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])))
+    around = np.clip(crossing.value + step * np.array([-1.0, 0.0, 1.0]), course.low, course.high)
+    spectra = [np.linalg.eigvals(each.image.jacobian) for each in course.at(around)]
+    away = [float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])) for values in spectra]
     # The step stays outside the root, as its square may underflow.
     bend = abs(away[0] - 2.0 * away[1] + away[2])
     return SAFETY * step * float(np.sqrt(2.0 * uncertain / bend)) if bend > 0.0 else np.inf

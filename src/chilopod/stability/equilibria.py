@@ -272,7 +272,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
     """A small cycle beside a Hopf point, with its parameter, and its displacement over the root of the parameter's."""
     rate = point.rate
-    if rate is None or point.criticality in (None, Criticality.UNDECIDED):
+    if rate is None or point.criticality is Criticality.UNDECIDED:
         said = "is a Hopf point whose coefficients leave the side of its cycles undecided"
         raise ParameterError(said, field="point", value=point.value)
     here, _ = equilibrium_at(family, point.value, point.orbit)

@@ -316,8 +316,7 @@ class CheckedFamily:
         except (UserError, ParameterError) as error:
             if not self.dimension:
                 raise
-            cause = error.__cause__ if isinstance(error, UserError) else error
-            assert cause is not None
+            cause = (isinstance(error, UserError) and error.__cause__) or error
             self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
             raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
 

@@ -138,12 +138,10 @@ def section_at(
     if not is_autonomous(system):
         return None
     velocity = velocity_at(system, x)
-    if duration is None:
-        duration = return_duration(system)
     if not velocity.any():
         raise AnalysisError("is an equilibrium", field="orbit", allowed="a state on an orbit")
-    if scale is None:
-        scale = sizes(system, x, duration)
+    duration = return_duration(system) if duration is None else duration
+    scale = sizes(system, x, duration) if scale is None else scale
     normal = velocity / scale**2
     return Section(x, normal / float(np.linalg.norm(normal * scale)), duration)
 
@@ -208,10 +206,8 @@ def return_map(system: SystemLike, x: Array, with_error: bool = True, section: S
     if system.symmetry is not None:
         state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
     image = on_section(system, section, state, jacobian, duration, error)
-    if not (with_error and is_autonomous(system)):
+    if not (with_error and is_autonomous(system)) or image.velocity is None or image.normal is None:
         return image
-    assert image.velocity is not None
-    assert image.normal is not None
     # The flow maps the motion at the start to that at the end. In a stiff system rounding of the state changes this
     # motion, and so the projection along it.
     off = np.abs(jacobian @ velocity_at(system, x) - image.velocity) / abs(float(image.normal @ image.velocity))

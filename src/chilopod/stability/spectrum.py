@@ -206,26 +206,22 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
     parts: list[_Part] = []
     for start, end in itertools.pairwise(np.linspace(0.0, duration, _FEWEST + 1).tolist()):
         parts.append(_part(system, parts[-1].state if parts else x, start, end, units))
+    ratios, one = units / units[:, None], np.eye(x.size)
+    symmetry = one if system.symmetry is None else system.symmetry * units / units[:, None]
     if not (autonomous or unresolved):
-        ratios = units / units[:, None]
         whole = image.jacobian * ratios
-        product = np.linalg.multi_dot([turn_in_units(system, units), *(part.factor for part in reversed(parts))])
+        product = np.linalg.multi_dot([symmetry, *(part.factor for part in reversed(parts))])
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
             error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
-            return Cut(units, np.eye(x.size), [whole], [error])
+            return Cut(units, one, [whole], [error])
     parts = _moderate_parts(system, x, parts, units, unresolved)
     sections = [section_basis(system, state, units) for state in (x, *(part.state for part in parts[:-1]))]
-    turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
+    turns = [one] * (len(parts) - 1) + [symmetry]
     factors, errors = [], []
     for part, turn, (before, after) in zip(parts, turns, itertools.pairwise([*sections, sections[0]]), strict=True):
         factors.append(after.T @ turn @ part.factor @ before)
         errors.append(np.abs(after.T) @ np.abs(turn) @ part.error @ np.abs(before))
     return Cut(units, sections[0], factors, errors)
-
-
-def turn_in_units(system: SystemLike, units: Array) -> Array:
-    """Symmetry in time in scaled units, shape (n, n); the unit matrix if there is none."""
-    return np.eye(units.size) if system.symmetry is None else system.symmetry * units / units[:, None]
 
 
 def section_basis(system: SystemLike, state: Array, units: Array) -> Array:

@@ -89,14 +89,12 @@ class TaylorFlow:
         n = self.tape.dimension
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
-        if not bounded:
-            derivative = np.eye(n)
-            steps = self._run(x, (t0, t1), params, derivative)
-            return Passage(x, derivative, _NOTHING, steps)
-        other_x = x.copy()
-        derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
+        derivative, bound, shaken = np.eye(n), np.zeros((n, n)) if bounded else _NOTHING, x * self._shaken
         steps = self._run(x, (t0, t1), params, derivative, bound)
-        self._run(other_x * self._shaken, (t0, t1), params, other, other=True)
+        if not bounded:
+            return Passage(x, derivative, bound, steps)
+        other = np.eye(n)
+        self._run(shaken, (t0, t1), params, other, other=True)
         difference = np.abs(other - derivative)
         # An entry that is zero within round-off gives no information on the others' differences.
         beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))

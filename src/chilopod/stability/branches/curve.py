@@ -102,16 +102,13 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         self, last: BranchPoint, matrix: Array, section: Section | None, before: Anchor | None, leaving: bool = False
     ) -> Anchor:
         """The anchor of a point with its matrix, after the previous point with its matrix."""
-        n = last.orbit.size
-        mode = last.tangent[:n] if leaving else None
-        space = symmetric_space(self.system(last.value), last.orbit, self.state_units, mode)
+        system, mode = self.system(last.value), last.tangent[:-1] if leaving else None
+        space = symmetric_space(system, last.orbit, self.state_units, mode)
         if before is None:
             return Anchor(last, matrix, None, section, space, leaving)
         earlier, tangent, lengthening = before.last, np.array(before.tangent), 0.0
         back = self.moved(last, earlier.orbit, earlier.value)
-        if section is not None:
-            system = self.system(last.value)
-            assert is_autonomous(system)
+        if section is not None and is_autonomous(system):
             assert last.period is not None
             assert earlier.period is not None
             lengthening = (last.period - earlier.period) / last.period / float(np.linalg.norm(back))
@@ -258,12 +255,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """A step with the anchor at its end, on the section there."""
         anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
-        tangent, matrix, section = step.tangent, step.matrix, None
-        if anchor.section is not None:
-            system = self.system(value)
-            section = section_at(system, x, self.sizes, image.duration)
-            assert section is not None
-            assert is_autonomous(system)
+        tangent, matrix, system = step.tangent, step.matrix, self.system(value)
+        section = section_at(system, x, self.sizes, image.duration)
+        if section is not None and anchor.section is not None and is_autonomous(system):
             velocity = velocity_at(system, x)
             self._check_moving(anchor.section, velocity, step.found)
             along = self._projection(velocity, section)

@@ -73,9 +73,8 @@ class Orbit(Shown, ReadOnlyArrays):
     @property
     def section(self) -> Section | None:
         """Section of ``image``, if the system does not depend on time."""
-        if self.image.normal is None:
-            return None
-        return Section(self.state, self.image.normal, self.image.duration)
+        normal = self.image.normal
+        return None if normal is None else Section(self.state, normal, self.image.duration)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         """The state, so that an orbit serves wherever a guess of one is wanted."""
@@ -319,7 +318,7 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
     if error is None:
         # The state's error is that of the flow, from the derivative's error or, where that is coarse, from two
         # computations, multiplied by the inverse of H - 1.
-        flow = _matrix(image.error, size) @ size
+        flow = (image.error if isinstance(image.error, np.ndarray) else np.full(scaled.shape, image.error)) @ size
         stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():
             twice = REPEATED * np.abs(in_parts(system, x, image.duration) - image.state) + _CHANCE * size
@@ -331,9 +330,4 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
     weakest = size * np.linalg.svd(scaled)[2][-1]
     beside = return_map(system, x + BESIDE * weakest, with_error=False, section=section)
     bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / BESIDE)
-    return Orbit(x, replace(image, error=_matrix(image.error, size) + bend), error)
-
-
-def _matrix(error: float | Array, size: Array) -> Array:
-    """The error of every entry of a derivative."""
-    return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
+    return Orbit(x, replace(image, error=image.error + bend), error)

@@ -109,9 +109,7 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
         budget = Budget(_FLOWS * samples.orbits, samples.budget.remaining)
         fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising, budget)
         # Close to it a step may land on another curve with another fold.
-        if fold is None or not _next_to(samples, sample, fold, rising):
-            continue
-        if _comes_as_a_root(samples, sample, fold, rising):
+        if fold is not None and _next_to(samples, sample, fold, rising) and _as_a_root(samples, sample, fold, rising):
             return fold
     return None
 
@@ -127,7 +125,7 @@ def _next_to(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: b
     )
 
 
-def _comes_as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: bool) -> bool:
+def _as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: bool) -> bool:
     """True if the multiplier approaches +1 as a root, as in a fold; at a crossing branch it does so linearly."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])

@@ -98,7 +98,7 @@ def find_crossings(
     for each in found:
         value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
         crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
-    return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), spectra.evaluations)
+    return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), len(spectra.known))
 
 
 def first_values(low: float, high: float) -> Array:
@@ -236,7 +236,7 @@ class _Finder:
             self.b,
             error=lambda places: spectra.function_error(places, event),
             left=lambda: spectra.left - spare,
-            skip=spectra.without_pair if event is CircleEvent.PAIR and not spectra.conservative else None,
+            skip=spectra.without_pair if event is CircleEvent.PAIR else None,
         )
 
     def _roots(self, event: CircleEvent, found: Zeros) -> list[Root]:
@@ -253,7 +253,7 @@ class _Finder:
             if spectra.left <= 0:
                 report.spent = True
                 break
-            if event is CircleEvent.PAIR and not spectra.conservative and spectra.without_pair(left, right):
+            if event is CircleEvent.PAIR and spectra.without_pair(left, right):
                 continue
             if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
                 # Zero only by rounding, or two real multipliers have product 1.

@@ -88,13 +88,13 @@ class Spectra:
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
         self.values: list[float] = []  # values with a matrix, in order
+        self.known: dict[float, ComplexArray | None] = {}  # eigenvalues; None for a missing matrix
         self.size = 0  # number of eigenvalues, once a matrix is known
         self.idle = dict.fromkeys(CircleEvent, 0)  # numbers of factors of an event's function that vanish throughout
         self.conservative = False  # multipliers come in pairs with product 1 throughout, and may stay on the circle
         self._matrices = matrices
         self._budget = budget
         self._affordable = affordable
-        self._known: dict[float, ComplexArray | None] = {}
         self._stretch: dict[float, float] = {}
         self._disturbed: dict[float, ComplexArray] = {}
         self._units: Array | None = None
@@ -105,35 +105,30 @@ class Spectra:
         return self.idle[CircleEvent.PLUS] + self.idle[CircleEvent.MINUS]
 
     @property
-    def evaluations(self) -> int:
-        """Number of evaluated values."""
-        return len(self._known)
-
-    @property
     def left(self) -> int:
         """Remaining number of values."""
-        left = self._budget - len(self._known)
+        left = self._budget - len(self.known)
         return left if self._affordable is None else min(left, self._affordable())
 
     def at(self, values: Array) -> ComplexArray:
         """Eigenvalues by falling modulus, shape (k, m); NaN for a missing matrix."""
         wanted = values.tolist()
-        missing = sorted({value for value in wanted if value not in self._known})
+        missing = sorted({value for value in wanted if value not in self.known})
         if missing:
             self._compute(missing)
         none = np.full(self.size, np.nan + 0j)
-        each = [self._known[value] for value in wanted]
+        each = [self.known[value] for value in wanted]
         return np.array([none if nu is None else nu for nu in each]).reshape(len(wanted), self.size)
 
     def _compute(self, values: list[float]) -> None:
-        self._known.update(dict.fromkeys(values))
+        self.known.update(dict.fromkeys(values))
         found = self._ask(values)
         if not found:
             return
         balanced = self._balanced(np.array([matrix for _, matrix, _ in found]))
         self.size = balanced.shape[-1]
         for (value, _, _), nu, stretch in zip(found, _eigenvalues(balanced), _stretches(balanced), strict=True):
-            self._known[value] = nu
+            self.known[value] = nu
             self._stretch[value] = float(stretch)
             bisect.insort(self.values, value)
 
@@ -158,7 +153,7 @@ class Spectra:
     def exists(self, value: float) -> bool:
         """True if a matrix exists at a value, which is evaluated if unknown."""
         self.at(np.array([value]))
-        return self._known[value] is not None
+        return self.known[value] is not None
 
     def beside(self, place: float, apart: float = 0.0) -> tuple[float, float]:
         """The nearest values with a matrix beside a place, at a least distance; else the place, or one beyond it."""
@@ -169,13 +164,13 @@ class Spectra:
 
     def holes(self, low: float, high: float) -> bool:
         """True if a matrix is missing between two values."""
-        return any(low < value < high and nu is None for value, nu in self._known.items())
+        return any(low < value < high and nu is None for value, nu in self.known.items())
 
     def without_pair(self, low: float, high: float) -> bool:
         """True if all complex multipliers are clear of the circle between two values, judged by known values: the
         bialternate product also vanishes where two real multipliers have product 1."""
         values = self.values[bisect.bisect_left(self.values, low) : bisect.bisect_right(self.values, high)]
-        if len(values) < 2:
+        if self.conservative or len(values) < 2:
             return False
         nu = self.at(np.array(values))
         # Rounding decides if small ones are real or a pair; a pair that grew from them would change the count.
