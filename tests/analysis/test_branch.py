@@ -136,7 +136,7 @@ def test_orbits_and_multipliers_are_as_good_as_is_said(right):
     for index in (3, 8, 12, -1):
         at = right.isel(point=index)
         multipliers = at.multiplier_real.values + 1j * at.multiplier_imag.values
-        units = curve.units(at.orbit.size)
+        units = curve.units
         point = BranchPoint(float(at.parameter_si), at.orbit.values, multipliers, at.tangent.values, units)
         image = curve.image(point.orbit, point.value)
         # How far the point is off the curve, at right angles to it.

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import Slopes, UserCode, as_real, numbers, sampled
-from chilopod.flows.carrying import TooManySteps, longest_step, pieces, state_beside
+from chilopod.flows.carrying import NOT_FINITE, TooManySteps, failure, longest_step, pieces, state_beside
 from chilopod.frozen import Array
 
 Parts = list[tuple[float, float]]
@@ -195,8 +195,7 @@ class CalledFlow:
             if gradient is not None:
                 slope = np.concatenate([slope, (gradient(t, state) @ y[n:].reshape(n, n)).ravel()])
             if not np.isfinite(slope).all():  # scipy would shorten its step without end
-                said = f"the motion diverges, or the right-hand side is not finite, at t = {t:g}"
-                raise AnalysisError(said, field="rhs")
+                raise failure(NOT_FINITE, t)
             return slope
 
         if not np.isfinite(y).all():

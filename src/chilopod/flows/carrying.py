@@ -14,6 +14,9 @@ RESOLUTION = 4096  # number of grid points over the period; a pulse in time that
 _FAST, _MARGIN = 0.02, 8  # change between two of these points that is fast, and points beside it
 _STEPS_IN_FAST_PART = 16
 
+REPEATED = 10.0
+"""Factor on the difference of two computations with different steps for a bound on the error of either."""
+
 DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, JUMPS, TIME_OVER = range(9)
 """Ending of an integration."""
 

@@ -28,8 +28,7 @@ class SpentError(ChilopodError, RuntimeError):
 
 class Deadline:
     """A time limit, s from now, infinite for none; within its context a flow ends at the limit or at that of an
-    outer context, even inside an integration, and a message is shown once. Time that numba spends compiling is not
-    counted."""
+    outer context, even inside an integration, and a message is shown once. Time that numba compiles does not count."""
 
     def __init__(self, seconds: float = math.inf) -> None:
         given: object = seconds
@@ -88,6 +87,7 @@ class Budget(Deadline):
     def __init__(self, allowed: float, seconds: float = math.inf) -> None:
         super().__init__(seconds)
         self.left = allowed  # remaining number of flows; never below zero
+        self.taken = 0.0  # number of those so far
 
     @property
     def spent(self) -> str:
@@ -100,6 +100,7 @@ class Budget(Deadline):
             raise SpentError(_SPENT)
         if self.late:
             raise over()
+        self.taken += min(count, self.left)
         self.left = max(self.left - count, 0)
 
 

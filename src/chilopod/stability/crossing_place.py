@@ -19,7 +19,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.interface import SystemLike, spatial_symmetries
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.returns import ReturnMap
-from chilopod.stability.spectrum import Spectrum, disturbed, return_multipliers, spectrum
+from chilopod.stability.spectrum import EPSILON, Spectrum, disturbed, return_multipliers, spectrum
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings
@@ -27,8 +27,7 @@ from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossin
 
 
 def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...], tuple[str, ...]]:
-    """The blocks of the symmetries of an orbit, a single None for the whole return map, and a sentence if it has none
-    of the system's."""
+    """Blocks of an orbit's symmetries, None for the whole return map, and a sentence if it has none of the system's."""
     generators = spatial_symmetries(system)
     if not generators:
         return (None,), ()
@@ -70,7 +69,6 @@ _SHORTER = 0.25
 _AGREES = 1e-6  # largest difference of two interpolations, relative to the reach
 _TOGETHER = 0.1  # distance of a multiplier from +1, relative to the next one's, at which both cross together
 _AT_HOME = 0.01  # largest distance from the root finder's place, relative to the reach
-_EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +166,9 @@ def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
 def _touch_error(course: Course, crossing: Crossing, uncertain: float) -> float:
     """Error of the place where a multiplier touches the circle and turns back: its distance is a parabola."""
     step = _TOUCH_STEP * course.width
-    away = []
-    for each in course.at(np.clip(crossing.value + step * np.array([-1.0, 0.0, 1.0]), course.low, course.high)):
-        values = np.linalg.eigvals(each.image.jacobian)
-        away.append(float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])))
+    around = np.clip(crossing.value + step * np.array([-1.0, 0.0, 1.0]), course.low, course.high)
+    spectra = [np.linalg.eigvals(each.image.jacobian) for each in course.at(around)]
+    away = [float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])) for values in spectra]
     # The step stays outside the root, as its square may underflow.
     bend = abs(away[0] - 2.0 * away[1] + away[2])
     return SAFETY * step * float(np.sqrt(2.0 * uncertain / bend)) if bend > 0.0 else np.inf
@@ -181,7 +178,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     """Error of the place where two multipliers meet. They move as a square root, but their product is smooth: det(H' -
     nu), or the squared difference of nu + 1/nu of two pairs, gives the error by its own over its slope."""
     matrix = image.jacobian
-    error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
+    error = np.broadcast_to(image.error, matrix.shape) + 4.0 * EPSILON * np.abs(matrix)
     here = _collision(matrix, crossing)
     moved = max(abs(_collision(other, crossing) - here) for other in disturbed(matrix, error))
     before, after, apart = course.jacobians(crossing)

@@ -17,15 +17,14 @@ from chilopod.flows.arguments import UserCode, finite_array, numbers
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import Autonomous, Family, SystemLike, check_system, is_autonomous, offers, system_of
-from chilopod.stability.normal_forms.manifold import radii, series
+from chilopod.stability.normal_forms.manifold import RADII, series
 from chilopod.stability.orbits.orbit import Orbit, near_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.returns import section_at
-from chilopod.stability.spectrum import SAFETY, disturbed, eigenvalue_errors, phased
+from chilopod.stability.spectrum import EPSILON, SAFETY, disturbed, eigenvalue_errors, phased
 
-_EPSILON = float(np.finfo(float).eps)
-ROUNDING = 16.0 * _EPSILON
+ROUNDING = 16.0 * EPSILON
 """Rounding error of a right-hand side, relative to its terms: a few roundings in each."""
 
 _ROUNDS = 60
@@ -189,12 +188,12 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
 def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> Array:
     """Error of the derivative, shape (n, n), due to the error and rounding of the state. Where terms of f cancel, an
     entry may be round-off of entries as large as the others, in units that balance."""
-    states = disturbed(x, error + 4.0 * _EPSILON * np.abs(x), draws=4)
+    states = disturbed(x, error + 4.0 * EPSILON * np.abs(x), draws=4)
     others = [linear_part(system, other)[1:] for other in states]
     moved = np.max([np.abs(other - matrix) + wrong for other, wrong in others], axis=0)
     units = numerical_balance(matrix)
     ratios = units / units[:, None]
-    return np.asarray(moved + 4.0 * _EPSILON * float(np.abs(matrix * ratios).max()) / ratios)
+    return np.asarray(moved + 4.0 * EPSILON * float(np.abs(matrix * ratios).max()) / ratios)
 
 
 def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
@@ -207,12 +206,12 @@ def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
     for curve, value, bound in zip(curves, best, error, strict=True):
         value[0], bound[0] = _velocity(system, curve[0]), 0.0
         for span in _SPANS:
-            powers = (span * np.concatenate([radii(), -radii()]))[:, None] ** np.arange(orders)
+            powers = (span * np.concatenate([RADII, -RADII]))[:, None] ** np.arange(orders)
             samples = np.array([_velocity(system, x) for x in powers @ curve])
             ahead, back = np.split(samples, 2)
             for order in range(1, orders) if np.isfinite(samples).all() else ():
                 part = 0.5 * (ahead + (-1.0) ** order * back)
-                noise = _EPSILON * np.abs(samples).max(axis=0)
+                noise = EPSILON * np.abs(samples).max(axis=0)
                 term, wrong = series(part.astype(np.complex128), order % 2).taylor(order, noise)
                 wrong = wrong / span**order
                 value[order] = np.where(wrong < bound[order], term.real / span**order, value[order])
@@ -228,7 +227,7 @@ def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> H
     form = _hopf_form(system, x, matrix, frequency)
     scatter = [
         _hopf_form(system, other, matrix + off * random.choice([-1.0, 1.0], off.shape), frequency, draws=0).cubic
-        for other in disturbed(x, error + 4.0 * _EPSILON * np.abs(x))
+        for other in disturbed(x, error + 4.0 * EPSILON * np.abs(x))
     ]
     moved = float(np.abs(np.array(scatter).real - form.cubic.real).max())
     return replace(form, error=form.error + SAFETY * moved)
@@ -245,7 +244,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     turns = np.exp(2j * np.pi * np.arange(_ANGLES) / _ANGLES)[:, None]
     # Along the mode at the size of the states, where differences are needed.
     size = np.where(x == 0.0, units * float((np.abs(x) / units).max() or 1.0), np.abs(x))
-    reach = 0.1 * float((size / np.maximum(np.abs(mode), _EPSILON * np.abs(mode).max())).min())
+    reach = 0.1 * float((size / np.maximum(np.abs(mode), EPSILON * np.abs(mode).max())).min())
     along = 2.0 * (reach * mode * turns).real
     still, none = np.broadcast_to(x, along.shape), np.zeros_like(along)
     quadratic, wrong = _expanded(system, np.stack([still, along, none], axis=1))
@@ -273,7 +272,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
     """A small cycle beside a Hopf point, with its parameter, and its displacement over the root of the parameter's."""
     rate = point.rate
-    if rate is None or point.criticality in (None, Criticality.UNDECIDED):
+    if rate is None or point.criticality is Criticality.UNDECIDED:
         said = "is a Hopf point whose coefficients leave the side of its cycles undecided"
         raise ParameterError(said, field="point", value=point.value)
     here, _ = equilibrium_at(family, point.value, point.orbit)

@@ -23,6 +23,7 @@ from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit,
 from chilopod.stability.returns import return_maps
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
 from chilopod.stability.spectrum import (
+    EPSILON,
     SAFETY,
     VERDICTS,
     ContractionError,
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
 _RESOLVED = 1e-6  # modulus of a multiplier below which the error bound of an eigenvalue is invalid
 _TELLING = 0.1  # relative error of a multiplier whose exponent is reported alone
 _SAME_ANGLE = 1e-12
-_EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +240,7 @@ def exponents(
                 raise
             log_nu, modes = np.log(spec.values[kept]), spec.right[:, kept]
             moved = SAFETY * (spec.error[kept] / np.abs(spec.values[kept]))
-    bound = image.returns * (moved + 4.0 * _EPSILON * np.abs(log_nu)) / image.period
+    bound = image.returns * (moved + 4.0 * EPSILON * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k, with the imaginary part in (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0

@@ -29,13 +29,13 @@ from chilopod.stability.interface import Autonomous, Family, SystemLike, offers
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.search.locate import Found, Located, located
 from chilopod.stability.search.samples import Samples
+from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
-_EPSILON = float(np.finfo(float).eps)
 _POINTS = 2000  # budget of return maps beside a point: those of the map cost almost nothing
 _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
@@ -149,7 +149,7 @@ def _piece(
         reason = f"{point.multiplicity // 2} pairs are critical at once"
         if point.multiplicity <= 2:
             try:
-                return [_hopf_point(family, between, point, duration)]
+                return [_of_f(family, between, point, duration)]
             except AnalysisError as error:
                 reason = error.problem
         return [f"no coefficient at {point.value:.9g}: {reason}", replace(point, multiplier=1j * point.frequency)]
@@ -174,7 +174,7 @@ def _of_map(
     values, vectors = np.linalg.eig(image.jacobian)
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
     frequency = abs(float(np.angle(crossing.multiplier))) / duration
-    error = place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value)
+    error = place_error(course, crossing, image) + 4.0 * EPSILON * abs(crossing.value)
     mode = vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128)
     at = BifurcationPoint(Kind.HOPF, crossing.value, error, sample.orbit, mode, crossing.multiplier, frequency)
     return replace(at, period=2.0 * np.pi / frequency, multiplicity=crossing.multiplicity)
@@ -195,7 +195,7 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
     off = min(reach / max(float(values[-1]), 1e-300), most * float(np.cbrt(reach / (steepest * most))))
     beside = linear_part(system, x + off * units * rows[-1])[1]
     moved = float(np.linalg.norm((np.abs(beside - matrix) + wrong) * ratios))
-    return 4.0 * _EPSILON * (1.0 + duration * float(np.linalg.norm(matrix * ratios))) + duration * moved
+    return 4.0 * EPSILON * (1.0 + duration * float(np.linalg.norm(matrix * ratios))) + duration * moved
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
@@ -241,7 +241,7 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
         if not np.abs(power).max() < _LARGEST:  # NaN too
             raise AnalysisError("a disturbance grows too much within the guessed period", field="equilibrium")
         # The norm of the exponent multiplies its relative error (Higham, Functions of Matrices, ch. 10).
-        error = 16.0 * _EPSILON * (1.0 + float(np.abs(scaled).sum(axis=1).max())) * float(np.abs(power[:n, :n]).max())
+        error = 16.0 * EPSILON * (1.0 + float(np.abs(scaled).sum(axis=1).max())) * float(np.abs(power[:n, :n]).max())
         ratios = units[:, None] / units
         return x + units * power[:n, n], power[:n, :n] * ratios, error * ratios
 
@@ -250,9 +250,7 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
     )
 
 
-def _hopf_point(
-    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
-) -> BifurcationPoint:
+def _of_f(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> BifurcationPoint:
     """A Hopf point from that of the map, with value, error, rate and coefficient from f."""
     low, high = between
     value, state = point.value, point.orbit
@@ -266,7 +264,7 @@ def _hopf_point(
         off = float(here.eigenvalues[index].real)
         if correcting:
             value = min(max(value - off / rate.real, low), high)
-    bound = (abs(off) + float(here.error_bounds[index])) / abs(rate.real) + 4.0 * _EPSILON * abs(value)
+    bound = (abs(off) + float(here.error_bounds[index])) / abs(rate.real) + 4.0 * EPSILON * abs(value)
     if not bound <= _KNOWN * (high - low):
         raise AnalysisError("the eigenvalues are not accurate enough", field="family", value=value)
     form = hopf_form(system, here.state, here.error, frequency)

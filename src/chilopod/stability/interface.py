@@ -306,16 +306,13 @@ class CheckedFamily:
     def __init__(self, family: Family) -> None:
         self.dimension = 0  # 0 until a system is known
         self.timed = True  # they depend on time
-        self._family = family
-        self._systems: dict[float, SystemLike] = {}
+        self._system = functools.lru_cache(_KEPT)(functools.partial(system_of, family))
         self._refused: dict[str, tuple[str, set[float]]] = {}
 
     def __call__(self, value: float) -> SystemLike:
         """The system at a value of the parameter."""
-        if value in self._systems:
-            return self._systems[value]
         with self.calling(value):
-            system = system_of(self._family, value)
+            system = self._system(value)
         kind = system.dimension, not is_autonomous(system)
         if self.dimension == 0:
             self.dimension, self.timed = kind
@@ -323,9 +320,6 @@ class CheckedFamily:
             what = "dimension" if system.dimension != self.dimension else "kind of period"
             self._refuse(value, what, f"the family changes its {what}")
             raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
-        if len(self._systems) >= _KEPT:
-            self._systems.pop(next(iter(self._systems)))
-        self._systems[value] = system
         return system
 
     @contextlib.contextmanager
@@ -337,8 +331,7 @@ class CheckedFamily:
         except (UserError, ParameterError) as error:
             if not self.dimension:
                 raise
-            cause = error.__cause__ if isinstance(error, UserError) else error
-            assert cause is not None
+            cause = (isinstance(error, UserError) and error.__cause__) or error
             self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
             raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
 

@@ -19,22 +19,23 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, shape_of
+from chilopod.flows.carrying import REPEATED
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import Capabilities, check_finite, is_autonomous, returns_per_period
 from chilopod.stability.returns import (
+    BESIDE,
     CUTS,
-    REPEATED,
     RETURN,
     Section,
     carried,
+    crossing,
     return_duration,
-    return_time,
     section_at,
     turned,
     velocity_at,
 )
-from chilopod.stability.spectrum import FIRST_ORDER, eigensystem, eigenvalue_errors
+from chilopod.stability.spectrum import EPSILON, FIRST_ORDER, eigensystem, eigenvalue_errors
 
 LARGE = 100  # number of states from which a few directions are cheaper than the whole derivative
 
@@ -49,14 +50,13 @@ _STEADY = 2.0  # change of the ratios of sizes below which they are accurate eno
 
 _ROUNDS = 30  # rounds of Newton's method
 _WORSE = 10.0  # largest growth of a residual
-_RESTS = 1e-8  # motion, relative to the sizes, that counts as rest
+RESTS = 1e-8  # motion, relative to the sizes, that counts as rest
 _UNSOLVED = 0.5  # remaining part of a residual, in the whole space, that fails a step of Newton's method
 _COARSE, _FINE = 1e-2, 1e-6  # accuracy of linear systems, relative to the residual
 
 _FEWEST, _SPARE = 8, 2  # columns of a block, and those beyond the requested multipliers
 _CONVERGED = 1e-13  # residual, relative to the size of the matrix
 _SAFETY = 4.0  # factor on a norm estimated from eight or more random components
-_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +161,9 @@ class TangentMap(ReadOnlyArrays):
 def tangent_map(system: Capabilities, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
     velocity, across = None, None
-    duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
+    duration = return_duration(system)
+    if is_autonomous(system) and section is not None:
+        duration = sum(crossing(system, x, section, derived=False)[:2])
     state = turned(system, carried(system, x[None], 0.0, duration))[0]
     check_finite(state)
     if is_autonomous(system) and section is not None:
@@ -215,7 +217,7 @@ def closed_orbit(
         residual = (image.state - x) / size
         off = float(np.abs(residual).max())
         if RETURN.met(off, best):
-            if image.velocity is not None and np.abs(image.velocity * image.duration / size).max() <= _RESTS:
+            if image.velocity is not None and np.abs(image.velocity * image.duration / size).max() <= RESTS:
                 break
             if section is not None:
                 image = tangent_map(system, x, section_at(system, x, size, image.duration))
@@ -274,7 +276,7 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> tuple[Com
     images = (both[:, :chosen] + 1j * both[:, chosen:]) / units
     residual = np.linalg.norm(images - values * vectors, axis=0)
     residual += np.linalg.norm((errors[:, :chosen] + errors[:, chosen:]) / units, axis=0)
-    residual += 4.0 * np.finfo(float).eps * np.linalg.norm(images, axis=0)
+    residual += 4.0 * EPSILON * np.linalg.norm(images, axis=0)
     residual += _bend(image, size, subspace, state_error, directions, both)
     condition = np.linalg.norm(left[:, :chosen], axis=0)
     if subspace.coupling.size:
@@ -304,8 +306,8 @@ def _bend(
     weakest = subspace.basis @ right[values.size - 1]
     wrong = float(np.linalg.norm((np.abs(image.state - image.point) + state_error) / size))
     off = wrong * max(1.0, 1.0 / float(values[-1]))
-    x = image.point + _BESIDE * size * weakest
+    x = image.point + BESIDE * size * weakest
     beside = tangent_map(image.system, x, image.section).images(directions)
     change = np.linalg.norm((beside - images) / size[:, None], axis=0)
     half = change.size // 2
-    return (change[:half] + change[half:]) * (off / _BESIDE)
+    return (change[:half] + change[half:]) * (off / BESIDE)

@@ -19,7 +19,7 @@ from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormSt
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.returns import returned_states, velocity_at
 from chilopod.stability.shown import Shown, bounded, number
-from chilopod.stability.spectrum import Spectrum, phased, spectrum
+from chilopod.stability.spectrum import EPSILON, Spectrum, phased, spectrum
 from chilopod.stability.symmetry.groups import symmetric_basis
 from chilopod.stability.symmetry.isotypic import Block, SymmetricCrossing, SymmetricKind, symmetric_crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossing
@@ -183,7 +183,6 @@ def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationP
     return point
 
 
-_EPSILON = float(np.finfo(float).eps)
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
 _SETTLED = 1e-7  # change of the mean from half as many parts; its error is about the square of that
 
@@ -229,14 +228,13 @@ def described(
         frequency = np.pi / orbit.period
     simple = critical.size == (2 if crossing.event is CircleEvent.PAIR else 1)
     breaking = block is not None and not block.trivial
-    form = None
     # At +1 the normal form, or a broken symmetry, determines the kind.
     asked = with_normal_form or (crossing.event is CircleEvent.PLUS and not breaking and kind is None)
-    if simple and asked and not crossing.collision:
-        form = _formed(system, orbit, crossing.event, nu, mode, left)
+    formed = simple and asked and not crossing.collision
+    form = _formed(system, orbit, crossing.event, nu, mode, left) if formed else None
     # No orbits branch off from a Krein collision, whatever the symmetries.
-    branching = block is not None and not (crossing.collision and crossing.event is CircleEvent.PAIR)
-    symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
+    krein = crossing.collision and crossing.event is CircleEvent.PAIR
+    symmetry = None if block is None or krein else symmetric_crossing(block, crossing.event, k)
     if kind is None and crossing.event is CircleEvent.PLUS and not crossing.collision:
         alone = simple and (form is None or form.status is not NormalFormStatus.SEVERAL_CRITICAL)
         if not alone and _is_continuum(system, orbit, mode):
@@ -250,11 +248,9 @@ def described(
             kind, symmetry = _by_quadratic_term(system, orbit, modes, symmetry)
     verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
     about: dict[str, Any] = {"criticality": verdict, "multiplicity": critical.size, "symmetry": symmetry}
-    error_bound += 4.0 * _EPSILON * abs(value)
-    period = orbit.period
-    point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, period=period, **about)
-    if not simple:
-        return replace(point, modes=modes)
+    about |= {"period": orbit.period, "modes": modes}
+    error_bound += 4.0 * EPSILON * abs(value)
+    point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, **about)
     return with_coefficients(point, form) if form is not None and with_normal_form else point
 
 

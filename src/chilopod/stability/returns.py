@@ -20,6 +20,7 @@ import numpy as np
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers
+from chilopod.flows.carrying import REPEATED
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.stability.interface import (
     Autonomous,
@@ -38,14 +39,12 @@ _CROSSING_ROUNDS = 30
 _BENT = 0.5  # largest part of a correction of the time that the change of the speed adds
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
 _ENDS = 1e-3, 1e-4  # parts of a return, at its ends
+BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _FALLING = 0.5  # least fall of the residual that is progress
 
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
 errors."""
-
-REPEATED = 10.0
-"""Factor on the difference of two computations with different steps for a bound on the error of one."""
 
 
 class Rule(NamedTuple):
@@ -139,12 +138,10 @@ def section_at(
     if not is_autonomous(system):
         return None
     velocity = velocity_at(system, x)
-    if duration is None:
-        duration = return_duration(system)
     if not velocity.any():
         raise AnalysisError("is an equilibrium", field="orbit", allowed="a state on an orbit")
-    if scale is None:
-        scale = sizes(system, x, duration)
+    duration = return_duration(system) if duration is None else duration
+    scale = sizes(system, x, duration) if scale is None else scale
     normal = velocity / scale**2
     return Section(x, normal / float(np.linalg.norm(normal * scale)), duration)
 
@@ -209,10 +206,8 @@ def return_map(system: SystemLike, x: Array, with_error: bool = True, section: S
     if system.symmetry is not None:
         state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
     image = on_section(system, section, state, jacobian, duration, error)
-    if not (with_error and is_autonomous(system)):
+    if not (with_error and is_autonomous(system)) or image.velocity is None or image.normal is None:
         return image
-    assert image.velocity is not None
-    assert image.normal is not None
     # The flow maps the motion at the start to that at the end. In a stiff system rounding of the state changes this
     # motion, and so the projection along it.
     off = np.abs(jacobian @ velocity_at(system, x) - image.velocity) / abs(float(image.normal @ image.velocity))
@@ -238,11 +233,6 @@ def on_section(
 def _projection(velocity: Array, normal: Array) -> Array:
     """Projection along a motion onto the section with a normal, shape (n, n)."""
     return np.asarray(np.eye(normal.size) - np.outer(velocity, normal) / float(normal @ velocity))
-
-
-def return_time(system: Autonomous, x: Array, section: Section) -> float:
-    """Duration of a motion from a state, shape (n,), back to the section."""
-    return sum(crossing(system, x, section, derived=False)[:2])
 
 
 def crossing(system: Autonomous, x: Array, section: Section, derived: bool = True) -> tuple[float, float, Array, Array]:

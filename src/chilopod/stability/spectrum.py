@@ -42,7 +42,7 @@ FIRST_ORDER = 1e-6  # error, relative to the largest eigenvalue, up to which fir
 VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
 """Words for the results of :func:`stable_within`."""
 
-_EPSILON = float(np.finfo(float).eps)
+EPSILON = float(np.finfo(float).eps)
 
 
 def stable_within(values: ComplexArray, bound: float, bounds: Array | float | None = None) -> bool | None:
@@ -66,7 +66,7 @@ def _signs(shape: tuple[int, ...]) -> Array:
 
 def eigenvalue_errors(values: ComplexArray, matrix: Array, error: Array) -> Array:
     """Bounds on the errors of the eigenvalues of a matrix whose entries have errors, shape (n,)."""
-    error = error + 4.0 * _EPSILON * np.abs(matrix)
+    error = error + 4.0 * EPSILON * np.abs(matrix)
     if not np.isfinite(error).all():
         return np.full(values.size, np.inf)
     others = np.linalg.eigvals(disturbed(matrix, error))
@@ -102,8 +102,7 @@ def eigensystem(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray
 
 
 def falling(values: ComplexArray) -> NDArray[np.intp]:
-    """Order by falling modulus. The two of a pair stay together, positive frequency first, as the eigenvalue solver
-    returns them."""
+    """Order by falling modulus; the two of a pair stay together, positive frequency first, as the solver has them."""
     relative = np.round(np.abs(values) / np.abs(values).max(initial=1e-300), 12)
     return np.lexsort((-np.round(np.abs(values.imag), 12), -relative))
 
@@ -117,7 +116,7 @@ def spectrum(image: ReturnMap) -> Spectrum:
     scaled = jacobian * units / units[:, None]
     values, right, left = eigensystem(scaled)
     # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
-    error = 4.0 * _EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
+    error = 4.0 * EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
     right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
     # Squares of tiny entries vanish; a power of 2 as a unit is exact.
     size = np.exp2(np.floor(np.log2(np.abs(right).max(axis=0))))
@@ -207,26 +206,22 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
     parts: list[_Part] = []
     for start, end in itertools.pairwise(np.linspace(0.0, duration, _FEWEST + 1).tolist()):
         parts.append(_part(system, parts[-1].state if parts else x, start, end, units))
+    ratios, one = units / units[:, None], np.eye(x.size)
+    symmetry = one if system.symmetry is None else system.symmetry * units / units[:, None]
     if not (autonomous or unresolved):
-        ratios = units / units[:, None]
         whole = image.jacobian * ratios
-        product = np.linalg.multi_dot([turn_in_units(system, units), *(part.factor for part in reversed(parts))])
+        product = np.linalg.multi_dot([symmetry, *(part.factor for part in reversed(parts))])
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
             error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
-            return Cut(units, np.eye(x.size), [whole], [error])
+            return Cut(units, one, [whole], [error])
     parts = _moderate_parts(system, x, parts, units, unresolved)
     sections = [section_basis(system, state, units) for state in (x, *(part.state for part in parts[:-1]))]
-    turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
+    turns = [one] * (len(parts) - 1) + [symmetry]
     factors, errors = [], []
     for part, turn, (before, after) in zip(parts, turns, itertools.pairwise([*sections, sections[0]]), strict=True):
         factors.append(after.T @ turn @ part.factor @ before)
         errors.append(np.abs(after.T) @ np.abs(turn) @ part.error @ np.abs(before))
     return Cut(units, sections[0], factors, errors)
-
-
-def turn_in_units(system: SystemLike, units: Array) -> Array:
-    """Symmetry in time in scaled units, shape (n, n); the unit matrix if there is none."""
-    return np.eye(units.size) if system.symmetry is None else system.symmetry * units / units[:, None]
 
 
 def section_basis(system: SystemLike, state: Array, units: Array) -> Array:

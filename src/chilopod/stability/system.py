@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import LARGEST, Claim, UserCode, checked_count, finite_array, numbers, positive
-from chilopod.flows.carrying import numerical_balance
+from chilopod.flows.carrying import REPEATED, numerical_balance
 from chilopod.flows.rhs import TOLERANCE, Event, Method, RightHandSide
 from chilopod.flows.tracing.trace import Opaque, describe
 from chilopod.frozen import Array, ReadOnlyArrays
@@ -276,7 +276,6 @@ def _key(options: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 _SHAKE = 2.0**-52
-_OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _ROUNDING = 8.0 * float(np.finfo(float).eps)
 
 
@@ -326,7 +325,7 @@ def from_map(
         shaken = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
         other = iterated(shaken, t0, t1)[1]
         rounding = _ROUNDING * n * max(1, math.ceil(t1) - math.ceil(t0)) * reach
-        return state, derivative, _OWN * np.abs(other - derivative) + rounding
+        return state, derivative, REPEATED * np.abs(other - derivative) + rounding
 
     return PeriodicSystem(
         n,

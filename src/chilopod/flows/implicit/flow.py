@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.carrying import RESOLUTION, failure, longest_step, numerical_balance, pieces
+from chilopod.flows.carrying import REPEATED, RESOLUTION, failure, longest_step, numerical_balance, pieces
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.tape import Tape
 from chilopod.flows.tracing.trace import branches_of, evaluate, evaluate_jacobian
@@ -23,7 +23,6 @@ _NEAREST = 3  # largest number of couplings between two states with their deriva
 _MOST_WORK = 3e9  # multiplications
 _FEWEST_STEPS = 2000
 _VOLUME_STEPS = 64  # fewest steps for the growth of volume
-_OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _FINER = 0.2
 _SHAKE = 2.0**-52
 _ROUNDING = 2.0**-49
@@ -64,7 +63,7 @@ class ImplicitFlow(ReadOnlyArrays):
         finer = self._run(x * (1.0 - shake), (t0, t1), _STAGES, _FINER * self.tolerance)[1]
         difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
         size = np.abs(derivative)
-        return state, derivative, _OWN * difference + _ROUNDING * (size + size @ size)
+        return state, derivative, REPEATED * difference + _ROUNDING * (size + size @ size)
 
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.carrying import NOT_FINITE, RESOLUTION, failure, pieces
+from chilopod.flows.carrying import NOT_FINITE, REPEATED, RESOLUTION, failure, pieces
 from chilopod.flows.tracing.tape import COSH, EXP, LOG, POWER, SINH, SQRT, Tape
 from chilopod.flows.tracing.trace import evaluate
 from chilopod.frozen import Array
@@ -30,7 +30,6 @@ _FEWEST_STEPS = 5000
 _MOST_CLOCKS = 8  # tables of 4096 rows, each for one set of parameters
 _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
-_OWN = 10.0  # factor on the difference of two independent errors for a bound on either
 _COMMON = 20.0  # factor on the usual difference of all entries, for those that agree by chance
 _NOTHING_BESIDE = 1e-6  # negligible entry, relative to the geometric mean of the largest in its row and column
 _SHAKE = 4.0 * 2.0**-53
@@ -90,21 +89,19 @@ class TaylorFlow:
         n = self.tape.dimension
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
-        if not bounded:
-            derivative = np.eye(n)
-            steps = self._run(x, (t0, t1), params, derivative)
-            return Passage(x, derivative, _NOTHING, steps)
-        other_x = x.copy()
-        derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
+        derivative, bound, shaken = np.eye(n), np.zeros((n, n)) if bounded else _NOTHING, x * self._shaken
         steps = self._run(x, (t0, t1), params, derivative, bound)
-        self._run(other_x * self._shaken, (t0, t1), params, other, other=True)
+        if not bounded:
+            return Passage(x, derivative, bound, steps)
+        other = np.eye(n)
+        self._run(shaken, (t0, t1), params, other, other=True)
         difference = np.abs(other - derivative)
         # An entry that is zero within round-off gives no information on the others' differences.
         beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))
         known = (bound > _UNDERFLOW) & (bound > _NOTHING_BESIDE * beside)
         ratios = np.sort(difference[known] / bound[known])
         usual = float(ratios[ratios.size // 2]) if ratios.size else 0.0
-        bound = bound * (1.0 + _COMMON * usual) + _OWN * difference
+        bound = bound * (1.0 + _COMMON * usual) + REPEATED * difference
         return Passage(x, derivative, bound, steps)
 
     def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:

@@ -74,11 +74,9 @@ class Graph:
         return float(np.int64(operands[0]).view(np.float64)) if code == ops.NUMBER else None
 
     def terms(self, node: int) -> list[tuple[int, int]]:
-        """A node as a sum: pairs of weight and node."""
-        code, operands = self.nodes[node]
-        if code == ops.LINEAR:
-            return list(zip(operands[::2], operands[1::2], strict=True))
-        return [(self.number(1.0), node)]
+        """Terms of a sum: pairs of weight and node."""
+        operands = self.nodes[node][1]
+        return list(zip(operands[::2], operands[1::2], strict=True))
 
     def linear(self, terms: Sequence[tuple[int, int]]) -> int:
         """A sum of nodes with constant weights."""
@@ -89,8 +87,6 @@ class Graph:
             if w is not None and v is not None:
                 constant += w * v
                 continue
-            if v is not None:
-                weight, node = node, weight  # a number times a parameter
             if node in kept:
                 weight = self.linear([(one, kept.pop(node)), (one, weight)])
             if self.value(weight) != 0.0:
@@ -126,9 +122,7 @@ class Graph:
             if self.nodes[b][0] == ops.LINEAR and len(self.nodes[b][1]) == 2:
                 weight, node = self.nodes[b][1]
                 return self.linear([(self.multiply(a, weight), node)])
-        if self.depends[a] == ops.CONSTANT and self.depends[b] != ops.CONSTANT:
-            return self.linear([(a, b)])
-        if va is not None:
+        if va is not None or (self.depends[a] == ops.CONSTANT and self.depends[b] != ops.CONSTANT):
             return self.linear([(a, b)])
         if a == b:
             return self._new(ops.SQUARE, (a,))

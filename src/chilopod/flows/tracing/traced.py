@@ -282,7 +282,8 @@ def _blank(make: Callable[..., Any]) -> Callable[..., Any]:
             result[...] = value
             return result.view(TracedArray)
         options = {key: value for key, value in options.items() if not _means_object(value)}
-        args = tuple(_numeric(value) for value in args if not _means_object(value))
+        plain_args = [value for value in args if not _means_object(value)]
+        args = tuple(np.zeros(each.shape) if isinstance(each, TracedArray) else each for each in plain_args)
         result = make(*args, **options)
         return as_traced(result) if result.dtype.kind == "f" else result
 
@@ -292,10 +293,6 @@ def _blank(make: Callable[..., Any]) -> Callable[..., Any]:
 def _means_object(value: Any) -> bool:
     """True for the type of traced arrays."""
     return isinstance(value, type | np.dtype) and value in (object, np.dtype(object))
-
-
-def _numeric(value: Any) -> Any:
-    return np.zeros(value.shape) if isinstance(value, TracedArray) else value
 
 
 def _norm(value: Any, ord: Any = None, axis: Any = None, keepdims: Any = False) -> Any:

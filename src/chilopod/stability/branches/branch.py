@@ -243,12 +243,12 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
         inward = dict(zip(curve.between, (True, False), strict=True))
         anchor = anchored(curve, replace(start, rising=inward.get(start.value, start.rising)), step)
     else:
-        units = curve.units(start.orbit.size)
+        units = curve.units
         tangent = start.tangent * start.units / units
         meeting = start.special not in (None, Kind.FOLD) and float(np.abs(start.multipliers - 1.0).min()) <= _MEETING
         special = start.special if meeting else None
         first = replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=special)
-        anchor = curve.anchor(first, ahead=step if meeting else 0.0, leaving=meeting)
+        anchor = curve.anchor(first, ahead=step if meeting else 0.0)
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()
     return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor
@@ -263,9 +263,9 @@ def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anc
     curve.scale, curve.sizes = branch.scale, branch.units[:-1]
     curve.periods, curve.symmetric = branch.periods, branch.symmetric
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
-    leaving = last.special is not None
     # At a branch point the matrix is singular, so it is computed a step ahead.
-    anchor = curve.anchor(last, earlier[0] if earlier else None, branch.step if leaving else 0.0, leaving)
+    ahead = 0.0 if last.special is None else branch.step
+    anchor = curve.anchor(last, earlier[0] if earlier else None, ahead)
     # Steps along straight parts are longer than the longest.
     return (replace(branch, step=min(branch.step, longest)) if longest < LONGEST else branch), anchor
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import KW_ONLY, dataclass, field
 from typing import NamedTuple
@@ -166,31 +167,31 @@ class FamilyReturns:
     precision: float = PRECISION  # precision of orbits, relative to the sizes of the states
     budget: Budget = field(default_factory=lambda: Budget(math.inf))
     steepness: float = field(default=1.0, init=False)  # of the return map over the parameter, in units
-    _known: dict[float, SystemLike] = field(default_factory=dict, init=False)
     _dimension: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         self.box = np.array([self.between])
+        self._own = functools.lru_cache(_KEPT)(functools.partial(system_of, self.family))
 
     def system(self, value: float) -> SystemLike:
         """System under study, over the periods of the orbits."""
-        if value not in self._known:
-            own = system_of(self.family, value)
-            self._dimension = self._dimension or own.dimension
-            if own.dimension != self._dimension:
-                allowed = f"{self._dimension} states"
-                raise AnalysisError("changes its dimension", field="family", value=value, allowed=allowed)
-            if len(self._known) >= _KEPT:
-                self._known.pop(next(iter(self._known)))
-            whole = self.symmetric or (own.symmetry is None and self.periods == 1)
-            self._known[value] = own if whole else whole_period(own, self.periods)
-        return self._known[value]
+        own = self._own(value)
+        self._dimension = self._dimension or own.dimension
+        if own.dimension != self._dimension:
+            allowed = f"{self._dimension} states"
+            raise AnalysisError("changes its dimension", field="family", value=value, allowed=allowed)
+        studied = self.symmetric or (own.symmetry is None and self.periods == 1)
+        return own if studied else whole_period(own, self.periods)
 
-    def units(self, count: int) -> Array:
-        """Sizes of the states and scale of the parameter, shape (n+1,)."""
-        units = np.full(count + 1, self.scale, dtype=np.float64)
-        units[:-1] = 1.0 if self.sizes is None else self.sizes
-        return units
+    @property
+    def state_units(self) -> Array:
+        """Units of the states, shape (n,): their sizes, or one before these are known."""
+        return np.ones(self._dimension) if self.sizes is None else self.sizes
+
+    @property
+    def units(self) -> Array:
+        """Units of the states and scale of the parameter, shape (n+1,)."""
+        return np.append(self.state_units, self.scale)
 
     def image(self, x: Array, value: float, section: Section | None = None, with_error: bool = False) -> ReturnMap:
         """The return map and its derivative."""
@@ -212,7 +213,7 @@ class FamilyReturns:
     def by_parameter(self, x: Array, value: float, section: Section | None, mapped: Array | None = None) -> Array:
         """dH/dp at a state, per scale, shape (n,), from H there if it is known. The parabola through a third value is
         needed near branch points, where the matrix of a curve is nearly singular."""
-        units, steepness = self.units(x.size)[:-1], self.steepness
+        steepness = self.steepness
         mapped = self.mapped(x, value, section) if mapped is None else mapped
         for last in (False, True):
             step = max(_PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP), 8.0 * float(np.spacing(abs(value))))
@@ -225,7 +226,7 @@ class FamilyReturns:
                 steepness *= 100.0
                 continue
             difference: Array = (beside - mapped) / (step / self.scale)
-            found = float(np.abs(difference / units).max())
+            found = float(np.abs(difference / self.state_units).max())
             # A return that magnifies needs a smaller step of the parameter.
             if last or not 2.0 * max(_STEEP, steepness) < found < np.inf:
                 break

@@ -287,7 +287,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
 def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     """Anchor of the first step of a branch; its matrix is computed ``ahead`` by a distance where branches meet."""
     section = curve.section_at(start.orbit, start.value, start.period)
-    units = curve.units(start.orbit.size)
+    units = curve.units
     image, matrix = curve.matrix_at(start.orbit, start.value, section, np.zeros(units.size), True)
     matrix = matrix[:-1]
     if not np.isfinite(matrix).all():
@@ -311,7 +311,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     if start.bifurcation is not None:
         about |= {"special": start.bifurcation.kind, "bifurcation": start.bifurcation}
     point = BranchPoint(start.value, start.orbit, values, tangent, units, **about)
-    return curve.anchor(point, ahead=ahead if leaving else 0.0, leaving=leaving)
+    return curve.anchor(point, ahead=ahead if leaving else 0.0)
 
 
 def _along(matrix: Array, rising: bool) -> Array:
@@ -332,8 +332,7 @@ def _along(matrix: Array, rising: bool) -> Array:
 def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -> Array:
     """Tangent of the second of two crossing curves, by the algebraic branching equation (Keller 1977; Kuznetsov,
     *Elements of Applied Bifurcation Theory*, section 10.2.3), with second differences of H."""
-    n = start.orbit.size
-    units = curve.units(n)
+    n, units = start.orbit.size, curve.units
     left, _, rows = np.linalg.svd(matrix)
     w, basis = left[:, -1], rows[-2:]
 

@@ -2,6 +2,10 @@
 
 The curve is H(x, p) = x, in units: x in the sizes of the states, p in a scale. For a system without a period of its
 own, every step uses the section across the motion at its start.
+
+The tracer calls ``step``, whose corrector calls ``residual``, ``off``, ``met`` and ``exact``, then ``arrived`` for the
+anchor of the next step, and ``first_from`` and ``is_first`` where the curve may close. The other methods serve the
+starts of branches and the search for events within a step.
 """
 
 from __future__ import annotations
@@ -61,7 +65,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
-        sizes = self.units(len(jacobian))[:-1]
+        sizes = self.state_units
         with np.errstate(over="ignore"):
             scaled = jacobian * sizes / sizes[:, None] - np.eye(len(jacobian))
         return np.block([[scaled, (derivative / sizes)[:, None]], [tangent[None]]])
@@ -75,24 +79,22 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     def moved(self, start: BranchPoint, x: Array, value: float) -> Array:
         """Displacement of an orbit from a point, in units, shape (n+1,)."""
-        return np.append(x - start.orbit, value - start.value) / self.units(x.size)
+        return np.append(x - start.orbit, value - start.value) / self.units
 
     def reached(self, start: BranchPoint, moved: Array) -> tuple[Array, float]:
         """State and parameter at a displacement from a point; the inverse of :meth:`moved`."""
-        total = self.units(start.orbit.size) * moved
+        total = self.units * moved
         return start.orbit + total[:-1], start.value + float(total[-1])
 
-    def anchor(
-        self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0, leaving: bool = False
-    ) -> Anchor:
-        """The anchor of a point, with its matrix computed ``ahead`` by a distance along the tangent."""
+    def anchor(self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0) -> Anchor:
+        """The anchor of a point; at a branch point its matrix is computed ``ahead`` by a distance along the tangent."""
         section = self.section_at(last.orbit, last.value, last.period)
-        x = last.orbit + ahead * last.tangent[:-1] * self.units(last.orbit.size)[:-1]
+        x = last.orbit + ahead * last.tangent[:-1] * self.state_units
         # With errors, to be equal to the end of a step, to the bit.
         matrix = self.matrix_at(x, last.value, section, last.tangent, True)[1]
         # The matrix of a branch point was computed ahead, so it gives no prediction.
         if before is None or before.special is not None:
-            return self.anchored(last, matrix, section, None, leaving)
+            return self.anchored(last, matrix, section, None, ahead > 0.0)
         matrix_before = self.matrix_at(before.orbit, before.value, section, before.tangent, True)[1]
         return self.anchored(last, matrix, section, Anchor(before, matrix_before))
 
@@ -100,16 +102,13 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         self, last: BranchPoint, matrix: Array, section: Section | None, before: Anchor | None, leaving: bool = False
     ) -> Anchor:
         """The anchor of a point with its matrix, after the previous point with its matrix."""
-        n = last.orbit.size
-        mode = last.tangent[:n] if leaving else None
-        space = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
+        system, mode = self.system(last.value), last.tangent[:-1] if leaving else None
+        space = symmetric_space(system, last.orbit, self.state_units, mode)
         if before is None:
             return Anchor(last, matrix, None, section, space, leaving)
         earlier, tangent, lengthening = before.last, np.array(before.tangent), 0.0
         back = self.moved(last, earlier.orbit, earlier.value)
-        if section is not None:
-            system = self.system(last.value)
-            assert is_autonomous(system)
+        if section is not None and is_autonomous(system):
             assert last.period is not None
             assert earlier.period is not None
             lengthening = (last.period - earlier.period) / last.period / float(np.linalg.norm(back))
@@ -122,7 +121,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return slice(n, n + 1), np.array([self.scale])
 
     def residual(self, anchor: Anchor, moved: Array, values: Array) -> tuple[Returned, Array]:
-        sizes, space, value = self.units(moved.size - 1)[:-1], anchor.space, float(values[0])
+        sizes, space, value = self.state_units, anchor.space, float(values[0])
         x = anchor.last.orbit + sizes * moved[:-1]
         if space is not None:
             x = sizes * (space @ (x / sizes))
@@ -148,11 +147,11 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
         image, system = self.image(x, value, section), self.system(value)
         other = in_parts(system, x, image.duration)
-        return float(np.abs((other - image.state) / self.units(x.size)[:-1]).max())
+        return float(np.abs((other - image.state) / self.state_units).max())
 
     def size(self, step: Step[Anchor, OnCurve]) -> float:
         x = step.found.x
-        return float(np.linalg.norm(x / self.units(x.size)[:-1]))
+        return float(np.linalg.norm(x / self.state_units))
 
     def stretches(self, step: Step[Anchor, OnCurve]) -> bool:
         """True unless short steps are wanted, or the system gives the sizes of its states."""
@@ -177,7 +176,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         count = node_count(guess.matrix[:n, :n] + np.eye(n), np.ones(n)) if space is None else 0
         off, weakest, corrections = self.precision, 0.0, 0
         if count >= _MANY_NODES:
-            moved, x, value, image, matrix = self._shot(anchor, timed, plane, count)
+            moved, x, value, image, matrix = self._shot(anchor, plane, count)
             if bounded:
                 with contextlib.suppress(AnalysisError):  # the flow may magnify too much over the whole return
                     image = replace(image, error=self.image(x, value, timed.section, with_error=True).error)
@@ -208,24 +207,22 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         except AnalysisError:
             if count < _FEWEST_NODES:
                 raise
-        moved, _, _, image, _ = self._shot(anchor, timed, plane, count)
+        moved, _, _, image, _ = self._shot(anchor, plane, count)
         if timed.section is not None:
             timed = replace(timed, section=replace(timed.section, duration=image.duration))
         return timed, self.corrected(timed, Guess(moved, matrix), plane)
 
-    def _shot(
-        self, anchor: Anchor, timed: Anchor, plane: Plane, count: int
-    ) -> tuple[Array, Array, float, ReturnMap, Array]:
+    def _shot(self, anchor: Anchor, plane: Plane, count: int) -> tuple[Array, Array, float, ReturnMap, Array]:
         """Displacement in units, state, parameter, return map and :meth:`matrix`, by multiple shooting."""
-        last, section = anchor.last, timed.section
-        system, units = self.system(last.value), self.units(last.orbit.size)
-        duration = return_duration(system) if anchor.section is None else anchor.section.duration
+        last, section = anchor.last, anchor.section
+        system, units = self.system(last.value), self.units
+        duration = return_duration(system) if section is None else section.duration
         start = np.append(last.orbit, last.value)
         self.budget.take(2 * FEW_ROUNDS)  # each in parts
         nodes = nodes_along(system, last.orbit, duration, count, last.value)
         free = Free(plane.row, plane.target, start, self.scale)
         problem = Problem(lambda value: self.system(self._inside(value)), free)
-        found = shot(problem, nodes, units[:-1], anchor.section)
+        found = shot(problem, nodes, units[:-1], section)
         x, value = found.nodes.states[0], self._inside(found.nodes.value) if plane.edge is None else plane.edge[1]
         system = self.system(value)
         image = on_section(system, section, x, found.jacobian, found.nodes.duration)
@@ -245,11 +242,11 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """Error of the derivative due to that of the orbit: ``off``, and ``weakest`` times the error of the flow."""
         n = x.size
         # Units may be much larger than the orbit.
-        reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
+        reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.state_units)))
         length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(matrix[:n, :n] - anchor.matrix[:n, :n])) / length
         # The flow's error relative to its magnification is a bound already.
-        sizes = self.units(n)[:-1]
+        sizes = self.state_units
         error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
         flow = float(error.max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
         return bend * (off + weakest * flow * max(1.0, self._relative_size(x)))
@@ -258,12 +255,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """A step with the anchor at its end, on the section there."""
         anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
-        tangent, matrix, section = step.tangent, step.matrix, None
-        if anchor.section is not None:
-            system = self.system(value)
-            section = section_at(system, x, self.sizes, image.duration)
-            assert section is not None
-            assert is_autonomous(system)
+        tangent, matrix, system = step.tangent, step.matrix, self.system(value)
+        section = section_at(system, x, self.sizes, image.duration)
+        if section is not None and anchor.section is not None and is_autonomous(system):
             velocity = velocity_at(system, x)
             self._check_moving(anchor.section, velocity, step.found)
             along = self._projection(velocity, section)
@@ -275,7 +269,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
         about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": self.periods}
-        point = BranchPoint(value, x, values, tangent, self.units(x.size), **about)
+        point = BranchPoint(value, x, values, tangent, self.units, **about)
         before = None if anchor.leaving or anchor.last.special is not None else anchor
         return replace(step, end=self.anchored(point, matrix, section, before))
 
@@ -283,13 +277,13 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """Check that an orbit has not shrunk into an equilibrium, beyond which the same orbits come again half a period
         later. A fraction f of the largest motion lies at a distance f^2 in the parameter from the Hopf point, and the
         precision leaves that uncertain by an f-th part."""
-        motion = float(np.linalg.norm(velocity / self.units(velocity.size)[:-1])) * found.image.period
+        motion = float(np.linalg.norm(velocity / self.state_units)) * found.image.period
         self._motion = max(self._motion, motion)
         if float(section.normal @ velocity) > 0.0 and motion >= _SHRUNK * np.cbrt(self.precision) * self._motion:
             return
         # A small cycle is smaller than its velocity in any state times its period.
         path = self._path(found.x, found.value, found.image.duration)
-        extent = float(np.linalg.norm((path - found.x) / self.units(velocity.size)[:-1], axis=1).max())
+        extent = float(np.linalg.norm((path - found.x) / self.state_units, axis=1).max())
         said = "the motion nearly stops in the section, and the next step has no direction"
         shrinks = extent <= motion and has_centre(self.system(found.value), found.x, found.image.period)
         raise AnalysisError(_SHRINKS if shrinks else said, field="orbit")
@@ -315,7 +309,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             return True
         if first.period is None or abs(point.period - first.period) > _SAME_PERIOD * first.period:
             return False
-        path = (self._path(point.orbit, point.value, point.period) - first.orbit) / self.units(point.orbit.size)[:-1]
+        path = (self._path(point.orbit, point.value, point.period) - first.orbit) / self.state_units
         chords = np.diff(path, axis=0)
         lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
         share = np.clip(-(path[:-1] * chords).sum(axis=1) / lengths, 0.0, 1.0)
@@ -328,7 +322,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         for an additional error of the derivative, in units; infinite without a bound."""
         if not (np.isfinite(wrong) and np.isfinite(image.error).all()):
             return return_multipliers(image) ** image.returns, np.inf
-        sizes = self.units(image.state.size)[:-1]
+        sizes = self.state_units
         spec = spectrum(replace(image, error=image.error + wrong * sizes[:, None] / sizes))
         found = full_period(spec.values, spec.error, image.returns, image.state, image.period)
         moduli = np.abs(spec.values)
@@ -336,10 +330,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return found.values, float(telling.max(initial=0.0))
 
     def _relative_size(self, x: Array) -> float:
-        return float(np.abs(x / self.units(x.size)[:-1]).max())
+        return float(np.abs(x / self.state_units).max())
 
     def _projection(self, velocity: Array, section: Section) -> Array:
         """Projection along the motion onto a section, in units, shape (n, n)."""
-        sizes = self.units(velocity.size)[:-1]
+        sizes = self.state_units
         normal = section.normal * sizes
         return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)

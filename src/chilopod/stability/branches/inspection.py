@@ -131,7 +131,7 @@ def _side(within: Within, at: float, place: EventPlace) -> tuple[float, ...]:
     """Side of the critical multiplier and, if it is real, sign of the product of all distances; 0 if undecided."""
     curve, step, crossing = within.curve, within.at(at), place.crossing
     (here, value_here, returned, _), section = step.found, within.step.start.section
-    units = curve.units(here.size)
+    units = curve.units
 
     def off(x: Array, value: float) -> tuple[Array, Array, ReturnMap]:
         image = curve.image(x, value, section, with_error=True)

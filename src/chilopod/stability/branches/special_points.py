@@ -55,7 +55,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         section = curve.section_at(last.orbit, last.value, last.period)
         image = curve.image(last.orbit, last.value, section, with_error=True)
         # On a branch orbits are not corrected to the last digit.
-        orbit = Orbit(last.orbit, image, SAME_ORBIT * curve.units(last.orbit.size)[:-1])
+        orbit = Orbit(last.orbit, image, SAME_ORBIT * curve.state_units)
         return orbit_blocks(curve.system(last.value), orbit)[0]
 
     def sides(self, place: float) -> tuple[Step[Anchor, OnCurve], Step[Anchor, OnCurve]]:
@@ -68,7 +68,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         if place > 0.0:
             return self.at(place).found.image.jacobian
         matrix = self.step.start.matrix[:-1, :-1]
-        sizes = self.curve.units(len(matrix))[:-1]
+        sizes = self.curve.state_units
         return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
 
     def near_jacobian(self, place: float) -> Array:
@@ -82,7 +82,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
             for _ in range(_CORRECTED):
                 x, value = self.curve.reached(start.last, moved)
                 image = self.curve.image(x, value, start.section)
-                off = np.append((image.state - x) / self.curve.units(x.size)[:-1], 0.0)
+                off = np.append((image.state - x) / self.curve.state_units, 0.0)
                 correction = np.linalg.solve(matrix, off)
                 if float(np.abs(correction).max()) <= _OFF * step.size:
                     return image.jacobian
@@ -148,7 +148,7 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
 
         def bounded_at(_: float, moved: Array, error: Array, duration: float) -> Orbit:
             x, value = curve.reached(start, moved)
-            return with_bounds(curve.system(value), x, duration, error[:-1] * curve.units(x.size)[:-1])
+            return with_bounds(curve.system(value), x, duration, error[:-1] * curve.state_units)
 
         regular = past_singular(course, crossing, bounded_at)
     if regular is None:
@@ -193,7 +193,7 @@ def _orbit(within: Within, point: BranchPoint, place: EventPlace) -> Orbit:
     if not place.fold:
         with contextlib.suppress(AnalysisError):
             orbit = searched_orbit(system, x, section=section)
-            if float((np.abs(orbit.state - x) / curve.units(x.size)[:-1]).max()) <= SAME_ORBIT:
+            if float((np.abs(orbit.state - x) / curve.state_units).max()) <= SAME_ORBIT:
                 return orbit
     return Orbit(x, curve.image(x, point.value, section, with_error=True), np.zeros(x.size))
 
@@ -239,8 +239,8 @@ def _noise(curve: Curve, here: Step[Anchor, OnCurve], section: Section | None) -
 
 
 def _off(curve: Curve, x: Array, image: ReturnMap) -> Array:
-    """Distance by which an orbit may miss its return, in units of the states' sizes, shape (n,)."""
-    sizes = curve.units(x.size)[:-1]
+    """Distance by which an orbit may miss its return, in units of the states, shape (n,)."""
+    sizes = curve.state_units
     wrong = np.broadcast_to(image.error, image.jacobian.shape)
     return np.asarray((np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes)
 

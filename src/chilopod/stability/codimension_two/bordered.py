@@ -102,11 +102,6 @@ class Evaluated(ReadOnlyArrays):
     left: Array
     reach: float  # norm of the inverse of the bordered matrix
 
-    @property
-    def shift(self) -> Array | None:
-        """Bounds on the errors of the coordinates, shape (m + k + 1,); None if not computed."""
-        return None
-
 
 @dataclass(frozen=True, eq=False)
 class Spot(Evaluated):
@@ -275,9 +270,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         """The frame at a place; its borders come from the previous frame, so that they change continuously."""
         n, k = size.size, 1 if self.target else 2
         basis = np.zeros((n, 0)) if self.known else symmetric_states(system, place.state, size)
-        section = None
-        if image.normal is not None:
-            section = Section(place.state, image.normal, image.duration)
+        section = None if image.normal is None else Section(place.state, image.normal, image.duration)
         jacobian = image.jacobian * size / size[:, None]
         critical = self._critical(jacobian, place.cosine)
         if before is None:

@@ -26,7 +26,7 @@ from chilopod.stability.normal_forms.manifold import CriticalOrbit, ReturnedStat
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.returns import returned_states
-from chilopod.stability.spectrum import spectrum
+from chilopod.stability.spectrum import EPSILON, spectrum
 from chilopod.stability.symmetry.groups import reverses
 from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent
 
@@ -39,7 +39,6 @@ _MEETING = 1e-4  # smallest singular value of the equations, in units, where cur
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
-_EPSILON = float(np.finfo(float).eps)
 
 
 class Own(enum.Enum):
@@ -63,6 +62,7 @@ _COSINES = {
 }
 
 
+_Parts = Parts[Spot, Evaluated, Evaluated]
 Test = Callable[[float], tuple[float, float]]
 """A test function and its error at a distance along a step; NaN where undefined."""
 
@@ -121,7 +121,7 @@ class Detector:
         here = Critical(self._curve.target, spot)
         form = self.form(here) if self._coefficients and abs(spot.place.cosine) < 1.0 else None
         signals = {signal: self._measured(signal, here, form) for signal in self._signals}
-        bound = across(spot) + 4.0 * _EPSILON * np.abs(spot.values)
+        bound = across(spot) + 4.0 * EPSILON * np.abs(spot.values)
         return Station(_point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
 
     def events(self, step: Step[Spot, Evaluated], before: Signals, after: Signals) -> list[tuple[Spot, SpecialPoint2]]:
@@ -139,9 +139,9 @@ class Detector:
 
     def form(self, here: Critical) -> NormalForm:
         """The normal form at a place."""
-        at, shift, orbit_error = here.at, here.at.shift, 0.0
-        if shift is not None:
-            state = at.frame.size * (np.abs(at.frame.basis) @ shift[: at.frame.parameters.start])
+        at, orbit_error = here.at, 0.0
+        if isinstance(at, Spot):
+            state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
             orbit_error = float(np.abs(here.left) @ state)
         return normal_form(*self.sampled(here), scale=at.frame.size, orbit_error=orbit_error)
 
@@ -169,8 +169,8 @@ class Detector:
     def _measured(self, signal: Signal, here: Critical, form: NormalForm | None = None) -> tuple[float, float]:
         """A test function and its error, which needs an image with error bounds, and errors of the coordinates."""
         if isinstance(signal, CodimensionTwo):
-            shift = here.at.shift
-            return here.at.place.cosine - _COSINES[signal], 0.0 if shift is None else float(shift[-1])
+            error = float(here.at.shift[-1]) if isinstance(here.at, Spot) else 0.0
+            return here.at.place.cosine - _COSINES[signal], error
         if signal is Own.DOUBLE:
             return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.at.error))
         if signal is Own.COEFFICIENT:
@@ -187,9 +187,7 @@ class Detector:
             return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], off)
         return _product(nu - TARGETS[signal], 1.0 + np.abs(nu), errors)
 
-    def _located(
-        self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
-    ) -> tuple[float, Spot, SpecialPoint2] | None:
+    def _located(self, signal: Signal, parts: _Parts) -> tuple[float, Spot, SpecialPoint2] | None:
         """Point where a test function vanishes within a step, with its distance along the step."""
         curve, start, length = self._curve, parts.step.start, parts.step.size
 
@@ -210,7 +208,7 @@ class Detector:
             return None
         along = _along(test, parts, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
-        bound = off + along + 4.0 * _EPSILON * np.abs(spot.values)
+        bound = off + along + 4.0 * EPSILON * np.abs(spot.values)
         if not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
             return None
         low, high = test(root - beside)[0], test(root + beside)[0]
@@ -303,13 +301,13 @@ def across(spot: Spot) -> Array:
     response = np.linalg.pinv(spot.matrix[:-1])[frame.parameters]
     tangent = spot.tangent[frame.parameters]
     length = float(np.linalg.norm(tangent))
-    if length > np.sqrt(_EPSILON):  # at a cusp the curve has no direction
+    if length > np.sqrt(EPSILON):  # at a cusp the curve has no direction
         normal = np.array([-tangent[1], tangent[0]]) / length
         response = np.outer(normal, normal @ response)
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))
 
 
-def _along(test: Test, parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float) -> Array:
+def _along(test: Test, parts: _Parts, root: float, h: float, error: float) -> Array:
     """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
     with contextlib.suppress(AnalysisError):
         slope = abs(test(root + h)[0] - test(root - h)[0]) / (2.0 * h)

@@ -22,7 +22,7 @@ from chilopod.flows.arguments import check_arguments, checked_box, finite_array
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
-from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
+from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
@@ -196,10 +196,7 @@ _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
 _HALVINGS = 12  # halvings of the amplitude
 _NEAR = 0.25  # largest error of a predicted fold, relative to the amplitude and its distance from the point
 
-_CURVES = {
-    CodimensionTwo.GENERALISED_PERIOD_DOUBLING: Kind.PERIOD_DOUBLING,
-    CodimensionTwo.DEGENERATE_PITCHFORK: Kind.PITCHFORK,
-}
+_CURVES = {DEGENERATE[kind]: kind for kind in (Kind.PERIOD_DOUBLING, Kind.PITCHFORK)}
 _OTHERS = {
     CodimensionTwo.CUSP: "is a cusp: the curve of folds itself goes through it",
     CodimensionTwo.CHENCINER: "is a Chenciner point: folds of tori leave it, which cannot be followed",

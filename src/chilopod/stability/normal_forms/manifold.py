@@ -29,23 +29,19 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.returns import ReturnMap
 
-RADII = 8  # number of radii at which a function is sampled
+RADII: Array = np.cos((2 * np.arange(8) + 1) * np.pi / 32)
+"""Radii at which a function is sampled: the positive Chebyshev points of the first kind of [-1, 1], falling."""
 
 _SAFETY = 5.0  # factor on the noise, estimated from few samples, and the truncation, from the next two terms
 _FALL = 4.0
 _TAIL = 2  # number of last coefficients of every parity that count as noise
 
 
-def radii() -> Array:
-    """Positive Chebyshev points of the first kind of [-1, 1], falling, shape (RADII,)."""
-    return np.cos((2 * np.arange(RADII) + 1) * np.pi / (4 * RADII))
-
-
 @dataclass(frozen=True, eq=False)
 class Series(ReadOnlyArrays):
     """Chebyshev coefficients over [-1, 1] of functions that are even or odd."""
 
-    coefficients: ComplexArray  # coefficients of T_parity, T_(parity + 2), ..., shape (RADII, entries)
+    coefficients: ComplexArray  # coefficients of T_parity, T_(parity + 2), ..., shape (radii, entries)
     parity: int  # 0 for even functions, 1 for odd ones
 
     @property
@@ -67,7 +63,7 @@ class Series(ReadOnlyArrays):
         # Coefficients after the next two count only above the noise.
         standing_out = np.maximum(sizes - 2.0 * np.abs(weights[:, None]) * self.roughness, 0.0)
         beyond = np.cumsum(np.vstack([np.zeros(noise.size), standing_out[::-1]]), axis=0)[::-1]
-        first, last = (order - self.parity) // 2, RADII - _TAIL
+        first, last = (order - self.parity) // 2, RADII.size - _TAIL
         after = sizes[first + 1 : last + 1] + sizes[first + 2 : last + 2] + beyond[first + 3 : last + 3]
         errors = _SAFETY * (gains[first:last, None] * noise + after)
         errors = np.where(errors < np.inf, errors, np.inf)
@@ -76,15 +72,15 @@ class Series(ReadOnlyArrays):
 
 
 def series(values: ComplexArray, parity: int) -> Series:
-    """The series of functions sampled at the :func:`radii`, shape (RADII, entries)."""
+    """The series of functions sampled at the radii, shape (radii, entries)."""
     return Series(_transform(parity) @ values, parity)
 
 
 @cache
 def _transform(parity: int) -> Array:
     """Discrete cosine transform of a function of one parity, from its values at positive points."""
-    orders = np.arange(parity, 2 * RADII, 2)
-    matrix = 2.0 / RADII * np.cos(np.outer(orders, np.arccos(radii())))
+    orders = np.arange(parity, 2 * RADII.size, 2)
+    matrix = 2.0 / RADII.size * np.cos(np.outer(orders, np.arccos(RADII)))
     if parity == 0:
         matrix[0] *= 0.5
     return matrix
@@ -93,8 +89,9 @@ def _transform(parity: int) -> Array:
 @cache
 def _weights(order: int, parity: int) -> tuple[Array, Array]:
     """Coefficient of r^order in every T_k, and the factor of the sum up to each k on an error of the samples."""
-    orders = np.arange(parity, 2 * RADII, 2)
-    weights = np.array([chebyshev.cheb2poly(np.eye(2 * RADII)[k])[order] if k >= order else 0.0 for k in orders])
+    orders = np.arange(parity, 2 * RADII.size, 2)
+    one = np.eye(2 * RADII.size)
+    weights = np.array([chebyshev.cheb2poly(one[k])[order] if k >= order else 0.0 for k in orders])
     gains = np.abs(np.cumsum(weights[:, None] * _transform(parity), axis=0)).sum(axis=1)
     return weights, gains
 
@@ -167,7 +164,7 @@ class Sampled:
     falling: bool  # True if the series still fall at their end, unlike noise
     size: Array  # largest distance of every state from x, on the curve or its image, shape (n,)
     radius: float  # largest |z|
-    outermost: ComplexArray  # harmonics of the projection at the largest of the :func:`radii`, shape (angles,)
+    outermost: ComplexArray  # harmonics of the projection at the largest of the radii, shape (angles,)
 
     def taylor(self, powers: Powers) -> tuple[ComplexArray, Array]:
         """Coefficient of a monomial in H(W(z)), and its error: shape (n + 1,)."""
@@ -226,7 +223,7 @@ class Manifold:
         """The map on the manifold up to a radius; None where it is undefined."""
         at = self._at
         directions = at.turns()
-        displaced = at.displacements(self.curve, radius * radii()[:, None] * directions)
+        displaced = at.displacements(self.curve, radius * RADII[:, None] * directions)
         highest = np.power(radius, _HIGHEST)
         if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
             return None
@@ -241,8 +238,8 @@ class Manifold:
         size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
         blur, floor = (_expected_noise(at, reached) for reached in (np.abs(at.state), np.abs(at.state) + size))
         # A cosine transform spreads the noise of the samples evenly over the coefficients, smaller by this factor.
-        seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
-        shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
+        seen = np.sqrt(RADII.size / 2.0) * np.max([one.roughness for one in found], axis=0)
+        shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII.size - 2))) if seen[-1] > 0.0 else 1.0
         falling = any(one.falling[-1] for one in found)
         noise = np.maximum(floor, seen)
         return Sampled(found, noise, float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1])
@@ -266,7 +263,7 @@ class Manifold:
             return value, error
         random = np.random.default_rng(0)
         directions = at.turns()
-        largest = found.radius * radii()[0]
+        largest = found.radius * RADII[0]
         z = largest * directions
         off = {each: np.abs(excess) + uncertain for each, (excess, uncertain) in self._excess(found).items()}
         shifts, factors = [], []

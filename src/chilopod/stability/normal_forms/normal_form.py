@@ -64,57 +64,56 @@ def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | No
     """
     third = (3, 0) if at.real else (2, 1)
     manifold = Manifold(mapped, at, 3)
-    # Hill climbing in the amplitude: `growing` is its direction (0 before the first error is known), `turned` counts
-    # reversals, `best` is the sample with the least error of the coefficient.
+    # Hill climbing in the amplitude, up or down (`direction`, 0 before an error is known); `best` has the least error
+    # of the coefficient, infinite while the map seems linear.
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
     best = None
-    best_error, status = np.inf, NormalFormStatus.LINEAR
-    bends = ups = downs = turned = 0
-    growing = 0.0
+    best_error = np.inf
+    bends = ups = downs = reversals = 0
+    direction = 0.0
     for _ in range(_TRIALS):
-        found = manifold.sample(radius)
-        share, order, seen = (np.inf, 2, True) if found is None else _departure(found, at)
-        if found is not None and found.blur > _BLURRED * radius:  # the orbit's error hides the terms
+        sample = manifold.sample(radius)
+        departure, order, visible = (np.inf, 2, True) if sample is None else _departure(sample, at)
+        if sample is not None and sample.blur > _BLURRED * radius:  # the orbit's error hides the terms
             low, factor = radius, _UP
-        elif found is None or share > _TOO_FAR:
-            high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
-        elif (
-            seen and status is NormalFormStatus.LINEAR and downs < _DOWNS and found.falling and found.shrink < _RESOLVED
-        ):
-            high, factor, downs = radius, max(found.shrink, _FIRST_DOWN), downs + 1
-        elif bends < _BENDS and manifold.bend(found):
+        elif sample is None or departure > _TOO_FAR:
+            high, factor = radius, _FIRST_DOWN if sample is None else _toward(departure, order)
+        elif visible and best_error == np.inf and downs < _DOWNS and sample.falling and sample.shrink < _RESOLVED:
+            high, factor, downs = radius, max(sample.shrink, _FIRST_DOWN), downs + 1  # the series has not converged
+        elif bends < _BENDS and manifold.bend(sample):
             bends += 1
             continue  # once more, along the better curve
-        elif not seen:  # the map is linear to its error
-            best, low, ups = (found, dict(manifold.curve)), radius, ups + 1
+        elif not visible:  # the map is linear to its error
+            best, low, ups = (sample, dict(manifold.curve)), radius, ups + 1
             factor = _linear_up(mapped, at, manifold.curve, radius, high) if ups <= _UPS else np.inf
         else:
-            value, error = found.term(third)
+            value, error = sample.term(third)
             better = error < _BETTER * best_error
             if error < best_error:
-                best, best_error, status = (found, dict(manifold.curve)), error, NormalFormStatus.FOUND
-            full = _highest(found) > _FULL
-            if error <= _ENOUGH * abs(value) or (full and found.shrink > _RESOLVED):
+                best, best_error = (sample, dict(manifold.curve)), error
+            full = _highest(sample) > _FULL
+            if error <= _ENOUGH * abs(value) or (full and sample.shrink > _RESOLVED):
                 break
-            if growing == 0.0:
-                growing = -1.0 if full else 1.0
+            if direction == 0.0:
+                direction = -1.0 if full else 1.0
             elif not better:
-                growing, turned = -growing, turned + 1
+                direction, reversals = -direction, reversals + 1
                 radius = best[0].radius if best else radius
-            if turned > 1:
+            if reversals > 1:
                 break
             # The noise in the coefficient falls with the third power of the amplitude.
-            wanted = min(float(np.cbrt(error / max(_ENOUGH * abs(value), 1e-300))), _toward(share / _FAR, order))
-            factor = max(_toward(share, order) ** 0.5, wanted, 2.0) if growing > 0.0 else 0.5
+            wanted = min(float(np.cbrt(error / max(_ENOUGH * abs(value), 1e-300))), _toward(departure / _FAR, order))
+            factor = max(_toward(departure, order) ** 0.5, wanted, 2.0) if direction > 0.0 else 0.5
         bends = 0
         nearer = _within(radius * factor, low, high)
         if nearer is None:
             break
         radius = nearer
-    if best is None or (status is NormalFormStatus.LINEAR and np.isfinite(high)):
+    if best is None or (best_error == np.inf and np.isfinite(high)):
         return None
-    found, manifold.curve = best
-    return status, found, manifold.coefficient(found, third)
+    sample, manifold.curve = best
+    status = NormalFormStatus.LINEAR if best_error == np.inf else NormalFormStatus.FOUND
+    return status, sample, manifold.coefficient(sample, third)
 
 
 def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: ManifoldCurve, radius: float, high: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import finite_array
+from chilopod.flows.arguments import finite_array, shape_of
 from chilopod.frozen import Array
 from chilopod.stability.interface import Autonomous, SystemLike, checked_flow, is_autonomous, returns_per_period, sizes
 from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
@@ -34,11 +34,8 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     n, whole = system.dimension, return_duration(system) * returns_per_period(system)
     timed = isinstance(guess, tuple) and len(guess) == 2 and hasattr(guess[1], "__len__")
     times, states = guess if timed else (None, guess)
-    try:
-        shape = np.shape(states)
-    except ValueError:  # rows of different lengths
-        return None
-    if len(shape) != 2:
+    shape = shape_of(states)
+    if isinstance(shape, str) or len(shape) != 2:
         return None
     states = finite_array(states, (shape[0], n), "orbit")
     if timed:

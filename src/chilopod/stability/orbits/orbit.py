@@ -12,23 +12,15 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import check_arguments, finite_array
-from chilopod.flows.carrying import TooManySteps
+from chilopod.flows.carrying import REPEATED, TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
-from chilopod.stability.interface import (
-    Capabilities,
-    SystemLike,
-    check_system,
-    is_autonomous,
-    is_stiff,
-    offers,
-    sizes,
-)
-from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
+from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
+from chilopod.stability.krylov import LARGE, RESTS, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, shot
 from chilopod.stability.returns import (
-    REPEATED,
+    BESIDE,
     ReturnMap,
     Section,
     carried,
@@ -43,7 +35,6 @@ from chilopod.stability.returns import (
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.groups import symmetric_basis
 
-_RESTS = 1e-8  # motion, relative to the sizes at the guess, that counts as rest
 _RETURNED = 1e-12  # relative residual of a known orbit that is exact
 _MISSES = 1e-6  # error of a state, relative to its size, with which a return does not close
 _SINGULAR = 1e-13  # singular value of H - 1, relative to the largest, that counts as zero
@@ -55,7 +46,6 @@ _COARSE = 1e-11  # error, relative to the sizes of the states, from which a seco
 _CHANCE = 1e-13  # difference, relative to the sizes of the states, of two computations that may agree by chance
 _SYMMETRIC = 1e-12  # residual, relative to the sizes of the states, of a symmetry of the orbit
 _ALIKE = 1e-6  # distance of a return, relative to the sizes and its growth, from the symmetric one
-_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +74,8 @@ class Orbit(Shown, ReadOnlyArrays):
     @property
     def section(self) -> Section | None:
         """Section of ``image``, if the system does not depend on time."""
-        if self.image.normal is None:
-            return None
-        return Section(self.state, self.image.normal, self.image.duration)
+        normal = self.image.normal
+        return None if normal is None else Section(self.state, normal, self.image.duration)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         """The state, so that an orbit serves wherever a guess of one is wanted."""
@@ -293,7 +282,7 @@ def near_orbit(
             start = start._replace(states=start.states / size @ basis @ basis.T * size)
         found = shot(Problem(lambda _: system, None, shared, budget, careful), start, size, section)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
-    if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= _RESTS:
+    if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
@@ -328,12 +317,12 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
     image = return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
     if error is None:
-        # The state's error is that of the flow, from the derivative's error or, where that is coarse, from two
-        # computations, multiplied by the inverse of H - 1.
         if _relative(image.state - x, size) > _MISSES * max(1.0, float(np.abs(scaled).max())):
             said = f"the motion misses itself by {_relative(image.state - x, size):.1e} of its size"
             raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit and its period")
-        flow = _matrix(image.error, size) @ size
+        # The state's error is that of the flow, from the derivative's error or, where that is coarse, from two
+        # computations, multiplied by the inverse of H - 1.
+        flow = (image.error if isinstance(image.error, np.ndarray) else np.full(scaled.shape, image.error)) @ size
         stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():
             twice = REPEATED * np.abs(in_parts(system, x, image.duration) - image.state) + _CHANCE * size
@@ -343,11 +332,6 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative belongs to a state with this error: along the orbit's least certain direction.
     weakest = size * np.linalg.svd(scaled)[2][-1]
-    beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
-    bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / _BESIDE)
-    return Orbit(x, replace(image, error=_matrix(image.error, size) + bend), error)
-
-
-def _matrix(error: float | Array, size: Array) -> Array:
-    """The error of every entry of a derivative."""
-    return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
+    beside = return_map(system, x + BESIDE * weakest, with_error=False, section=section)
+    bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / BESIDE)
+    return Orbit(x, replace(image, error=image.error + bend), error)

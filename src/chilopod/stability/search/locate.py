@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
-from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
@@ -24,7 +23,6 @@ from chilopod.stability.equilibria import has_centre
 from chilopod.stability.interface import Family, checked_flow, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
-from chilopod.stability.returns import ReturnMap
 from chilopod.stability.search.samples import NEAR_FOLD, SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, rows, said
 from chilopod.stability.spectrum import spectrum
@@ -111,9 +109,7 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
         budget = Budget(_FLOWS * samples.orbits, samples.budget.remaining)
         fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising, budget)
         # Close to it a step may land on another curve with another fold.
-        if fold is None or not _next_to(samples, sample, fold, rising):
-            continue
-        if _comes_as_a_root(samples, sample, fold, rising):
+        if fold is not None and _next_to(samples, sample, fold, rising) and _as_a_root(samples, sample, fold, rising):
             return fold
     return None
 
@@ -129,7 +125,7 @@ def _next_to(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: b
     )
 
 
-def _comes_as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: bool) -> bool:
+def _as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising: bool) -> bool:
     """True if the multiplier approaches +1 as a root, as in a fold; at a crossing branch it does so linearly."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
@@ -158,8 +154,6 @@ def _at_rest(samples: Samples, value: float, state: Array, period: float) -> boo
 
 
 _DESCRIBING = 400  # budget of return maps for the orbits beside a point
-_FOLLOWED = 10.0  # factor on the error of the first orbit for that of followed ones
-_LEAST_ERROR = 1e-15
 _GRACE = 0.7  # s, for the description of found points after the time limit
 _BESIDE = 1e-6  # distance from a crossing at which rates of change are computed, relative to the interval
 
@@ -321,7 +315,7 @@ def located(
         for crossing in found.crossings:
             if crossing.event is CircleEvent.PLUS and here.explains(crossing.value):
                 continue
-            samples.allow(returns)
+            samples.budget.left = returns
             try:
                 with samples.budget, UserCode("family", crossing.value):
                     results += described(crossing, block)
@@ -345,8 +339,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     """The crossings in every block of the return map."""
     try:
         blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
-        # The first orbit may contract strongly within a return, and followed ones less.
-        uncertain = _FOLLOWED * _relative(samples.of_flow())
+        uncertain = samples.of_flow
     except SpentError as error:
         return [(None, Crossings((), SearchStatus.BUDGET, (error.problem,), 0))]
 
@@ -356,7 +349,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
             shape = found[0].image.jacobian.shape
             errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
         elif block is None or block.trivial:
-            errors = samples.errors(found, uncertain)
+            errors = samples.errors(found)
         else:  # a symmetry-breaking mode does not affect the orbit's accuracy
             errors = np.full(len(found), uncertain)
         return np.stack([each.image.jacobian for each in found]), errors
@@ -437,11 +430,3 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         value_text = bounded(point.value, point.error_bound)
         return f"at {value_text} a multiplier only touches the unit circle and goes back: nothing changes"
     return point
-
-
-def _relative(image: ReturnMap) -> float:
-    """Error of the derivative over its largest entry, or over one, in units that balance the states."""
-    # An entry of round-off gives no information on the units.
-    units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
-    largest = max(1.0, float(np.abs(image.jacobian * units / units[:, None]).max()))
-    return max(_LEAST_ERROR, float(np.max(image.error * units / units[:, None])) / largest)

@@ -1,9 +1,16 @@
-"""A family of systems sampled along its parameter: known orbits, or orbits followed from a first guess."""
+"""A family of systems sampled along its parameter: known orbits, or orbits followed from a first guess.
+
+A followed orbit is first sampled along a path to the upper end (``_whole_path``), each sample corrected (``_sampled``)
+from a prediction (``_predicted``); later ones lie between two of them (``_between``). Newton's method may find another
+orbit near by: a sample that jumps, turns back at a multiplier +1, or is not on the branch of the last one is not taken,
+and a shorter step is tried.
+"""
 
 from __future__ import annotations
 
 import bisect
 import contextlib
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +18,14 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode
+from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_place import Sample, through
-from chilopod.stability.interface import CheckedFamily, Family, SystemLike, sizes
+from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
 from chilopod.stability.orbits.orbit import from_known, known_state, near_orbit, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.returns import ReturnMap, Section, return_duration, return_map, return_maps, section_at
+from chilopod.stability.returns import BESIDE, return_duration, return_map, return_maps, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -32,7 +40,6 @@ _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit a
 _DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
 _ATTEMPTS = 24  # largest number of steps to a value from the sample beside it: ten halvings, then more
 _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as accurate as the flow
-_BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
 _SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
 _HALVED, _CLOSER = 13, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
@@ -43,8 +50,9 @@ _BEHIND = 6  # number of samples of a prediction
 _BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
 _TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
 _TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
-_NEAR_MERGED = 1e-2  # gap, relative to the interval, in which a failed correction confirms that they do
-_MERGED = 1e-5  # gap, relative to the interval, in which they still do
+_NEAR_MERGED = 1e-2  # gap, relative to the interval, in which a failed correction confirms that two orbits meet
+_MERGED = 1e-5  # gap, relative to the interval, below which no sample between two orbits that meet is tried
+_FOLLOWED, _LEAST_ERROR = 10.0, 1e-15  # factor on the error of the first orbit for that of others, and least error
 _JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 
 
@@ -64,26 +72,24 @@ class Samples:
         self.spent = ""  # the limit that ended the path
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
         self.count = 0  # orbits computed
-        self._taken = 0.0  # return maps of those before :meth:`allow`, without the first
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
         self._bends: dict[float, float] = {}
         self._normal: Array | None = None  # of the section of the last orbit
-        self.orbits = budget
-        self._allowed = _RETURNS * budget
-        self.budget = Budget(max(self._allowed, _FIRST), seconds)
+        self.orbits, allowed = budget, _RETURNS * budget
+        self.budget = Budget(max(allowed, _FIRST), seconds)
         with self.budget, UserCode("family", low):
             self.first = searched_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
-        self.budget.left = self._allowed
+        self.budget.left, self.budget.taken = allowed, 0.0  # without the first orbit
         self.known = guess is None and self.family.timed
         if not self.known:
             self._keep(Sample(low, self.first.state, self.first.image))
         with self.budget:
-            self.path = [] if self.known else self._to_merging(self._followed())
+            self.path = [] if self.known else self._up_to_merging(self._whole_path())
         self.end = self.path[-1].value if self.path else high
-        self.allow(self._allowed)
+        self.budget.left = allowed
 
     def at(self, values: Array) -> list[Sample]:
         """Samples at values in the interval; an AnalysisError if one is missing, while the others are kept."""
@@ -107,11 +113,6 @@ class Samples:
                 raise self._missing[value]
         return [self._by_value[value] for value in wanted]
 
-    def allow(self, returns: int) -> None:
-        """Set the limit of further return maps."""
-        self._taken += self._allowed - self.budget.left
-        self._allowed = self.budget.left = returns
-
     def within(self, low: float, high: float) -> list[float]:
         """Values with a sample between two others."""
         return self._values[bisect.bisect_left(self._values, low) : bisect.bisect_right(self._values, high)]
@@ -120,14 +121,15 @@ class Samples:
         """Number of further orbits, at the mean cost of those so far."""
         if self.budget.late:
             return 0
-        price = (self._taken + self._allowed - self.budget.left) / max(self.count, 1)
+        price = self.budget.taken / max(self.count, 1)
         # Failed orbits do not predict the cost of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
-    def errors(self, samples: list[Sample], of_flow: float) -> Array:
-        """Relative errors of the derivatives at samples of a followed orbit: that of the flow and its derivative,
-        ``of_flow``, and that due to the orbit's error, the flow's times the inverse of H - 1."""
-        units, result = self.size / self.size[:, None], np.full(len(samples), of_flow)
+    def errors(self, samples: list[Sample]) -> Array:
+        """Relative errors of the derivatives at samples of a followed orbit: that of the flow and its derivative, and
+        that due to the orbit's error, the flow's times the inverse of H - 1."""
+        of_flow, units = self.of_flow, self.size / self.size[:, None]
+        result = np.full(len(samples), of_flow)
         scaled = np.array([each.image.jacobian for each in samples]) * units
         _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
         for i in np.flatnonzero(values[:, -1] <= _SURE):
@@ -135,19 +137,25 @@ class Samples:
             if sample.value not in self._bends:
                 system, duration = self.family(sample.value), sample.image.duration
                 section = section_at(system, sample.orbit, self.size, duration)
-                beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[i, -1], False, section)
+                beside = return_map(system, sample.orbit + BESIDE * self.size * rows[i, -1], False, section)
                 change = (beside.jacobian - sample.image.jacobian) * units
-                self._bends[sample.value] = float(np.linalg.norm(change)) / _BESIDE
+                self._bends[sample.value] = float(np.linalg.norm(change)) / BESIDE
             # Where H - 1 vanishes along a direction, the rest is of third order, except in special cases.
             off = min(of_flow / max(float(values[i, -1]), of_flow), of_flow ** (1.0 / 3.0))
             result[i] = min(1.0, of_flow + self._bends[sample.value] * off)
         return result
 
-    def of_flow(self) -> ReturnMap:
-        """The return map at the first orbit, with the error of the flow alone."""
-        if Sample(self.low, self.first.state, self.first.image).off_plus_one > NEAR_FOLD:
-            return self.first.image  # the orbit is as accurate as the flow
-        return return_map(self.family(self.low), self.first.state, True, self.first.section)
+    @functools.cached_property
+    def of_flow(self) -> float:
+        """Relative error of the derivative of the flow over a return, in units that balance the states, from that at
+        the first orbit: it may contract strongly within a return, and followed ones less."""
+        image = self.first.image
+        if Sample(self.low, self.first.state, image).off_plus_one <= NEAR_FOLD:  # the orbit is less accurate
+            image = return_map(self.family(self.low), self.first.state, True, self.first.section)
+        # An entry of round-off gives no information on the units.
+        units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
+        largest = max(1.0, float(np.abs(image.jacobian * units / units[:, None]).max()))
+        return _FOLLOWED * max(_LEAST_ERROR, float(np.max(image.error * units / units[:, None])) / largest)
 
     def jumped(self, orbit: Array, guess: Array) -> bool:
         """True if an orbit is so far from its prediction that it must be another one."""
@@ -176,29 +184,25 @@ class Samples:
         self.budget.take(0)  # before a family that may be slow
         system = self.family(value)
         with self.family.calling(value):
-            start, section = self._start(system, near, beside.image.duration)
-            orbit = near_orbit(system, start, False, self.budget, section, units=self.size)
+            duration = beside.image.duration if is_autonomous(system) else return_duration(system)
+            section = section_at(system, near, self.size, duration)
+            if section is not None:  # one normal while it serves, so that orbits are smooth
+                if self._normal is None or (section.normal * self.size) @ (self._normal * self.size) < _ACROSS:
+                    self._normal = section.normal
+                section = replace(section, normal=self._normal)
+            orbit = near_orbit(system, Nodes(near[None], duration), False, self.budget, section, units=self.size)
         return Sample(value, orbit.state, orbit.image)
-
-    def _start(self, system: SystemLike, near: Array, duration: float) -> tuple[Nodes, Section | None]:
-        """A state as a guess, and the section there, with one normal while that serves, so that orbits are smooth."""
-        section = section_at(system, near, self.size, duration)
-        if section is None:
-            return Nodes(near[None], return_duration(system)), None
-        if self._normal is None or (section.normal * self.size) @ (self._normal * self.size) < _ACROSS:
-            self._normal = section.normal
-        return Nodes(near[None], duration), replace(section, normal=self._normal)
 
     def _between(self, value: float) -> Sample:
         """A sample between two others, from their orbits."""
         around = self._around(min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1))
         try:
-            found = self._sampled(value, self._foreseen(around, value), around[0])
+            found = self._sampled(value, self._predicted(around, value), around[0])
             if found.passes(around[0]) and found.passes(around[1]) and not self._goes_through(around[0], found):
                 raise AnalysisError("is another orbit", field="orbit")
             return found
         except AnalysisError:
-            reached = self._follow(around[:1], value, _ATTEMPTS)
+            reached = self._followed(around[:1], value, _ATTEMPTS)
             for sample in reached:
                 if sample.value == value:
                     return sample
@@ -214,7 +218,7 @@ class Samples:
         beyond = self._values[max(before - 1, 0) : before] + self._values[after : after + 1]
         return [self._by_value[v] for v in (a, b, *beyond)]
 
-    def _foreseen(self, samples: list[Sample], value: float) -> Array:
+    def _predicted(self, samples: list[Sample], value: float) -> Array:
         """The orbit at a value by the polynomial through samples, or the line through two if that differs much."""
         if len(samples) == 1:
             return samples[0].orbit
@@ -228,11 +232,11 @@ class Samples:
         allowed = _BENT * float((np.abs(step) / self.size).max())
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
-    def _followed(self) -> list[Sample]:
+    def _whole_path(self) -> list[Sample]:
         """Samples of the followed orbit from the lower end, those of the first values of a search among them."""
         path = [self._by_value[self.low]]
         for value in first_values(self.low, self.high)[1:].tolist():
-            reached = self._follow(path, value)
+            reached = self._followed(path, value)
             for sample in reached:
                 self._keep(sample)
             path += reached
@@ -241,7 +245,7 @@ class Samples:
                 break
         return path
 
-    def _to_merging(self, path: list[Sample]) -> list[Sample]:
+    def _up_to_merging(self, path: list[Sample]) -> list[Sample]:
         """The path up to a pitchfork where the orbit meets another one: a multiplier comes to +1 and turns back."""
         i = 1
         while i < len(path) - 2:
@@ -250,7 +254,7 @@ class Samples:
                 continue
             gap = path[i + 1].value - path[i].value
             try:
-                found = None if gap <= _MERGED * self.width else self._inside(path[: i + 1], path[i + 1])
+                found = None if gap <= _MERGED * self.width else self._nearer(path[: i + 1], path[i + 1])
             except SpentError:
                 break
             if found is not None:
@@ -264,17 +268,17 @@ class Samples:
                 i += 1
         return path
 
-    def _inside(self, behind: list[Sample], ahead: Sample) -> Sample | None:
+    def _nearer(self, behind: list[Sample], ahead: Sample) -> Sample | None:
         """Sample between the last one and another, in the middle or nearer to the last; None if there is none."""
         for part in (0.5, 0.25, 0.125, 0.0625):
             value = behind[-1].value + part * (ahead.value - behind[-1].value)
             try:
-                return self._sampled(value, self._foreseen(behind[: -_BEHIND - 1 : -1], value), behind[-1])
+                return self._sampled(value, self._predicted(behind[: -_BEHIND - 1 : -1], value), behind[-1])
             except AnalysisError:
                 continue
         return None
 
-    def _follow(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
+    def _followed(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
         """Samples from the last one to ``value``, by smaller steps after failures; fewer where these end."""
         path, target = list(behind), value
         smallest = _SHORTEST * abs(value - path[-1].value)
@@ -282,11 +286,11 @@ class Samples:
             if attempts == 0 or (attempts is None and self.count + len(path) - len(behind) >= self.orbits):
                 break
             attempts = None if attempts is None else attempts - 1
-            last, guess = path[-1], self._foreseen(path[: -_BEHIND - 1 : -1], target)
+            last, guess = path[-1], self._predicted(path[: -_BEHIND - 1 : -1], target)
             try:
                 found = self._sampled(target, guess, last)
                 # A large jump shows that Newton's method has found another orbit.
-                other = self.jumped(found.orbit, guess) or not self._connected(last, guess, found)
+                other = self.jumped(found.orbit, guess) or not self._on_same_branch(last, guess, found)
                 other = other or self._turns_back(path[-2:], found)
             except SpentError:
                 break
@@ -316,7 +320,7 @@ class Samples:
         passes = np.sign(ahead) != np.sign(rates[1])
         return bool(passes or (abs(ahead) < abs(rates[1]) < abs(rates[2])))
 
-    def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
+    def _on_same_branch(self, last: Sample, guess: Array, found: Sample) -> bool:
         """True if an orbit that was not predicted is on the branch of the last one: then another lies about halfway
         between them, in a fold at the square root of a half; towards another branch a jump remains."""
         change = found.orbit - last.orbit

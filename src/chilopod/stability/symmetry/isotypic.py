@@ -102,16 +102,14 @@ def _blocks(group: Group, random: np.random.Generator) -> list[Block] | None:
     q, n = group.orthogonal, group.dimension
     sets = [np.flatnonzero(group.component == number) for number in range(group.component.max() + 1)]
     blocks: list[Block] = []
-    characters: list[Array] = []
     for space in (each for coordinates in sets for each in _irreducible(q, coordinates, random)):
         rho = space.T @ q @ space
         character = np.trace(rho, axis1=1, axis2=2)
-        if any(abs(character @ other) > 0.5 * group.order for other in characters):
+        if any(abs(character @ np.trace(each.representation, axis1=1, axis2=2)) > 0.5 * group.order for each in blocks):
             continue
         real = _is_real(rho, character)
         if real is None:
             return None
-        characters.append(character)
         d = space.shape[1]
         # Real type: projection to the first coordinate of all copies, and from there to the others; else to all copies.
         weights = rho[:, :, 0] if real else 0.5 * character[:, None]

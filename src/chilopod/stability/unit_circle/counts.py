@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.spectra import UNKNOWN, CircleEvent, Crossing, Root, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
 
@@ -27,7 +28,6 @@ _ROUNDS = 200  # rounds of balancing: each adds a root, joins two or counts near
 _GROWTH = 8.0  # ratio of successive distances from a root at which multipliers are counted
 _JUMP, _WIDER = 0.5, 100.0  # part of a multiplier's change that remains in a jump, and ratio of the intervals' widths
 _SHADOW = 1.5  # distance of a crossing that explains a touch, in widths of the touch
-_EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass
@@ -246,7 +246,7 @@ class Accounts:
                 at = self._parameter(root.place)
                 self._remark(f"a multiplier jumps across the circle at {at:.9g}", (left, right))
                 said = True
-            elif all(abs(root.place - other.place) > 16.0 * _EPSILON * abs(root.place) for other in roots):
+            elif all(abs(root.place - other.place) > 16.0 * EPSILON * abs(root.place) for other in roots):
                 roots += [root] * self._is_critical(root)
         self._report.spent |= spectra.left <= 0
         if not (said or self._report.spent) and (not roots or spectra.holes(x, y)):

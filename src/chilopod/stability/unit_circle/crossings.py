@@ -16,6 +16,7 @@ import numpy as np
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
+from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
 from chilopod.stability.unit_circle.spectra import (
     TARGETS,
@@ -43,7 +44,7 @@ _PROBES = 65
 _FINEST_PROBE = 1e-6  # finest spacing of probes, relative to the interval
 _OF_ERROR = 1e-4  # width of a root's enclosure, relative to its error from those of all entries
 _NARROW = 1e-13  # narrowest enclosure of a root, relative to its value
-_DIGITS = 4.0 * float(np.finfo(float).eps)  # rounding of a root's place, relative to its value
+_DIGITS = 4.0 * EPSILON  # rounding of a root's place, relative to its value
 _CLOSE = 0.25  # predicted approach to the circle, relative to the nearer end, that calls for a probe
 
 
@@ -97,7 +98,7 @@ def find_crossings(
     for each in found:
         value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
         crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
-    return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), spectra.evaluations)
+    return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), len(spectra.known))
 
 
 def first_values(low: float, high: float) -> Array:
@@ -107,8 +108,7 @@ def first_values(low: float, high: float) -> Array:
 
 
 def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any], Callable[[Any], Any]]:
-    """Ends of an interval in an even coordinate, over decades the logarithm, the parameter at places there, and the
-    inverse."""
+    """Ends of an interval in an even coordinate, over decades the logarithm; the parameter at places; the inverse."""
     inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
     a, b = float(inward(low)), float(inward(high))
 
@@ -236,7 +236,7 @@ class _Finder:
             self.b,
             error=lambda places: spectra.function_error(places, event),
             left=lambda: spectra.left - spare,
-            skip=spectra.without_pair if event is CircleEvent.PAIR and not spectra.conservative else None,
+            skip=spectra.without_pair if event is CircleEvent.PAIR else None,
         )
 
     def _roots(self, event: CircleEvent, found: Zeros) -> list[Root]:
@@ -253,11 +253,12 @@ class _Finder:
             if spectra.left <= 0:
                 report.spent = True
                 break
-            if event is CircleEvent.PAIR and not spectra.conservative and spectra.without_pair(left, right):
+            if event is CircleEvent.PAIR and spectra.without_pair(left, right):
                 continue
             if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
-                if not spectra.clear(left):  # or two real multipliers have product 1
-                    report.leave(f"{LOST}, at {self.shown(left):.9g}")  # zero only by rounding
+                # Zero only by rounding, or two real multipliers have product 1.
+                if (np.abs(spectra.margins(left)) <= spectra.margin_errors(left)).any():
+                    report.leave(f"{LOST}, at {self.shown(left):.9g}")
                 continue
             roots.append(Root(left, left, left, event) if left == right else self._root(event, left, right))
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]

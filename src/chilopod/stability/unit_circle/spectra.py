@@ -17,21 +17,20 @@ from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
-from chilopod.stability.spectrum import DRAWS, SAFETY, disturbed
+from chilopod.stability.spectrum import DRAWS, EPSILON, SAFETY, disturbed
 
 Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
 entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, for a missing matrix,
 and may be called twice for a value."""
 
-_ROUNDING = 2.0 * np.finfo(float).eps
+_ROUNDING = 2.0 * EPSILON
 _SMALLEST = -1e300  # logarithm of zero
 _LARGEST = 1e150  # modulus to which larger multipliers are reduced
 _TURNING = 1e-6  # least imaginary part of a complex multiplier, relative to its size
 _SMALL = 1e-3  # modulus of multipliers that are far inside the circle
 _SPARE = 8  # number of factors, beside the idle ones, in the sum over factors to leave out
 UNKNOWN = 1.0  # error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined
-_EPSILON = float(np.finfo(float).eps)
 _ULPS = 64.0
 _TELLING = 0.01  # error of a margin, from -1 to 1, that determines the multiplier's side
 _FILL = 1e-30  # value in place of zeros, relative to the largest entry, for the balance of a triangular matrix
@@ -89,13 +88,13 @@ class Spectra:
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
         self.values: list[float] = []  # values with a matrix, in order
+        self.known: dict[float, ComplexArray | None] = {}  # eigenvalues; None for a missing matrix
         self.size = 0  # number of eigenvalues, once a matrix is known
         self.idle = dict.fromkeys(CircleEvent, 0)  # numbers of factors of an event's function that vanish throughout
         self.conservative = False  # multipliers come in pairs with product 1 throughout, and may stay on the circle
         self._matrices = matrices
         self._budget = budget
         self._affordable = affordable
-        self._known: dict[float, ComplexArray | None] = {}
         self._stretch: dict[float, float] = {}
         self._disturbed: dict[float, ComplexArray] = {}
         self._units: Array | None = None
@@ -106,35 +105,30 @@ class Spectra:
         return self.idle[CircleEvent.PLUS] + self.idle[CircleEvent.MINUS]
 
     @property
-    def evaluations(self) -> int:
-        """Number of evaluated values."""
-        return len(self._known)
-
-    @property
     def left(self) -> int:
         """Remaining number of values."""
-        left = self._budget - len(self._known)
+        left = self._budget - len(self.known)
         return left if self._affordable is None else min(left, self._affordable())
 
     def at(self, values: Array) -> ComplexArray:
         """Eigenvalues by falling modulus, shape (k, m); NaN for a missing matrix."""
         wanted = values.tolist()
-        missing = sorted({value for value in wanted if value not in self._known})
+        missing = sorted({value for value in wanted if value not in self.known})
         if missing:
             self._compute(missing)
         none = np.full(self.size, np.nan + 0j)
-        each = [self._known[value] for value in wanted]
+        each = [self.known[value] for value in wanted]
         return np.array([none if nu is None else nu for nu in each]).reshape(len(wanted), self.size)
 
     def _compute(self, values: list[float]) -> None:
-        self._known.update(dict.fromkeys(values))
+        self.known.update(dict.fromkeys(values))
         found = self._ask(values)
         if not found:
             return
         balanced = self._balanced(np.array([matrix for _, matrix, _ in found]))
         self.size = balanced.shape[-1]
         for (value, _, _), nu, stretch in zip(found, _eigenvalues(balanced), _stretches(balanced), strict=True):
-            self._known[value] = nu
+            self.known[value] = nu
             self._stretch[value] = float(stretch)
             bisect.insort(self.values, value)
 
@@ -159,7 +153,7 @@ class Spectra:
     def exists(self, value: float) -> bool:
         """True if a matrix exists at a value, which is evaluated if unknown."""
         self.at(np.array([value]))
-        return self._known[value] is not None
+        return self.known[value] is not None
 
     def beside(self, place: float, apart: float = 0.0) -> tuple[float, float]:
         """The nearest values with a matrix beside a place, at a least distance; else the place, or one beyond it."""
@@ -170,13 +164,13 @@ class Spectra:
 
     def holes(self, low: float, high: float) -> bool:
         """True if a matrix is missing between two values."""
-        return any(low < value < high and nu is None for value, nu in self._known.items())
+        return any(low < value < high and nu is None for value, nu in self.known.items())
 
     def without_pair(self, low: float, high: float) -> bool:
         """True if all complex multipliers are clear of the circle between two values, judged by known values: the
         bialternate product also vanishes where two real multipliers have product 1."""
         values = self.values[bisect.bisect_left(self.values, low) : bisect.bisect_right(self.values, high)]
-        if len(values) < 2:
+        if self.conservative or len(values) < 2:
             return False
         nu = self.at(np.array(values))
         # Rounding decides if small ones are real or a pair; a pair that grew from them would change the count.
@@ -217,10 +211,6 @@ class Spectra:
         """Bounds on the errors of :meth:`margins`."""
         moved = margins(self.disturbed(np.array([value]))[0]) - self.margins(value)
         return np.asarray(SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
-
-    def clear(self, value: float) -> bool:
-        """True if the distance of all multipliers from the circle exceeds their errors."""
-        return bool((np.abs(self.margins(value)) > self.margin_errors(value)).all())
 
     def factor_sizes(self, value: float, event: CircleEvent) -> tuple[Array, Array]:
         """Rising sizes of the factors of an event's function, and their errors."""
@@ -266,8 +256,8 @@ class Spectra:
         """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
         most = min(200, max(self.left, 1))
         finest = max(within, 5e-324)
-        place = float(brentq(function, a, b, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
-        reach = within + 4.0 * _EPSILON * abs(place)
+        place = float(brentq(function, a, b, xtol=finest, rtol=4 * EPSILON, maxiter=most, disp=False))
+        reach = within + 4.0 * EPSILON * abs(place)
         return Root(place, max(place - reach, a), min(place + reach, b), event, known=(a, b))
 
     def tolerances(self, root: Root) -> Array:

@@ -2,10 +2,10 @@
 
 The interval is cut until the function is a polynomial of degree eight on every piece, or sixteen on a wide one, to a
 small part of its size there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to its own
-error. So every piece
-consists of parts with a certain sign and narrow parts where the function may vanish. Between opposite signs such a part
-contains one zero, if the polynomial is monotonic there and the function has these signs at both ends. Any other part,
-which may contain no zero, two, or a double one, is refined until it has a sign or is zero within its error.
+error. So every piece consists of parts with a certain sign and narrow parts where the function may vanish. Between
+opposite signs such a part contains one zero, if the polynomial is monotonic there and the function has these signs at
+both ends. Any other part, which may contain no zero, two, or a double one, is refined until it has a sign or is zero
+within its error.
 """
 
 from __future__ import annotations
@@ -39,8 +39,7 @@ DENSE = np.linspace(-1.0, 1.0, 65)
 
 
 def interpolated(values: Array, places: Array) -> tuple[Array, Array, Array]:
-    """Chebyshev coefficients of polynomials through values at one of the sets of places above, errors, and values at
-    ``DENSE``."""
+    """Chebyshev coefficients of polynomials through values at a set of places above, errors, values at ``DENSE``."""
     fit, at_checks, at_dense, checks = _matrices(places.size)
     coefficients: Array = fit @ np.delete(values, checks, axis=0)
     off = np.abs(at_checks @ coefficients - values[checks]).max(axis=0)
@@ -49,8 +48,7 @@ def interpolated(values: Array, places: Array) -> tuple[Array, Array, Array]:
 
 @cache
 def _matrices(count: int) -> tuple[Array, Array, Array, list[int]]:
-    """Coefficients from values at the nodes among some places, from these values at checks and ``DENSE``, and indices
-    of the checks."""
+    """Matrices from values at nodes to coefficients, from these to values at checks and ``DENSE``; the checks."""
     places, first = (FEW_PLACES, 5) if count == FEW_PLACES.size else (MORE_PLACES[:count], DEGREE + 1)
     checks = [first, first + 1]
     nodes = np.delete(places, checks)
@@ -120,7 +118,7 @@ def find_zeros(
     reported. Zeros between two values for which ``skip`` is true are ignored.
     """
     search = _Search(function, error, skip, low, high)
-    room_left = left if left is not None else lambda: 20_000 - search.asked
+    room_left = left if left is not None else lambda: 20_000 - len(search.signs)
     pieces = [(low, high)]
     while pieces:
         room = max(room_left(), 0) // (2 * PLACES.size)
@@ -168,7 +166,6 @@ class _Search:
     low: float
     high: float
     spent: bool = False
-    asked: int = 0
     signs: dict[float, float] = field(default_factory=dict)  # wherever the function was evaluated
     parts: list[_Part] = field(default_factory=list)  # in order
 
@@ -202,7 +199,6 @@ class _Search:
 
     def _ask(self, places: Array) -> tuple[Array, Array]:
         signs, logs = self.function(places)
-        self.asked += places.size
         self.signs.update(zip(places.tolist(), signs.tolist(), strict=True))
         return signs, logs
 
