@@ -58,6 +58,7 @@ _AHEAD = 10.0 * SHORTEST * LONGEST  # distance ahead of a lost curve's end at wh
 _JUMPS, _SMOOTH = 0.3, 0.1  # change of the derivative, relative to it, in a grazing; and largest part of it before
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
+_STEADY = 1e-8  # largest value of the parameter, relative to its scale, along a family by energy
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]
@@ -119,13 +120,20 @@ class Branch(Result):
 
     def _lines(self) -> list[str]:
         values = [point.value for point in self.points]
+        head = f"Branch: {len(values)} points between {min(values):.9g} and {max(values):.9g}, periods: {self.periods}"
         special = [
             each.bifurcation.row if each.bifurcation else (each.special.label, f"{each.value:.12g}", "")
             for each in self.points
             if each.special is not None
         ]
+        if len(values) > 1 and max(map(abs, values)) <= _STEADY * self.scale:  # a family by energy
+            special = [(each.special.label, f"{each.period:.9g}", "") for each in self.special_points if each.special]
+            values = [float(point.period or 0.0) for point in self.points]
+            head = (
+                f"Branch by energy: {len(values)} orbits with periods between {min(values):.9g} and {max(values):.9g}"
+            )
         return [
-            f"Branch: {len(values)} points between {min(values):.9g} and {max(values):.9g}, periods: {self.periods}",
+            head,
             f"ends: {self.ending.sentence}{f' ({self.reason})' if self.reason else ''}",
             *(["special points:", *rows(special)] if special else ["special points: none"]),
             "stability along it:",
