@@ -28,7 +28,7 @@ from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.interface import offers, sizes, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import return_duration, whole_period
+from chilopod.stability.returns import event_beside, return_duration, whole_period
 from chilopod.stability.symmetry.groups import reverses
 
 BUDGET = 20_000
@@ -171,6 +171,17 @@ class _Half:
         """Follow the curve from its first point, towards its tangent."""
         self.curve.first = spot
         self.ending, self.reason, _ = trace(self.curve, spot, steps, points, self.look, self.keep)
+        if self.ending is Ending.LOST:
+            end = self.last.spot
+            # The start has one tangent for both directions.
+            ahead = end.tangent if self.points else spot.tangent
+
+            def derivative(distance: float) -> Array:
+                place = end.frame.moved(end.place, distance * ahead)
+                return self.curve.evaluated(place, end.frame).jacobian
+
+            system, duration = self.curve.system(end.values), end.image.duration
+            self.reason = event_beside(system, end.place.state, duration, derivative) or self.reason
 
     def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
