@@ -116,6 +116,8 @@ def test_a_grazing_that_ends_the_curve_is_named(rising, border):
     curve = follow2(family2, fold.bifurcation, BOX, second=0.0, rising=rising)
     assert curve.endings[1] is Ending.LOST
     assert curve.reasons[1].startswith("just ahead the orbit grazes an event")
+    assert curve.remarks == (curve.reasons[1],)
+    assert curve.to_dataset().attrs["remarks"] == curve.reasons[1]
     assert curve.values[-1] == pytest.approx([0.0, border], abs=1e-5)
 
 

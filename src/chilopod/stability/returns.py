@@ -304,7 +304,6 @@ def event_beside(system: SystemLike, x: Array, duration: float, derivative: Call
     with contextlib.suppress(ChilopodError):
         if jumps_at_ends(system, x, duration):
             return EVENT_AT_ZERO
-    with contextlib.suppress(ChilopodError):
         # A very unstable orbit meets other events on both sides.
         if _jumps_within(derivative, _PAST) and not _jumps_within(derivative, -_PAST):
             return _GRAZES
@@ -313,19 +312,17 @@ def event_beside(system: SystemLike, x: Array, duration: float, derivative: Call
 
 def _jumps_within(derivative: Callable[[float], Array], reach: float) -> bool:
     """True if a derivative jumps between zero and some distance: its change there remains however short the way is."""
-    low, high = 0.0, reach
-    before, after = derivative(low), derivative(high)
-    whole = float(np.linalg.norm(after - before))
-    if not whole > _JUMPS * max(1.0, float(np.linalg.norm(before))):
-        return False
+    low, high, before, after = 0.0, reach, derivative(0.0), derivative(reach)
+    least = max(_JUMPS * max(1.0, float(np.linalg.norm(before))), 0.5 * float(np.linalg.norm(after - before)))
     for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        between = derivative(middle)
+        if not float(np.linalg.norm(after - before)) > least:
+            return False
+        between = derivative(middle := 0.5 * (low + high))
         if np.linalg.norm(between - before) > np.linalg.norm(after - between):
             high, after = middle, between
         else:
             low, before = middle, between
-    return float(np.linalg.norm(after - before)) > 0.5 * whole
+    return True
 
 
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:

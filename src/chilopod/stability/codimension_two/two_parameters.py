@@ -170,18 +170,16 @@ class _Half:
     def trace(self, spot: Spot, steps: tuple[float, float], points: int | None) -> None:
         """Follow the curve from its first point, towards its tangent."""
         self.curve.first = spot
+        self.last = self.last._replace(spot=spot)
         self.ending, self.reason, _ = trace(self.curve, spot, steps, points, self.look, self.keep)
         if self.ending is Ending.LOST:
-            end = self.last.spot
-            # The start has one tangent for both directions.
-            ahead = end.tangent if self.points else spot.tangent
+            end, evaluated = self.last.spot, self.curve.evaluated
 
             def derivative(distance: float) -> Array:
-                place = end.frame.moved(end.place, distance * ahead)
-                return self.curve.evaluated(place, end.frame).jacobian
+                return evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
 
-            system, duration = self.curve.system(end.values), end.image.duration
-            self.reason = event_beside(system, end.place.state, duration, derivative) or self.reason
+            about = self.curve.system(end.values), end.place.state, end.image.duration
+            self.reason = event_beside(*about, derivative) or self.reason
 
     def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""

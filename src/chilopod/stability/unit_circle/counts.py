@@ -203,10 +203,8 @@ class Accounts:
 
     def _smooth(self, root: Root) -> bool:
         """False if a multiplier jumps over the circle at a root of an event's function: it is never on it."""
-        if root.touch:
-            return True
-        nu = self._spectra.at(np.array([root.place]))[0]
-        ranks = [int(np.abs(nu - each.multiplier).argmin()) for each in self._critical(root)]
+        nu, crossings = self._spectra.at(np.array([root.place]))[0], [] if root.touch else self._critical(root)
+        ranks = [int(np.abs(nu - each.multiplier).argmin()) for each in crossings]
         return not any(self._jumps(root.place, rank) for rank in ranks)
 
     def _lost(self, root: Root) -> bool:
@@ -284,9 +282,8 @@ class Accounts:
         width = max(right - left, 4.0 * float(np.spacing(abs(place))))
         wide = spectra.beside(place, _WIDER * width)
         small, large = (abs(spectra.margins(b)[rank] - spectra.margins(a)[rank]) for a, b in ((left, right), wide))
-        if not small > _JUMP * large:
-            return False
-        return bool(small > _WIDER * (spectra.margin_errors(left)[rank] + spectra.margin_errors(right)[rank]))
+        errors = (spectra.margin_errors(side)[rank] for side in (left, right))  # computed only if they decide
+        return bool(small > _JUMP * large and small > _WIDER * sum(errors))
 
     def _separated(self, inside: list[Root]) -> list[Root]:
         """Roots with a counted place between them; those without one are merged."""
