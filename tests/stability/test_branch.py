@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Kind, PeriodicSystem, from_map, from_rhs, locate, multipliers
 from chilopod.stability.branches.branch import Ending, begin, follow, switch
 from helpers.systems import henon, of_map
@@ -208,6 +208,23 @@ def test_what_leaves_a_collision():
     for start in switch(area_preserving, meeting):
         point = follow(area_preserving, start, (0.5, 1.5), points=3).points[-1]
         assert point.orbit == pytest.approx(1.0 - point.value, abs=1e-9)
+
+
+def test_a_first_step_is_shortened_to_where_there_is_motion():
+    """As beside a doubling of a bouncing ball, where a state a step ahead comes to rest."""
+
+    def family(p):
+        def image(x):
+            if abs(x[0]) > 4e-3:
+                raise AnalysisError("the motion ends")
+            return -(1.0 + p) * x + x**3, np.array([[3.0 * x[0] ** 2 - 1.0 - p]])
+
+        return of_map(image, scale=np.ones(1))
+
+    (doubling,) = locate(family, (-0.3, 0.5), [0.0])
+    branch = follow(family, switch(family, doubling)[0], (-0.3, 0.5), points=2)
+    assert branch.ending is Ending.ENOUGH_POINTS
+    assert [each.value - each.orbit[0] ** 2 for each in branch.points] == pytest.approx([0.0] * 3, abs=1e-13)
 
 
 def test_switch_takes_the_periods_of_a_branch():

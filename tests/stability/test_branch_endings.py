@@ -39,6 +39,25 @@ def circle(p):
     return of_map(lambda x: x + 0.3 * (0.25 - x**2 - p**2), 1)
 
 
+@pytest.mark.parametrize("border", [0.0, 0.1234])
+def test_a_jump_is_named_where_the_multipliers_jump(border):
+    """A border collision, which is a kink of the branch: no cubic through the ends of a step shows its place."""
+
+    def family(p):
+        def flow(x, t0, t1):
+            slope = 1.0 if t1 - t0 < 0.5 else 0.549 if x[0] < 0.0 else -1.369
+            return slope * x + (p - border) * (t1 - t0 > 0.5), np.array([[slope]])
+
+        return PeriodicSystem(1, 1.0, flow)
+
+    branch = follow(family, [-1.1276 / 0.451], (border - 1.1276, border + 0.7144))
+    (said,) = branch.remarks
+    told = said.split("a multiplier jumps across the circle at ")[1].replace(",", "").split()
+    places = [float(told[i]) for i in (0, 2, 4)]
+    assert places == pytest.approx([border] * 3, abs=1e-9)
+    assert not branch.special_points
+
+
 def hostile(kind, random):
     """A family with something wrong, the size of its states, and the unit of its parameter."""
     c = random.normal(size=3)

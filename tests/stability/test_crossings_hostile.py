@@ -75,6 +75,15 @@ def test_a_jump_across_the_circle_is_no_crossing():
     assert any("jumps across the circle at 0.3" in remark for remark in found.remarks)
 
 
+def test_a_jump_at_zero_is_no_crossing():
+    """At zero the root finder's bracket shrinks without end: the multiplier seemed to be within it on the circle."""
+    found = find_crossings(scalar(lambda p: np.where(p < 0.0, 0.549, -1.369)), -1.1276, 0.7144)
+    assert (found.status, found.crossings) == (SearchStatus.INCOMPLETE, ())
+    (said,) = (remark for remark in found.remarks if "jumps" in remark)
+    assert abs(float(said.split(", ")[0].split()[-1])) < 1e-15
+    assert found.evaluations < 800
+
+
 def test_what_lies_in_a_hole_is_not_claimed():
     def matrices(values):
         if ((values > 0.4) & (values < 0.5)).any():

@@ -100,6 +100,27 @@ def test_where_the_map_does_not_exist_the_curve_is_lost_with_a_reason():
     assert 0.8 - 1e-5 < curve.values[-1][1] <= 0.8
 
 
+@pytest.mark.parametrize(("rising", "border"), [(True, 0.3), (False, -0.3)])
+def test_a_grazing_that_ends_the_curve_is_named(rising, border):
+    """Beyond the border the derivative of the return has another value, as where an impact is added."""
+
+    def family2(p, q):
+        def image(x):
+            past = max(x[0] + q / border - 1.0, 0.0)
+            return x + p - x**2 + 0.5 * past, np.array([[1.0 - 2.0 * x[0] + 0.5 * (past > 0.0)]])
+
+        return of_map(image, scale=np.ones(1))
+
+    family = partial(family2, q=0.0)
+    (fold,) = follow(family, begin(family, 0.04, [0.2], rising=False), (-0.1, 0.05)).special_points
+    curve = follow2(family2, fold.bifurcation, BOX, second=0.0, rising=rising)
+    assert curve.endings[1] is Ending.LOST
+    assert curve.reasons[1].startswith("just ahead the orbit grazes an event")
+    assert curve.remarks == (curve.reasons[1],)
+    assert curve.to_dataset().attrs["remarks"] == curve.reasons[1]
+    assert curve.values[-1] == pytest.approx([0.0, border], abs=1e-5)
+
+
 def test_a_family_that_refuses_values_ends_the_curve():
     def family2(p, q):
         if q > 0.8:

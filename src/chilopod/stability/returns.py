@@ -8,16 +8,17 @@ Systems*, 1989, ch. 2). Its derivative maps the direction of motion to exactly 0
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode, numbers
 from chilopod.flows.carrying import REPEATED
@@ -40,7 +41,14 @@ _BENT = 0.5  # largest part of a correction of the time that the change of the s
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
 _ENDS = 1e-3, 1e-4  # parts of a return, at its ends
 BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
+_PAST = 1.5e-5  # distance along a curve, in its units, at which an orbit is past a grazing
+_JUMPS, _HALVINGS = 0.3, 20  # least jump of the derivative in a grazing, relative to it, and halvings to its place
 _FALLING = 0.5  # least fall of the residual that is progress
+
+EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
+"""Sentence on the end of a curve at an event that reaches time 0."""
+
+_GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
 
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
@@ -288,6 +296,33 @@ def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
         return False  # a map has no parts
     pairs = [(change(0.0, part), change(1.0 - part, part)) for part in _ENDS]
     return any(near > max(_ENDS[0], 0.5 * far) for far, near in zip(*pairs, strict=True))
+
+
+def event_beside(system: SystemLike, x: Array, duration: float, derivative: Callable[[float], Array]) -> str:
+    """Sentence on the event at which a curve of orbits ends; empty without one. The derivative of the return is given
+    as a function of the distance along the curve from its last orbit."""
+    with contextlib.suppress(ChilopodError):
+        if jumps_at_ends(system, x, duration):
+            return EVENT_AT_ZERO
+        # A very unstable orbit meets other events on both sides.
+        if _jumps_within(derivative, _PAST) and not _jumps_within(derivative, -_PAST):
+            return _GRAZES
+    return ""
+
+
+def _jumps_within(derivative: Callable[[float], Array], reach: float) -> bool:
+    """True if a derivative jumps between zero and some distance: its change there remains however short the way is."""
+    low, high, before, after = 0.0, reach, derivative(0.0), derivative(reach)
+    least = max(_JUMPS * max(1.0, float(np.linalg.norm(before))), 0.5 * float(np.linalg.norm(after - before)))
+    for _ in range(_HALVINGS):
+        if not float(np.linalg.norm(after - before)) > least:
+            return False
+        between = derivative(middle := 0.5 * (low + high))
+        if np.linalg.norm(between - before) > np.linalg.norm(after - between):
+            high, after = middle, between
+        else:
+            low, before = middle, between
+    return True
 
 
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -28,12 +29,11 @@ from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, 
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, inspect
 from chilopod.stability.continuation.equations import Step
-from chilopod.stability.continuation.tolerances import SHORTEST
 from chilopod.stability.continuation.tracer import Ending, outward, trace
 from chilopod.stability.interface import Family, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import carried, jumps_at_ends, return_duration
+from chilopod.stability.returns import EVENT_AT_ZERO, carried, event_beside, jumps_at_ends, return_duration
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum import VERDICTS
 
@@ -52,10 +52,6 @@ BUDGET = 200_000
 
 _MEETING = 1e-6  # distance of a multiplier from +1 at a special point where branches meet
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
-_EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
-_GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
-_AHEAD = 10.0 * SHORTEST * LONGEST  # distance ahead of a lost curve's end at which an orbit is past a grazing
-_JUMPS, _SMOOTH = 0.3, 0.1  # change of the derivative, relative to it, in a grazing; and largest part of it before
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
 _STEADY = 1e-8  # largest value of the parameter, relative to its scale, along a family by energy
@@ -310,11 +306,11 @@ def followed(
         before, left = done, points and points - done
         ending, reason, size = trace(curve, moved, (branch.step, longest), left, look, keep)
         moved = None
-        if ending is Ending.LOST and _at_event(curve, found[-1]):
-            reason = _EVENT_AT_ZERO
-            moved = _elsewhere(curve, found[-1]) if done > before else None
-        elif ending is Ending.LOST and _grazes(curve, found[-1]):
-            reason = _GRAZES
+        if ending is Ending.LOST:
+            last = found[-1]
+            system, derivative = curve.system(last.value), partial(_derivative, curve, last)
+            reason = event_beside(system, last.orbit, _duration(system, last), derivative) or reason
+            moved = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
         if moved is not None:
             remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
     said = tuple(dict.fromkeys([*remarks, *_unpaired_folds(found)]))
@@ -354,30 +350,11 @@ def find_fold(
     return None
 
 
-def _at_event(curve: Curve, last: BranchPoint) -> bool:
-    """True if an event is about to pass time 0 of an orbit, where returns are not smooth."""
-    system = curve.system(last.value)
-    try:
-        return jumps_at_ends(system, last.orbit, _duration(system, last))
-    except ChilopodError:
-        return False
-
-
-def _grazes(curve: Curve, last: BranchPoint) -> bool:
-    """True if the derivative of the return jumps just ahead of a point, as where an orbit grazes an event."""
-    section = curve.section_at(last.orbit, last.value, last.period)
-
-    def scaled(distance: float) -> Array:
-        moved = distance * last.tangent * last.units
-        image = curve.image(last.orbit + moved[:-1], last.value + float(moved[-1]), section)
-        return np.asarray(image.jacobian * last.units[:-1] / last.units[:-1, None])
-
-    try:
-        behind, here, ahead = map(scaled, (-_AHEAD, 0.0, _AHEAD))
-    except ChilopodError:
-        return False
-    before, jump = float(np.linalg.norm(here - behind)), float(np.linalg.norm(ahead - here))
-    return jump > _JUMPS * max(1.0, float(np.linalg.norm(here))) > before / _SMOOTH
+def _derivative(curve: Curve, last: BranchPoint, distance: float) -> Array:
+    """Derivative of the return, in units, at a distance from a point along its tangent."""
+    section, moved = curve.section_at(last.orbit, last.value, last.period), distance * last.tangent * last.units
+    image = curve.image(last.orbit + moved[:-1], last.value + float(moved[-1]), section)
+    return np.asarray(image.jacobian * last.units[:-1] / last.units[:-1, None])
 
 
 def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
@@ -388,7 +365,7 @@ def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
             x = carried(system, last.orbit[None], 0.0, part * _duration(system, last))[0]
             rising = bool(last.tangent[-1] > 0.0)
             anchor = anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)
-            if not _at_event(curve, anchor.last):
+            if not jumps_at_ends(system, x, _duration(system, anchor.last)):
                 return anchor
     return None
 

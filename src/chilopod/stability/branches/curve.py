@@ -29,7 +29,7 @@ from chilopod.stability.branches.branch_points import (
     within_space,
 )
 from chilopod.stability.continuation.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
-from chilopod.stability.continuation.tolerances import SETTLED, SHARPEST_TURN
+from chilopod.stability.continuation.tolerances import RETRY, SETTLED, SHARPEST_TURN, SHORTEST
 from chilopod.stability.equilibria import has_centre
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import checked_flow, is_autonomous, offers
@@ -87,11 +87,17 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return start.orbit + total[:-1], start.value + float(total[-1])
 
     def anchor(self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0) -> Anchor:
-        """The anchor of a point; at a branch point its matrix is computed ``ahead`` by a distance along the tangent."""
+        """The anchor of a point; at a branch point its matrix is computed ``ahead`` by a distance along the tangent, or
+        by less where there is none."""
         section = self.section_at(last.orbit, last.value, last.period)
         x = last.orbit + ahead * last.tangent[:-1] * self.state_units
-        # With errors, to be equal to the end of a step, to the bit.
-        matrix = self.matrix_at(x, last.value, section, last.tangent, True)[1]
+        try:
+            # With errors, to be equal to the end of a step, to the bit.
+            matrix = self.matrix_at(x, last.value, section, last.tangent, True)[1]
+        except AnalysisError:
+            if ahead <= SHORTEST:
+                raise
+            return self.anchor(last, before, RETRY * ahead)
         # The matrix of a branch point was computed ahead, so it gives no prediction.
         if before is None or before.special is not None:
             return self.anchored(last, matrix, section, None, ahead > 0.0)

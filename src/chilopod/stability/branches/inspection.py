@@ -14,6 +14,7 @@ shorter steps confirm them.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -214,6 +215,9 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
             raise
 
     def parameter(place: float) -> float:
+        # Where multipliers jump the curve has a kink, which the cubic through the ends of the step does not show.
+        with contextlib.suppress(AnalysisError):
+            return within.at(place).found.value
         return curve.reached(step.start.last, step.between(place).moved)[1]
 
     def search(matrices: Matrices) -> Crossings:

@@ -118,6 +118,11 @@ class Curve2(Result):
         return tuple(point for point in self.points if isinstance(point, SpecialPoint2))
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """Reasons for lost or spent ends, a sentence each."""
+        return tuple(dict.fromkeys(filter(None, self.reasons)))
+
+    @property
     def values(self) -> Array:
         """Values of both parameters at all points, shape (points, 2)."""
         return np.array([point.values for point in self.points])
@@ -151,7 +156,7 @@ class Curve2(Result):
         names = ("values", "error_bound", "coefficient", "coefficient_error")
         more = ("frequency", "period", "orbit", "multipliers")
         first, last = (end.label for end in self.endings)
-        about = {"kind": self.kind.label, "first_end": first, "last_end": last}
+        about = {"kind": self.kind.label, "first_end": first, "last_end": last, "remarks": "; ".join(self.remarks)}
         return dataset("point", columns(self.points, *names, *more) | kinds, **about)
 
 

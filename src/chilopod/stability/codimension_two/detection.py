@@ -102,8 +102,9 @@ class Critical:
 
 
 class Station(NamedTuple):
-    """A point of a curve, and the test functions there."""
+    """A spot on a curve, its point, and the test functions there."""
 
+    spot: Spot
     point: Point2
     signals: Signals
 
@@ -122,7 +123,7 @@ class Detector:
         form = self.form(here) if self._coefficients and abs(spot.place.cosine) < 1.0 else None
         signals = {signal: self._measured(signal, here, form) for signal in self._signals}
         bound = across(spot) + 4.0 * EPSILON * np.abs(spot.values)
-        return Station(_point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
+        return Station(spot, _point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
 
     def events(self, step: Step[Spot, Evaluated], before: Signals, after: Signals) -> list[tuple[Spot, SpecialPoint2]]:
         """Points of codimension two within a step, in order."""

@@ -28,7 +28,7 @@ from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.interface import offers, sizes, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import return_duration, whole_period
+from chilopod.stability.returns import event_beside, return_duration, whole_period
 from chilopod.stability.symmetry.groups import reverses
 
 BUDGET = 20_000
@@ -170,7 +170,16 @@ class _Half:
     def trace(self, spot: Spot, steps: tuple[float, float], points: int | None) -> None:
         """Follow the curve from its first point, towards its tangent."""
         self.curve.first = spot
+        self.last = self.last._replace(spot=spot)
         self.ending, self.reason, _ = trace(self.curve, spot, steps, points, self.look, self.keep)
+        if self.ending is Ending.LOST:
+            end, evaluated = self.last.spot, self.curve.evaluated
+
+            def derivative(distance: float) -> Array:
+                return evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
+
+            about = self.curve.system(end.values), end.place.state, end.image.duration
+            self.reason = event_beside(*about, derivative) or self.reason
 
     def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""

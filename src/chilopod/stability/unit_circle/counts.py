@@ -77,7 +77,7 @@ class Accounts:
     def balance(self, roots: list[Root]) -> list[Crossing]:
         """Crossings that explain the counts, in order."""
         self._spectra.at(np.array(self._ends))
-        roots = [root for root in roots if self._is_critical(root) or self._lost(root)]
+        roots = [root for root in roots if (self._is_critical(root) or self._lost(root)) and self._smooth(root)]
         for _ in range(_ROUNDS):
             roots = sorted(_without_shadows(roots), key=lambda root: root.place)
             gaps = self._gaps(roots)
@@ -201,6 +201,12 @@ class Accounts:
     def _is_critical(self, root: Root) -> bool:
         return self._spectra.exists(root.place) and bool(self._critical(root))
 
+    def _smooth(self, root: Root) -> bool:
+        """False if a multiplier jumps over the circle at a root of an event's function: it is never on it."""
+        nu, crossings = self._spectra.at(np.array([root.place]))[0], [] if root.touch else self._critical(root)
+        ranks = [int(np.abs(nu - each.multiplier).argmin()) for each in crossings]
+        return not any(self._jumps(root.place, rank) for rank in ranks)
+
     def _lost(self, root: Root) -> bool:
         """Remark on a root that is rejected only because the multipliers there are unknown; return False."""
         if self._spectra.exists(root.place) and float(self._spectra.tolerances(root).max()) > UNKNOWN:
@@ -236,7 +242,8 @@ class Accounts:
 
             if spectra.holes(x, y) or spectra.left <= 0 or margin(x) * margin(y) >= 0.0:
                 break  # the last one: the errors were larger than their bounds
-            root = spectra.rooted(margin, x, y, None)
+            # A jump at zero has no last digits.
+            root = spectra.rooted(margin, x, y, None, EPSILON * (self._ends[1] - self._ends[0]))
             if not spectra.exists(root.place):
                 break
             if self._jumps(root.place, rank):
@@ -275,8 +282,8 @@ class Accounts:
         width = max(right - left, 4.0 * float(np.spacing(abs(place))))
         wide = spectra.beside(place, _WIDER * width)
         small, large = (abs(spectra.margins(b)[rank] - spectra.margins(a)[rank]) for a, b in ((left, right), wide))
-        errors = spectra.margin_errors(left)[rank] + spectra.margin_errors(right)[rank]
-        return bool(small > _JUMP * large and small > _WIDER * errors)
+        errors = (spectra.margin_errors(side)[rank] for side in (left, right))  # computed only if they decide
+        return bool(small > _JUMP * large and small > _WIDER * sum(errors))
 
     def _separated(self, inside: list[Root]) -> list[Root]:
         """Roots with a counted place between them; those without one are merged."""
