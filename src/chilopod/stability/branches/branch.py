@@ -54,7 +54,7 @@ _MEETING = 1e-6  # distance of a multiplier from +1 at a special point where bra
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
-_STEADY = 1e-8  # largest value of the parameter, relative to its scale, along a family by energy
+_STEADY = 1e-6  # largest value of the parameter, relative to its scale, along a family by energy
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]

@@ -203,7 +203,9 @@ class Accounts:
 
     def _smooth(self, root: Root) -> bool:
         """False if a multiplier jumps over the circle at a root of an event's function: it is never on it."""
-        nu, crossings = self._spectra.at(np.array([root.place]))[0], [] if root.touch else self._critical(root)
+        if root.touch or self._spectra.conservative:  # there multipliers that meet leave like square roots
+            return True
+        nu, crossings = self._spectra.at(np.array([root.place]))[0], self._critical(root)
         ranks = [int(np.abs(nu - each.multiplier).argmin()) for each in crossings]
         return not any(self._jumps(root.place, rank) for rank in ranks)
 
