@@ -15,7 +15,7 @@ import xarray as xr
 
 from chilopod.analysis.growth import FATES, Fate, growth_rates
 from chilopod.analysis.map_axes import DERIVED, Given, Plane
-from chilopod.analysis.map_curves import MapCurve, Search
+from chilopod.analysis.map_curves import Search
 from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
 from chilopod.analysis.map_result import StabilityMap
 from chilopod.analysis.parameters import ALL
@@ -107,14 +107,17 @@ def map(
     lost: list[str] = []
     if bending is not None:
         bent, lost = _radii(grid, bending, part(progress, 0.5, 1.0))
-    return _result(grid, search.curves, bent, [*dict.fromkeys(search.remarks), *_invalid(grid), *lost])
+    if sum(search.lost):
+        lost.append(f"the pitchfork is subcritical at {sum(search.lost)} points, but its folds were not found")
+    return _result(grid, search, bent, [*dict.fromkeys(search.remarks), *_invalid(grid), *lost])
 
 
-def _result(grid: Grid, curves: Sequence[MapCurve], radius: Array, remarks: Sequence[str]) -> StabilityMap:
+def _result(grid: Grid, search: Search, radius: Array, remarks: Sequence[str]) -> StabilityMap:
     plane, values = grid.plane, grid.values
     whole = values[UNSTABLE].astype(np.int16), values[FATE].astype(np.int8)
     columns = plane.x, plane.y, grid.x, grid.y, values[GROWTH], values[FREQUENCY], values[ERROR]
-    return StabilityMap(plane.robot, *columns, *whole, grid.computed, radius, tuple(curves), tuple(remarks))
+    curves, lost = tuple(search.curves), bool(search.lost)
+    return StabilityMap(plane.robot, *columns, *whole, grid.computed, radius, curves, tuple(remarks), lost)
 
 
 def _invalid(grid: Grid) -> list[str]:

@@ -3,14 +3,17 @@ unstable multipliers, and continued from there."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import stability
+from chilopod.analysis.branch import TOLERANCE
 from chilopod.analysis.map_axes import Plane
 from chilopod.analysis.map_grid import Grid
 from chilopod.analysis.straight_walk import coefficient_of
@@ -26,7 +29,14 @@ _MOST = 12  # curves
 _COVERED = 1.5  # cells between an edge of the grid and the curve that crosses it
 _FOLD_TOLERANCE = 1e-12  # of the flow; a fold is known to about its square root
 _FOLD_POINTS = 100
+_PIECES, _PIECE = 12, 5  # parts in which a branch is followed to its fold, and points of each
+_TURN = CodimensionTwo.DEGENERATE_PITCHFORK
+_TRIED = 0.5, 0.25, 0.75  # places of a subcritical stretch from which a branch is followed
+_ON_CIRCLE = 1e-6  # distance of a critical multiplier from the unit circle, at most
 _ENDS = Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS
+
+_Ends = tuple[float, float]
+_Family = Callable[[float, float], PlanarModel]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +97,8 @@ class Search:
     ----------
     curves, remarks
         Curves found so far; sentences about those that may be missing.
+    lost
+        Numbers of subcritical points whose folds were to be followed and were not found.
     """
 
     plane: Plane
@@ -95,6 +107,7 @@ class Search:
     progress: Progress
     curves: list[MapCurve] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    lost: list[int] = field(default_factory=list)
     _tried: set[Edge] = field(default_factory=set)
 
     def run(self) -> None:
@@ -166,41 +179,61 @@ class Search:
         """Value of the number that does not change along an edge, SI."""
         return float(self.grid.y[edge.j] if edge.across else self.grid.x[edge.i])
 
+    def _family(self, edge: Edge) -> _Family:
+        """Models at values of the number that changes along an edge, and of the other one."""
+        return lambda p, q: self.plane.model(*edge.ordered(p, q))
+
     def _located(self, edge: Edge) -> list[BifurcationPoint]:
+        """Bifurcations on an edge; for a number of modules the folds of the curved walks that they begin, too."""
         values, first = (self.grid.x, edge.i) if edge.across else (self.grid.y, edge.j)
-        beside = self._beside(edge)
-
-        def family(value: float) -> PlanarModel:
-            return self.plane.model(*edge.ordered(value, beside))
-
+        beside, family, whole = self._beside(edge), self._family(edge), self.plane.x.whole or self.plane.y.whole
         try:
             ends = float(values[first]), float(values[first + 1])
-            return list(stability.locate(family, ends, normal_form=self.plane.x.whole or self.plane.y.whole))
+            points = list(stability.locate(lambda value: family(value, beside), ends, normal_form=whole))
         except ChilopodError as error:
             self.remarks.append(f"a bifurcation between two neighbours is not located: {error}")
             return []
+        gives_way = 0 in self.grid.unstable[edge.j : edge.j + 1 + (not edge.across), edge.i : edge.i + 1 + edge.across]
+        for point in [*points] if whole and self.with_folds and gives_way else []:
+            if point.kind is Kind.PITCHFORK and (point.coefficient or 0.0) > 0.0:
+                fold = _fold(family, point, beside, edge.ordered(*self._box())[0])
+                points += [fold] if fold else []
+                self.lost += [] if fold else [1]
+        return points
 
     def _follow(self, point: BifurcationPoint, edge: Edge) -> None:
         """Continue a curve through a located point, and the folds that begin on it."""
-        between = edge.ordered(*self._box())
+        family, between = self._family(edge), edge.ordered(*self._box())
         how: dict[str, Any] = {"between": between, "longest": _LONGEST, "progress": self._told}
 
-        def family(p: float, q: float) -> PlanarModel:
-            return self.plane.model(*edge.ordered(p, q))
-
         def loose(p: float, q: float) -> PlanarModel:
-            return FollowedModel(family(p, q).robot, _FOLD_TOLERANCE)
+            return FollowedModel(family(p, q).robot, _FOLD_TOLERANCE, use_symmetry=False)
 
         try:
             curve = follow2(family, point, second=self._beside(edge), points=400, **how)
             self._add(curve, edge)
-            for special in curve.special if self.with_folds else ():
-                if special.kind is CodimensionTwo.DEGENERATE_PITCHFORK:
-                    # Both starts are mirror images of one curve.
-                    start, *_ = switch2(family, special, between)
-                    self._add(follow2(loose, start, points=_FOLD_POINTS, coefficients=False, **how), edge)
+            for start, second in self._fold_starts(family, curve, between) if self.with_folds else ():
+                self._add(follow2(loose, start, second=second, points=_FOLD_POINTS, coefficients=False, **how), edge)
         except ChilopodError as error:
+            self.lost += [0] * self.with_folds
             self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
+
+    def _fold_starts(self, family: _Family, curve: Curve2, between: tuple[_Ends, _Ends]) -> Iterator[tuple[Any, float]]:
+        """Folds beside points where a pitchfork turns, and one for every other subcritical stretch, each with its
+        second value."""
+        for special in curve.special:
+            if special.kind is _TURN:
+                start, *_ = switch2(family, special, between)  # the other is its mirror image
+                yield start, start.second
+        for stretch in _subcritical(curve) if curve.kind is Kind.PITCHFORK else ():
+            for at in (stretch[int(part * len(stretch))] for part in _TRIED):
+                p, q = at.values.tolist()
+                fork = BifurcationPoint(Kind.PITCHFORK, p, 0.0, at.orbit, at.mode, at.multiplier, 0.0, period=at.period)
+                if fold := _fold(family, fork, q, between[0]):
+                    yield fold, q
+                    break
+            else:
+                self.lost.append(len(stretch))
 
     def _add(self, curve: Curve2, edge: Edge) -> None:
         """Keep a curve in the order of the map's axes, and say where it ends before it should."""
@@ -220,11 +253,40 @@ class Search:
     def _told(self, count: int, point: Point2) -> None:
         self.progress(0.5, f"curve {len(self.curves) + 1}, {count} points")
 
-    def _box(self) -> tuple[tuple[float, float], tuple[float, float]]:
+    def _box(self) -> tuple[_Ends, _Ends]:
         """Part of the plane in which there are results."""
         rows, columns = np.nonzero(self.grid.unstable >= 0)
         x, y = self.grid.x[[columns.min(), columns.max()]], self.grid.y[[rows.min(), rows.max()]]
         return (float(x[0]), float(x[1])), (float(y[0]), float(y[1]))
+
+
+def _subcritical(curve: Curve2) -> Iterator[list[Point2]]:
+    """Subcritical stretches of a pitchfork curve at whose ends it does not turn, without points where the straight walk
+    is unstable on both sides."""
+    points = [each for each in curve.points if getattr(each, "kind", _TURN) is _TURN]
+    for hard, places in groupby(range(len(points)), lambda i: (points[i].coefficient or 0.0) > 0.0):
+        run = [*places]
+        beside = points[max(0, run[0] - 1) : run[-1] + 2]
+        leading = [each for each in points[run[0] : run[-1] + 1] if np.abs(each.multipliers).max() < 1.0 + _ON_CIRCLE]
+        if hard and leading and not any(each in beside for each in curve.special):
+            yield leading
+
+
+def _fold(family: _Family, fork: BifurcationPoint, second: float, ends: _Ends) -> BifurcationPoint | None:
+    """First fold of the curved walks that leave a pitchfork, as the first number changes within an interval; None if
+    none is found."""
+
+    def followed(value: float) -> PlanarModel:
+        return FollowedModel(family(value, second).robot, TOLERANCE)
+
+    with suppress(ChilopodError):
+        branch: Any = stability.switch(followed, fork)[0]  # the other is its mirror image
+        for _ in range(_PIECES):
+            branch = stability.follow(followed, branch, ends, points=_PIECE, closely=False, precision=TOLERANCE)
+            fold = next((each.bifurcation for each in branch.points if each.special is Kind.FOLD), None)
+            if fold or branch.ending is not Ending.ENOUGH_POINTS:
+                return fold
+    return None
 
 
 def _distance(line: Array, point: Array) -> float:

@@ -48,6 +48,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         Curves of bifurcations.
     remarks
         Sentences about what may be missing, and why robots are invalid.
+    folds_lost
+        True if folds were to be followed, and some were not found.
     """
 
     robot: Robot
@@ -64,6 +66,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
     radius: Array
     curves: tuple[MapCurve, ...]
     remarks: tuple[str, ...]
+    folds_lost: bool = False
 
     @property
     def special(self) -> tuple[MapPoint, ...]:
@@ -152,7 +155,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "values": [self.x_values.size, self.y_values.size],
             "computed": int(self.computed.sum()),
             "shares": {fate.label: share for fate, share in self.shares.items()},
-            "folded_share": float(self.folded.mean()),
+            "folded_share": None if self.folds_lost else float(self.folded.mean()),
             "curves": [
                 {**plain(curve), "coefficients": [*map(finite, curve.coefficient.tolist())], "line": curve.line}
                 for curve in self.curves
@@ -200,11 +203,13 @@ def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) ->
     """Places along an axis where folds, or subcritical pitchforks, have a value of the other number, in SI units."""
     places = [np.empty(0)]
     for curve in curves:
-        if curve.kind is kind and curve.line:
+        if curve.kind is kind:
             along, across = curve.values[:, axis], curve.values[:, 1 - axis]
-            meets = np.diff(np.sign(across - value)) != 0.0
-            if kind is not Kind.FOLD:
-                meets &= np.nan_to_num(curve.coefficient[:-1]) > 0.0
+            chosen = (np.nan_to_num(curve.coefficient) > 0.0) | (kind is Kind.FOLD)
+            if not curve.line:  # points at numbers of modules
+                places.append(along[chosen & (across == value)])
+                continue
+            meets = (np.diff(np.sign(across - value)) != 0.0) & chosen[:-1]
             part = (value - across[:-1][meets]) / np.diff(across)[meets]
             places.append(along[:-1][meets] + part * np.diff(along)[meets])
     return np.concatenate(places)
