@@ -331,3 +331,12 @@ def test_few_points_and_a_long_map_are_said(monkeypatch):
     monkeypatch.setattr(sys.modules[mapped.__module__], "_LONG", 1e-3)
     mapped(ROBOT, (K1, 1.9, 2.0), ("legs.half_width", 0.07, 0.08), points=2, remark=said.append)
     assert "the map takes about" in said[0]
+
+
+def test_a_map_of_hours_is_refused_unless_growth_rates_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[mapped.__module__], "_LONG", 1e-3)
+    monkeypatch.setattr(sys.modules[mapped.__module__], "_LONGEST", 1e-6)
+    axes = (K1, 1.9, 2.0), ("legs.half_width", 0.07, 0.08)
+    with pytest.raises(ParameterError, match=r"^points = 2: the map would take about .* s a growth rate; allowed: "):
+        mapped(ROBOT, *axes, points=2)
+    assert mapped(ROBOT, *axes, points=2, kept=tmp_path / "rates.nc").growth.shape == (2, 2)

@@ -36,6 +36,7 @@ POINTS = 129
 _ALSO = ("folds", "radius")
 _MOST_POINTS = 4097
 _LONG = 600.0  # s: a map that takes longer is announced
+_LONGEST = 4.0  # hours: one that takes longer is refused, unless its growth rates are kept
 _CURVE_RATES = 5e3  # growth rates that take as long as a curve
 _LATTICE = 24  # radii along an axis
 _BRANCHES = 12  # that are followed from the onset, a few seconds each, before other radii are left out
@@ -72,7 +73,8 @@ def map(
         ``folds`` to follow the folds of the curved walks too, which takes a minute; ``radius`` to compute the radius of
         the curved walks on a lattice of 24 x 24 values, some 50 ms each.
     kept
-        File that holds growth rates while they are computed; a map that was cut off goes on from it.
+        File that holds growth rates while they are computed; a map that was cut off goes on from it. Without it a map
+        that would take more than four hours is refused.
     remark
         Function that receives a sentence if the map will take long.
     progress
@@ -82,7 +84,7 @@ def map(
     ------
     ParameterError
         If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if
-        radii are wanted and neither axis is a number of the robot.
+        radii are wanted and neither axis is a number of the robot; if the map would take too long.
     """
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:
@@ -94,7 +96,7 @@ def map(
     grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
     if file is not None:
         _take(grid, file)
-    _announce(grid, remark)
+    _announce(grid, remark, file is not None)
     wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
     grid.refine(wanted, part(progress, 0.0, 0.5))
     search = Search(plane, grid, "folds" in also, part(progress, 0.5, 1.0))
@@ -127,8 +129,9 @@ def _invalid(grid: Grid) -> list[str]:
     return [f"at {rows.size} of the values there is no robot: {why}" for why in reasons]
 
 
-def _announce(grid: Grid, remark: Callable[[str], None]) -> None:
-    """Say how long a map will take, if that is long, from the time of its corners."""
+def _announce(grid: Grid, remark: Callable[[str], None], kept: bool) -> None:
+    """Say how long a map will take, if that is long, from the time of its corners; refuse one of many hours if its
+    growth rates are not kept."""
     corners = grid.robots(grid.x[[0, -1]].tolist(), grid.y[[-1, 0]].tolist())
     robots = [robot for robot in corners if isinstance(robot, Robot)]
     growth_rates([grid.plane.robot.with_value("body.modules", 2)], 1)  # compiles
@@ -143,6 +146,10 @@ def _announce(grid: Grid, remark: Callable[[str], None]) -> None:
     if each * rates > _LONG:
         hours = each * rates / 3600.0
         said = f"{hours:.2g} hours" if hours > 1.0 else f"{60.0 * hours:.2g} minutes"
+        if hours > _LONGEST and not kept:
+            allowed = f"{_LONGEST:g} hours, more if growth rates are kept (--out); fewer points or modules take less"
+            problem = f"the map would take about {said}, {each:.2g} s a growth rate"
+            raise ParameterError(problem, field="points", value=max(grid.computed.shape), allowed=allowed)
         remark(f"the map takes about {said}: {each:.2g} s a growth rate; fewer points or modules take less")
 
 
