@@ -272,6 +272,13 @@ def test_robots_that_cannot_be_are_a_fate_of_their_own():
     assert "there is no robot: springs.stiffness[0]" in remark
 
 
+def test_every_reason_why_there_is_no_robot_is_said():
+    found = mapped(ROBOT, ("modules", 1, 3), ("springs.stiffness[2]", 1.0, 2.0), points=2)
+    (remark,) = found.remarks
+    assert remark.startswith("at 6 of the values there is no robot: body.modules = 1.0: ")
+    assert "; or springs.stiffness[2]: must be the index of a spring" in remark
+
+
 def test_a_map_that_was_cut_off_goes_on(tmp_path, monkeypatch):
     axes, file = ((K1, 0.9, 2.0), (OFFSET[0], 0.02, 0.06)), tmp_path / "rates.nc"
     counts, compute = [], map_grid.growth_rates

@@ -123,10 +123,15 @@ def _result(grid: Grid, search: Search, radius: Array, remarks: Sequence[str]) -
 
 
 def _invalid(grid: Grid) -> list[str]:
-    """A sentence about the values that have no robot, with the reason at one of them."""
+    """A sentence about the values that have no robot, with the reasons at the first of every row and column."""
     rows, columns = np.nonzero(grid.values[FATE] == FATES.index(Fate.INVALID))
-    reasons = [*grid.robots(grid.x[columns[:1]].tolist(), grid.y[rows[:1]].tolist())]
-    return [f"at {rows.size} of the values there is no robot: {why}" for why in reasons]
+    first = np.unique([*np.unique(rows, return_index=True)[1], *np.unique(columns, return_index=True)[1]]).astype(int)
+    reasons: dict[tuple[str | None, str], str] = {}
+    for why in grid.robots(grid.x[columns[first]].tolist(), grid.y[rows[first]].tolist()):
+        if isinstance(why, ChilopodError):
+            reasons.setdefault((why.field, why.problem), str(why))
+    said = "; or ".join(reasons.values())
+    return [f"at {rows.size} of the values there is no robot: {said}"] if reasons else []
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], kept: bool) -> None:
