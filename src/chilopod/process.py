@@ -184,10 +184,7 @@ def _watch(pressed: int) -> None:
     time.sleep(_PATIENCE)
     with suppress(OSError):
         os.write(2, b"stopping ... (Ctrl-C once more ends at once)\n")
-    if first == signal.SIGINT:
-        _next(pressed, signal.SIGINT)
-    else:
-        time.sleep(_GRACE)
+    _next(pressed, signal.SIGINT) if first == signal.SIGINT else time.sleep(_GRACE)
     _pressed.append(first)  # nothing else has, while compiled code runs
     leave()
 

@@ -176,7 +176,7 @@ def test_folds_at_numbers_of_modules_are_those_of_branches(subcritical, monkeypa
     between = (found.x_values > found.curves[0].values[0, 0]) & (found.x_values < there)
     np.testing.assert_array_equal(found.folded, [np.zeros(9, dtype=bool), between])
     assert between.any()
-    monkeypatch.setattr(map_curves, "_fold", lambda *_: None)
+    monkeypatch.setattr(map_curves, "_PIECES", 0)
     lost = mapped(robot, x, ("modules", 2, 3), points=9, also=["folds"])
     assert lost.remarks == ("the pitchfork is subcritical at 1 points, but its folds were not found",)
     assert lost.as_json()["folded_share"] is None
@@ -344,6 +344,6 @@ def test_a_map_of_hours_is_refused_unless_growth_rates_are_kept(tmp_path, monkey
     monkeypatch.setattr(sys.modules[mapped.__module__], "_LONG", 1e-3)
     monkeypatch.setattr(sys.modules[mapped.__module__], "_LONGEST", 1e-6)
     axes = (K1, 1.9, 2.0), ("legs.half_width", 0.07, 0.08)
-    with pytest.raises(ParameterError, match=r"^points = 2: the map would take about .* s a growth rate; allowed: "):
+    with pytest.raises(ParameterError, match=r"^points = 2: the map would take about .*; allowed: "):
         mapped(ROBOT, *axes, points=2)
     assert mapped(ROBOT, *axes, points=2, kept=tmp_path / "rates.nc").growth.shape == (2, 2)

@@ -107,7 +107,7 @@ class RobotComparison(Summary):
         if not self.paths:
             return [], [], ["no number that the planar model reads differs", *tail]
         named = {name: unit_of(name, self.first, self.onset) for name in self.effects}
-        heads = [f"{name} ({unit})" if unit else name for name, unit in named.items()]
+        heads = [f"{name} ({unit})".removesuffix(" ()") for name, unit in named.items()]
         cells: list[Sequence[str]] = [("number", self.first.name, self.second.name, *heads)]
         first = next(iter(self.effects.values()))
         for at in np.argsort(-np.abs(np.nan_to_num(first.mean))).tolist():
@@ -130,8 +130,8 @@ class RobotComparison(Summary):
         name, found = next(iter(self.effects.items()))
         unit = unit_of(name, self.first, self.onset)
         parts = {path: units.from_si(float(each), unit) for path, each in zip(self.paths, found.mean, strict=True)}
-        of = f"{name} ({unit})" if unit else name
-        return tornado(axes, parts, f"part in the difference of the {of}", self.title.partition(":")[0])
+        said = f"part in the difference of the {name} ({unit})".removesuffix(" ()")
+        return tornado(axes, parts, said, self.title.partition(":")[0])
 
 
 def compare(

@@ -96,7 +96,7 @@ def map(
     grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
     if file is not None:
         _take(grid, file)
-    _announce(grid, remark, file is not None)
+    _announce(grid, remark, points, file is not None)
     wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
     grid.refine(wanted, part(progress, 0.0, 0.5))
     search = Search(plane, grid, "folds" in also, part(progress, 0.5, 1.0))
@@ -126,15 +126,12 @@ def _invalid(grid: Grid) -> list[str]:
     """A sentence about the values that have no robot, with the reasons at the first of every row and column."""
     rows, columns = np.nonzero(grid.values[FATE] == FATES.index(Fate.INVALID))
     first = np.unique([*np.unique(rows, return_index=True)[1], *np.unique(columns, return_index=True)[1]]).astype(int)
-    reasons: dict[tuple[str | None, str], str] = {}
-    for why in grid.robots(grid.x[columns[first]].tolist(), grid.y[rows[first]].tolist()):
-        if isinstance(why, ChilopodError):
-            reasons.setdefault((why.field, why.problem), str(why))
-    said = "; or ".join(reasons.values())
-    return [f"at {rows.size} of the values there is no robot: {said}"] if reasons else []
+    found = grid.robots(grid.x[columns[first]].tolist(), grid.y[rows[first]].tolist())
+    reasons = {(why.field, why.problem): str(why) for why in found if isinstance(why, ChilopodError)}
+    return [f"at {rows.size} of the values there is no robot: {'; or '.join(reasons.values())}"] if reasons else []
 
 
-def _announce(grid: Grid, remark: Callable[[str], None], kept: bool) -> None:
+def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
     """Say how long a map will take, if that is long, from the time of its corners; refuse one of many hours if its
     growth rates are not kept."""
     corners = grid.robots(grid.x[[0, -1]].tolist(), grid.y[[-1, 0]].tolist())
@@ -153,8 +150,7 @@ def _announce(grid: Grid, remark: Callable[[str], None], kept: bool) -> None:
         said = f"{hours:.2g} hours" if hours > 1.0 else f"{60.0 * hours:.2g} minutes"
         if hours > _LONGEST and not kept:
             allowed = f"{_LONGEST:g} hours, more if growth rates are kept (--out); fewer points or modules take less"
-            problem = f"the map would take about {said}, {each:.2g} s a growth rate"
-            raise ParameterError(problem, field="points", value=max(grid.computed.shape), allowed=allowed)
+            raise ParameterError(f"the map would take about {said}", field="points", value=points, allowed=allowed)
         remark(f"the map takes about {said}: {each:.2g} s a growth rate; fewer points or modules take less")
 
 

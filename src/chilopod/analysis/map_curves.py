@@ -3,10 +3,9 @@ unstable multipliers, and continued from there."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import groupby, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,13 +29,8 @@ _COVERED = 1.5  # cells between an edge of the grid and the curve that crosses i
 _FOLD_TOLERANCE = 1e-12  # of the flow; a fold is known to about its square root
 _FOLD_POINTS = 100
 _PIECES, _PIECE = 12, 5  # parts in which a branch is followed to its fold, and points of each
-_TURN = CodimensionTwo.DEGENERATE_PITCHFORK
-_TRIED = 0.5, 0.25, 0.75  # places of a subcritical stretch from which a branch is followed
-_ON_CIRCLE = 1e-6  # distance of a critical multiplier from the unit circle, at most
+_ON_CIRCLE = 1.0 + 1e-6  # modulus of a critical multiplier, at most
 _ENDS = Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS
-
-_Ends = tuple[float, float]
-_Family = Callable[[float, float], PlanarModel]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +89,8 @@ class Search:
 
     Attributes
     ----------
-    curves, remarks
-        Curves found so far; sentences about those that may be missing.
-    lost
-        Numbers of subcritical points whose folds were to be followed and were not found.
+    curves, remarks, lost
+        Curves found so far; sentences about those that may be missing; numbers of pitchforks without their folds.
     """
 
     plane: Plane
@@ -179,32 +171,53 @@ class Search:
         """Value of the number that does not change along an edge, SI."""
         return float(self.grid.y[edge.j] if edge.across else self.grid.x[edge.i])
 
-    def _family(self, edge: Edge) -> _Family:
-        """Models at values of the number that changes along an edge, and of the other one."""
-        return lambda p, q: self.plane.model(*edge.ordered(p, q))
-
     def _located(self, edge: Edge) -> list[BifurcationPoint]:
-        """Bifurcations on an edge; for a number of modules the folds of the curved walks that they begin, too."""
+        """Bifurcations on an edge; at a number of modules the folds of the curved walks that begin there, too."""
         values, first = (self.grid.x, edge.i) if edge.across else (self.grid.y, edge.j)
-        beside, family, whole = self._beside(edge), self._family(edge), self.plane.x.whole or self.plane.y.whole
+        beside, whole = self._beside(edge), self.plane.x.whole or self.plane.y.whole
+
+        def family(value: float) -> PlanarModel:
+            return self.plane.model(*edge.ordered(value, beside))
+
         try:
             ends = float(values[first]), float(values[first + 1])
-            points = list(stability.locate(lambda value: family(value, beside), ends, normal_form=whole))
+            points = list(stability.locate(family, ends, normal_form=whole))
         except ChilopodError as error:
             self.remarks.append(f"a bifurcation between two neighbours is not located: {error}")
             return []
-        gives_way = 0 in self.grid.unstable[edge.j : edge.j + 1 + (not edge.across), edge.i : edge.i + 1 + edge.across]
-        for point in [*points] if whole and self.with_folds and gives_way else []:
+        gives_way = 0 in self.grid.unstable[edge.j : edge.j + 2 - edge.across, edge.i : edge.i + 1 + edge.across]
+        for point in [*points] if whole and self.with_folds and gives_way else ():
             if point.kind is Kind.PITCHFORK and (point.coefficient or 0.0) > 0.0:
-                fold = _fold(family, point, beside, edge.ordered(*self._box())[0])
-                points += [fold] if fold else []
-                self.lost += [] if fold else [1]
+                points += self._fold(edge, point, point.value, beside, 1)
         return points
+
+    def _fold(self, edge: Edge, at: BifurcationPoint | Point2, p: float, q: float, n: int) -> list[BifurcationPoint]:
+        """Fold of the curved walks that leave one of n subcritical pitchforks, as the number along an edge changes, if
+        it is found on the map."""
+
+        def family(value: float) -> PlanarModel:
+            return FollowedModel(self.plane.at(*edge.ordered(value, q)), TOLERANCE)
+
+        fork = BifurcationPoint(Kind.PITCHFORK, p, 0.0, at.orbit, at.mode, at.multiplier, 0.0, period=at.period)
+        ends, *_ = edge.ordered(*self._box())
+        with suppress(ChilopodError):
+            branch: Any = stability.switch(family, fork)[0]  # the other is its mirror image
+            for _ in range(_PIECES):
+                branch = stability.follow(family, branch, ends, points=_PIECE, closely=False, precision=TOLERANCE)
+                folds = [each.bifurcation for each in branch.points if each.special is Kind.FOLD]
+                if folds:
+                    return folds[:1]
+        self.lost.append(n)
+        return []
 
     def _follow(self, point: BifurcationPoint, edge: Edge) -> None:
         """Continue a curve through a located point, and the folds that begin on it."""
-        family, between = self._family(edge), edge.ordered(*self._box())
+        between = edge.ordered(*self._box())
         how: dict[str, Any] = {"between": between, "longest": _LONGEST, "progress": self._told}
+        few: dict[str, Any] = {**how, "points": _FOLD_POINTS, "coefficients": False}
+
+        def family(p: float, q: float) -> PlanarModel:
+            return self.plane.model(*edge.ordered(p, q))
 
         def loose(p: float, q: float) -> PlanarModel:
             return FollowedModel(family(p, q).robot, _FOLD_TOLERANCE, use_symmetry=False)
@@ -212,28 +225,20 @@ class Search:
         try:
             curve = follow2(family, point, second=self._beside(edge), points=400, **how)
             self._add(curve, edge)
-            for start, second in self._fold_starts(family, curve, between) if self.with_folds else ():
-                self._add(follow2(loose, start, second=second, points=_FOLD_POINTS, coefficients=False, **how), edge)
+            turns = [each for each in curve.special if each.kind is CodimensionTwo.DEGENERATE_PITCHFORK]
+            for turn in turns if self.with_folds else ():
+                # Both starts are mirror images of one curve.
+                self._add(follow2(loose, switch2(family, turn, between)[0], **few), edge)
+            leading = [each for each in curve.points if np.abs(each.multipliers).max() < _ON_CIRCLE]
+            hard = [each for each in leading if (each.coefficient or 0.0) > 0.0]
+            if self.with_folds and curve.kind is Kind.PITCHFORK and hard and not turns:
+                at = hard[len(hard) // 2]
+                p, q = at.values.tolist()
+                for fold in self._fold(edge, at, p, q, len(hard)):
+                    self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
             self.lost += [0] * self.with_folds
             self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
-
-    def _fold_starts(self, family: _Family, curve: Curve2, between: tuple[_Ends, _Ends]) -> Iterator[tuple[Any, float]]:
-        """Folds beside points where a pitchfork turns, and one for every other subcritical stretch, each with its
-        second value."""
-        for special in curve.special:
-            if special.kind is _TURN:
-                start, *_ = switch2(family, special, between)  # the other is its mirror image
-                yield start, start.second
-        for stretch in _subcritical(curve) if curve.kind is Kind.PITCHFORK else ():
-            for at in (stretch[int(part * len(stretch))] for part in _TRIED):
-                p, q = at.values.tolist()
-                fork = BifurcationPoint(Kind.PITCHFORK, p, 0.0, at.orbit, at.mode, at.multiplier, 0.0, period=at.period)
-                if fold := _fold(family, fork, q, between[0]):
-                    yield fold, q
-                    break
-            else:
-                self.lost.append(len(stretch))
 
     def _add(self, curve: Curve2, edge: Edge) -> None:
         """Keep a curve in the order of the map's axes, and say where it ends before it should."""
@@ -253,40 +258,11 @@ class Search:
     def _told(self, count: int, point: Point2) -> None:
         self.progress(0.5, f"curve {len(self.curves) + 1}, {count} points")
 
-    def _box(self) -> tuple[_Ends, _Ends]:
+    def _box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Part of the plane in which there are results."""
         rows, columns = np.nonzero(self.grid.unstable >= 0)
         x, y = self.grid.x[[columns.min(), columns.max()]], self.grid.y[[rows.min(), rows.max()]]
         return (float(x[0]), float(x[1])), (float(y[0]), float(y[1]))
-
-
-def _subcritical(curve: Curve2) -> Iterator[list[Point2]]:
-    """Subcritical stretches of a pitchfork curve at whose ends it does not turn, without points where the straight walk
-    is unstable on both sides."""
-    points = [each for each in curve.points if getattr(each, "kind", _TURN) is _TURN]
-    for hard, places in groupby(range(len(points)), lambda i: (points[i].coefficient or 0.0) > 0.0):
-        run = [*places]
-        beside = points[max(0, run[0] - 1) : run[-1] + 2]
-        leading = [each for each in points[run[0] : run[-1] + 1] if np.abs(each.multipliers).max() < 1.0 + _ON_CIRCLE]
-        if hard and leading and not any(each in beside for each in curve.special):
-            yield leading
-
-
-def _fold(family: _Family, fork: BifurcationPoint, second: float, ends: _Ends) -> BifurcationPoint | None:
-    """First fold of the curved walks that leave a pitchfork, as the first number changes within an interval; None if
-    none is found."""
-
-    def followed(value: float) -> PlanarModel:
-        return FollowedModel(family(value, second).robot, TOLERANCE)
-
-    with suppress(ChilopodError):
-        branch: Any = stability.switch(followed, fork)[0]  # the other is its mirror image
-        for _ in range(_PIECES):
-            branch = stability.follow(followed, branch, ends, points=_PIECE, closely=False, precision=TOLERANCE)
-            fold = next((each.bifurcation for each in branch.points if each.special is Kind.FOLD), None)
-            if fold or branch.ending is not Ending.ENOUGH_POINTS:
-                return fold
-    return None
 
 
 def _distance(line: Array, point: Array) -> float:

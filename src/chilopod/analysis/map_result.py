@@ -46,10 +46,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         Radius of the curved walks, m, shape (rows, columns), NaN where there is none or it was not computed.
     curves
         Curves of bifurcations.
-    remarks
-        Sentences about what may be missing, and why robots are invalid.
-    folds_lost
-        True if folds were to be followed, and some were not found.
+    remarks, folds_lost
+        Sentences about what may be missing, and why robots are invalid; True if folds were searched in vain.
     """
 
     robot: Robot
@@ -206,10 +204,10 @@ def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) ->
         if curve.kind is kind:
             along, across = curve.values[:, axis], curve.values[:, 1 - axis]
             chosen = (np.nan_to_num(curve.coefficient) > 0.0) | (kind is Kind.FOLD)
-            if not curve.line:  # points at numbers of modules
+            if curve.line:
+                meets = (np.diff(np.sign(across - value)) != 0.0) & chosen[:-1]
+                part = (value - across[:-1][meets]) / np.diff(across)[meets]
+                places.append(along[:-1][meets] + part * np.diff(along)[meets])
+            else:  # points at numbers of modules
                 places.append(along[chosen & (across == value)])
-                continue
-            meets = (np.diff(np.sign(across - value)) != 0.0) & chosen[:-1]
-            part = (value - across[:-1][meets]) / np.diff(across)[meets]
-            places.append(along[:-1][meets] + part * np.diff(along)[meets])
     return np.concatenate(places)

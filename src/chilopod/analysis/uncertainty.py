@@ -219,9 +219,9 @@ def uncertainty(
             try:
                 robot.with_value(path, end)
             except ChilopodError as error:
-                number, within = (units.format(each, robot.unit_of(path), digits=4) for each in (end, tolerance))
-                said = f"{path} = {number}: {error.problem}"
-                raise ParameterError(said, field="tolerances", value=within, allowed=error.allowed) from None
+                error.problem = f"{path} = {units.format(end, robot.unit_of(path), digits=4)}: {error.problem}"
+                error.field, error.value = "tolerances", tolerance
+                raise
         if onset.parameter in (path, path.partition("[")[0]):
             said = "must not be the number whose critical value is searched"
             raise ParameterError(said, field="tolerances", value=path)
