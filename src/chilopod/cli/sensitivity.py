@@ -85,7 +85,7 @@ def compare(
             "walk), settling, margin, friction, work.",
         ),
     ] = "onset,growth,speed",
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of orders, for more than 8 differences.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of orders, for more than 9 differences.")] = 0,
 ) -> None:
     """Differing numbers of two robots, and the part of each in the difference of where they bend.
 
