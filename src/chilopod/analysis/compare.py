@@ -27,7 +27,7 @@ from chilopod.robot import Robot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_ORDERS = 64  # that are sampled, where these take fewer robots than all orders
+_ORDERS = 64  # that are sampled, where all orders take more robots than these can
 _EXACT = 1e-10  # part of a quantity to which it is computed
 _DERIVED = "body.yaw_inertia"
 
@@ -152,8 +152,7 @@ def compare(
     quantities
         Some of :data:`chilopod.analysis.quantities.QUANTITIES`.
     seed
-        Seed of the 64 orders that are sampled where these take fewer robots than all orders, for ten or more
-        differences.
+        Seed of the 64 orders that are sampled for ten or more differences.
     progress
         Function of the fraction done (0 to 1) and a few words.
     """
