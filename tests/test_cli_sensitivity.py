@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from chilopod.analysis.parameters import stiffness
 from helpers.command_line import remarks, run
 
 PRESET = "aoi2022-planar"
@@ -33,6 +34,14 @@ def test_tolerances_of_all_numbers_and_of_one():
     assert 0.0 < found["deviation_sampled_si"] < 0.1 * found["onset_si"]
 
 
+def test_tolerances_of_a_group_of_springs_that_differ():
+    arguments = ("--set", "springs.stiffness[4]=60 N*mm/deg", "--uncertain", "springs.stiffness[3:]=20%")
+    code, out, _ = run("sensitivity", PRESET, *arguments, "--samples", "16", "--json")
+    found = json.loads(out)["numbers"]
+    assert (code, [*found]) == (0, ["springs.stiffness[3]", "springs.stiffness[4]"])
+    assert [each["tolerance_si"] for each in found.values()] == pytest.approx([stiffness(8.2), stiffness(12.0)])
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -49,6 +58,10 @@ def test_tolerances_of_all_numbers_and_of_one():
         (("--uncertain", "150%"), "--uncertain = '150%': must be a share above 0 % and below 100 %"),
         (("--uncertain", "body.mass=20 kg"), "body.mass = -11.5"),
         (("--uncertain", "springs.damping[0]=0.001"), "springs.damping[0] = -0.001"),
+        (
+            ("--set", "springs.damping=0.02", "--uncertain", "springs.damping[0]=0.05"),
+            "--uncertain = 'springs.damping[0]=0.05': springs.damping[0] = -0.03 N*m*s/rad: must not be negative",
+        ),
         (("--uncertain", "springs.damping=10%"), "is 0, which has no share"),
         (("--uncertain", "5%", "--show", "growth"), "goes without --uncertain only"),
         (("--uncertain", "springs.stiffness[0]=10%"), "must not be the number whose critical value is searched"),

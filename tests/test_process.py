@@ -79,6 +79,24 @@ except KeyboardInterrupt:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGTERM")
+def test_sigterm_ends_what_takes_long_to_stop():
+    script = """
+import signal, threading, time
+from contextlib import suppress
+from chilopod import process
+process._PATIENCE = process._GRACE = 0.05
+signal.signal(signal.SIGTERM, signal.SIG_DFL)
+process.answer_interrupts()
+threading.Thread(target=time.sleep, args=(30.0,)).start()
+with suppress(KeyboardInterrupt):
+    signal.raise_signal(signal.SIGTERM)
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=20.0)
+    said = "stopping ... (Ctrl-C once more ends at once)\nerror: interrupted\n"
+    assert (ended.returncode, ended.stderr) == (128 + signal.SIGTERM, said)
+
+
 def test_an_end_on_the_spot_leaves_no_semaphores(tmp_path):
     (tmp_path / "interrupted_import.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     script = """

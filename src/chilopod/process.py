@@ -27,6 +27,7 @@ INTERRUPTED = 130
 _ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # not all systems have all of them
 
 _PATIENCE = 1.0  # s after Ctrl-C until a message that work is still being stopped
+_GRACE = 4.0  # s from then to the end of what was ended by another signal, which nobody repeats
 _SHOW_CURSOR = b"\n\x1b[?25h"  # a progress bar hides it
 
 
@@ -90,7 +91,7 @@ def answer_interrupts() -> None:
 
     The signals raise KeyboardInterrupt, so that cleanup runs. During an import (where C code may change or lose the
     exception) and at a second Ctrl-C the process ends at once; files are complete or absent at any moment. If stopping
-    takes more than a second, a line says so.
+    takes more than a second, a line says so, and unless it was Ctrl-C, the process ends four seconds later.
     """
     # Ignored in the background of a script, or by nohup, they stay ignored.
     usual = (signal.default_int_handler, signal.SIG_DFL)
@@ -179,15 +180,17 @@ def _unraisable(found: Any) -> None:
 
 
 def _watch(pressed: int) -> None:
-    _next(pressed, *(each for each in signal.Signals if each.name in _ENDS))
+    first = _next(pressed, *(each for each in signal.Signals if each.name in _ENDS))
     time.sleep(_PATIENCE)
     with suppress(OSError):
         os.write(2, b"stopping ... (Ctrl-C once more ends at once)\n")
-    _next(pressed, signal.SIGINT)
+    _next(pressed, signal.SIGINT) if first == signal.SIGINT else time.sleep(_GRACE)
+    _pressed.append(first)  # nothing else has, while compiled code runs
     leave()
 
 
-def _next(pressed: int, *numbers: int) -> None:
+def _next(pressed: int, *numbers: int) -> int:
     """Wait for one of some signals."""
-    while os.read(pressed, 1)[0] not in numbers:
+    while (number := os.read(pressed, 1)[0]) not in numbers:
         pass
+    return number

@@ -1,13 +1,14 @@
 """Two robots, number by number."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
 
 from chilopod.analysis import Onset, bifurcations, compare
 from chilopod.analysis.parameters import K1, stiffness
-from chilopod.analysis.quantities import leading_mode
+from chilopod.analysis.quantities import Measured, leading_mode
 from chilopod.errors import ParameterError
 from chilopod.robot import load_robot
 
@@ -52,6 +53,32 @@ def test_many_differences_are_changed_in_sampled_orders():
     # Small changes hardly depend on their order.
     assert effects.mean == pytest.approx(effects.alone, rel=0.1, abs=1e-4)
     assert "64 of the orders" in found.lines()[-1]
+
+
+def test_nine_differences_take_no_more_robots_than_all_subsets(monkeypatch):
+    asked = []
+    monkeypatch.setattr(Measured, "margin", lambda self, robot: asked.append(robot) or robot.body.mass)
+    paths = ["body.mass", "body.length", "legs.half_width", "legs.forward_offset", "ground.friction"]
+    other = ROBOT
+    for path in [*paths, *(f"springs.stiffness[{joint}]" for joint in range(1, 5))]:
+        other = other.with_value(path, 1.01 * ROBOT.get(path) + (path == "springs.stiffness[4]") * 1e-4)
+    found = compare(ROBOT, other, quantities=("margin",))
+    effects = found.effects["margin"]
+    assert (len(found.paths), len(asked)) == (9, 512)
+    expected = [0.01 * ROBOT.body.mass if path == "body.mass" else 0.0 for path in found.paths]
+    np.testing.assert_allclose(effects.mean, expected, rtol=1e-9, atol=1e-12)
+    assert not effects.error.any()
+    lines = found.lines()
+    assert ("margin ()" in lines[1], "  and" in lines[0]) == (False, False)
+    assert [line.split()[-1] for line in lines[3:11]] == ["0"] * 8
+
+
+@pytest.mark.parametrize("springs", ["springs.stiffness[2]", "springs.stiffness[2:]"])
+def test_a_number_that_one_of_the_robots_has_not_is_refused(springs):
+    short, between = ROBOT.with_value("body.modules", 3), (0.1, 5.0)
+    for pair in ((ROBOT, short), (short, ROBOT)):
+        with pytest.raises(ParameterError, match=rf"^{short.name}: {re.escape(springs)}: must be "):
+            compare(*pair, Onset(springs, between), ("onset",))
 
 
 def test_planar_numbers_of_a_robot_with_a_twin_are_compared():

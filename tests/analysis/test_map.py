@@ -155,6 +155,45 @@ def test_folds_begin_where_the_pitchfork_turns(monkeypatch):
     assert found.remarks == ("a curve that begins at a pitchfork is not followed to its end: no fold is near",)
 
 
+@pytest.fixture(scope="module")
+def subcritical():
+    """A robot of three modules whose pitchfork is subcritical, far from where it turns; an axis; the fold on it."""
+    numbers = {"body.modules": 3, "body.length": 0.45, "body.mass": 2.325, "springs.damping": 0.02}
+    numbers |= {"legs.forward_offset": 0.031, "gait.stride": 0.022, "gait.module_phase": np.deg2rad(77.0)}
+    robot = ROBOT
+    for path, number in {**numbers, "springs.stiffness[1]": stiffness(20.0)}.items():
+        robot = robot.with_value(path, number)
+    walks = curved_walks(robot, K1, (stiffness(3.0), stiffness(6.0)), points=12)
+    (fold,) = walks.parameter_si.values[walks.special == Kind.FOLD.label]
+    return robot, (K1, stiffness(3.0), stiffness(6.0)), fold
+
+
+def test_folds_at_numbers_of_modules_are_those_of_branches(subcritical, monkeypatch):
+    robot, x, there = subcritical
+    found = mapped(robot, x, ("modules", 2, 3), points=9, also=["folds"])
+    (fold,) = (curve for curve in found.curves if curve.kind is Kind.FOLD)
+    assert abs(fold.values[0, 0] - there) <= 2.0 * fold.error_bound[0, 0]
+    between = (found.x_values > found.curves[0].values[0, 0]) & (found.x_values < there)
+    np.testing.assert_array_equal(found.folded, [np.zeros(9, dtype=bool), between])
+    assert between.any()
+    monkeypatch.setattr(map_curves, "_PIECES", 0)
+    lost = mapped(robot, x, ("modules", 2, 3), points=9, also=["folds"])
+    assert lost.remarks == ("the pitchfork is subcritical at 1 points, but its folds were not found",)
+    assert lost.as_json()["folded_share"] is None
+
+
+def test_folds_of_a_pitchfork_that_turns_nowhere_on_the_map(subcritical, monkeypatch):
+    """From a branch of curved walks; a part in a thousand of the mass does not matter."""
+    robot, x, there = subcritical
+    monkeypatch.setattr(map_curves, "_LONGEST", 0.5)
+    monkeypatch.setattr(map_curves, "_FOLD_POINTS", 1)
+    found = mapped(robot, x, ("body.mass", 2.325, 2.327), points=3, also=["folds"])
+    pitchfork, folds = found.curves
+    assert (pitchfork.kind, pitchfork.special, folds.kind) == (Kind.PITCHFORK, (), Kind.FOLD)
+    np.testing.assert_allclose(folds.values[:, 0], there, rtol=1e-5)
+    assert folds.values[:, 0].min() > pitchfork.values[:, 0].max() * 1.2
+
+
 def test_between_a_fold_and_a_subcritical_pitchfork_curved_walks_exist_too():
     # Two lines that meet at k1 = 10, an offset of 50 mm; the pitchfork is subcritical below.
     found = mapped(ROBOT, (K1, "9.04 N*mm/deg", "11 N*mm/deg"), (OFFSET[0], "31 mm", "72 mm"), points=9)
@@ -233,6 +272,13 @@ def test_robots_that_cannot_be_are_a_fate_of_their_own():
     assert "there is no robot: springs.stiffness[0]" in remark
 
 
+def test_every_reason_why_there_is_no_robot_is_said():
+    found = mapped(ROBOT, ("modules", 1, 3), ("springs.stiffness[2]", 1.0, 2.0), points=2)
+    (remark,) = found.remarks
+    assert remark.startswith("at 6 of the values there is no robot: body.modules = 1.0: ")
+    assert "; or springs.stiffness[2]: must be the index of a spring" in remark
+
+
 def test_a_map_that_was_cut_off_goes_on(tmp_path, monkeypatch):
     axes, file = ((K1, 0.9, 2.0), (OFFSET[0], 0.02, 0.06)), tmp_path / "rates.nc"
     counts, compute = [], map_grid.growth_rates
@@ -292,3 +338,12 @@ def test_few_points_and_a_long_map_are_said(monkeypatch):
     monkeypatch.setattr(sys.modules[mapped.__module__], "_LONG", 1e-3)
     mapped(ROBOT, (K1, 1.9, 2.0), ("legs.half_width", 0.07, 0.08), points=2, remark=said.append)
     assert "the map takes about" in said[0]
+
+
+def test_a_map_of_hours_is_refused_unless_growth_rates_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[mapped.__module__], "_LONG", 1e-3)
+    monkeypatch.setattr(sys.modules[mapped.__module__], "_LONGEST", 1e-6)
+    axes = (K1, 1.9, 2.0), ("legs.half_width", 0.07, 0.08)
+    with pytest.raises(ParameterError, match=r"^points = 2: the map would take about .*; allowed: "):
+        mapped(ROBOT, *axes, points=2)
+    assert mapped(ROBOT, *axes, points=2, kept=tmp_path / "rates.nc").growth.shape == (2, 2)

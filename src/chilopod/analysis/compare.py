@@ -27,10 +27,8 @@ from chilopod.robot import Robot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-EXACT = 8
-"""Number of differences up to which all orders are computed; above it some orders are sampled."""
-
-_ORDERS = 64  # that are sampled
+_ORDERS = 64  # that are sampled, where all orders take more robots than these can
+_EXACT = 1e-10  # part of a quantity to which it is computed
 _DERIVED = "body.yaw_inertia"
 
 
@@ -74,7 +72,7 @@ class RobotComparison(Summary):
 
     def _shown(self, name: str, value: float) -> str:
         unit = unit_of(name, self.first, self.onset)
-        return f"{units.from_si(value, unit):.4g} {unit}" if math.isfinite(value) else "none"
+        return f"{units.from_si(value, unit):.4g} {unit}".rstrip() if math.isfinite(value) else "none"
 
     def as_json(self) -> dict[str, Any]:
         """Differences and effects as plain numbers, SI; null where a robot has no such quantity."""
@@ -108,18 +106,17 @@ class RobotComparison(Summary):
         tail = [f"no effect on planar walks: {', '.join(self.others)}"] * bool(self.others)
         if not self.paths:
             return [], [], ["no number that the planar model reads differs", *tail]
-        heads = [f"{name} ({unit_of(name, self.first, self.onset)})" for name in self.effects]
+        named = {name: unit_of(name, self.first, self.onset) for name in self.effects}
+        heads = [f"{name} ({unit})".removesuffix(" ()") for name, unit in named.items()]
         cells: list[Sequence[str]] = [("number", self.first.name, self.second.name, *heads)]
         first = next(iter(self.effects.values()))
         for at in np.argsort(-np.abs(np.nan_to_num(first.mean))).tolist():
             row = [self.paths[at], *(_text(robot, self.paths[at]) for robot in (self.first, self.second))]
             for name, found in self.effects.items():
-                mean, error = (
-                    units.from_si(float(x[at]), unit_of(name, self.first, self.onset))
-                    for x in (found.mean, found.error)
-                )
+                mean, error = (units.from_si(float(x[at]), named[name]) for x in (found.mean, found.error))
                 scatter = f" ± {error:.1g}" if error > 0.0 else ""
-                row.append((f"{mean:+.4g}{scatter}" if mean else "0") if math.isfinite(mean) else "unknown")
+                none = abs(found.mean[at]) <= _EXACT * max(abs(found.first), abs(found.second))
+                row.append(("0" if none else f"{mean:+.4g}{scatter}") if math.isfinite(mean) else "unknown")
             cells.append(row)
         sampled = any(found.error.any() for found in self.effects.values())
         orders = f"{_ORDERS} of the orders" if sampled else "all orders"
@@ -133,7 +130,8 @@ class RobotComparison(Summary):
         name, found = next(iter(self.effects.items()))
         unit = unit_of(name, self.first, self.onset)
         parts = {path: units.from_si(float(each), unit) for path, each in zip(self.paths, found.mean, strict=True)}
-        return tornado(axes, parts, f"part in the difference of the {name} ({unit})", self.title.partition(":")[0])
+        said = f"part in the difference of the {name} ({unit})".removesuffix(" ()")
+        return tornado(axes, parts, said, self.title.partition(":")[0])
 
 
 def compare(
@@ -154,10 +152,16 @@ def compare(
     quantities
         Some of :data:`chilopod.analysis.quantities.QUANTITIES`.
     seed
-        Seed of the orders that are sampled for more than :data:`EXACT` differences.
+        Seed of the 64 orders that are sampled for ten or more differences.
     progress
         Function of the fraction done (0 to 1) and a few words.
     """
+    for robot in (first, second):
+        try:
+            robot.unit_of(onset.parameter)
+        except ParameterError as error:
+            error.source = robot.name
+            raise
     names, measured = known_names(quantities, QUANTITIES, "quantities"), Measured(onset)
     one, other = _comparable(first, second)
     paths, others = differences(one, other, onset)
@@ -229,7 +233,8 @@ def _effects(
     show: Progress,
 ) -> Effects:
     count, known = len(paths), dict[frozenset[int], float]()
-    most = 2**count if count <= EXACT else _ORDERS * count
+    most = min(2**count, _ORDERS * count) if count else 1
+    exact = most == 2**count
 
     def value(changed: frozenset[int]) -> float:
         """The quantity of the first robot with some numbers of the second; NaN where it has none."""
@@ -249,17 +254,19 @@ def _effects(
     ends = value(frozenset()), value(whole)
     alone = [value(frozenset([at])) - ends[0] for at in whole]
     last = [ends[1] - value(whole - {at}) for at in whole]
-    exact = count <= EXACT
-    orders = (
-        itertools.permutations(range(count)) if exact else (rng.permutation(count).tolist() for _ in range(_ORDERS))
-    )
-    parts = []
-    for order in orders:
-        so_far, row = frozenset[int](), np.zeros(count)
-        for at in order:
+    if exact:
+        means = np.zeros(count)
+        for size in range(count):
+            weight = 1.0 / (count * math.comb(count - 1, size))  # part of the orders in which these come first
+            for earlier in map(frozenset, itertools.combinations(range(count), size)):
+                for at in whole - earlier:
+                    means[at] += weight * (value(earlier | {at}) - value(earlier))
+        return Effects(*ends, np.array(alone), np.array(last), means, np.zeros(count))
+    parts = np.zeros((_ORDERS, count))
+    for row in parts:
+        so_far = frozenset[int]()
+        for at in rng.permutation(count).tolist():
             row[at] = value(so_far | {at}) - value(so_far)
             so_far |= {at}
-        parts.append(row)
-    rows = np.array(parts)
-    scatter = np.zeros(count) if exact else rows.std(axis=0, ddof=1) / math.sqrt(len(rows))
-    return Effects(*ends, np.array(alone), np.array(last), rows.mean(axis=0), scatter)
+    scatter = parts.std(axis=0, ddof=1) / math.sqrt(_ORDERS)
+    return Effects(*ends, np.array(alone), np.array(last), parts.mean(axis=0), scatter)

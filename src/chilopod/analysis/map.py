@@ -15,7 +15,7 @@ import xarray as xr
 
 from chilopod.analysis.growth import FATES, Fate, growth_rates
 from chilopod.analysis.map_axes import DERIVED, Given, Plane
-from chilopod.analysis.map_curves import MapCurve, Search
+from chilopod.analysis.map_curves import Search
 from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
 from chilopod.analysis.map_result import StabilityMap
 from chilopod.analysis.parameters import ALL
@@ -36,6 +36,7 @@ POINTS = 129
 _ALSO = ("folds", "radius")
 _MOST_POINTS = 4097
 _LONG = 600.0  # s: a map that takes longer is announced
+_LONGEST = 4.0  # hours: one that takes longer is refused, unless its growth rates are kept
 _CURVE_RATES = 5e3  # growth rates that take as long as a curve
 _LATTICE = 24  # radii along an axis
 _BRANCHES = 12  # that are followed from the onset, a few seconds each, before other radii are left out
@@ -72,7 +73,8 @@ def map(
         ``folds`` to follow the folds of the curved walks too, which takes a minute; ``radius`` to compute the radius of
         the curved walks on a lattice of 24 x 24 values, some 50 ms each.
     kept
-        File that holds growth rates while they are computed; a map that was cut off goes on from it.
+        File that holds growth rates while they are computed; a map that was cut off goes on from it. Without it a map
+        that would take more than four hours is refused.
     remark
         Function that receives a sentence if the map will take long.
     progress
@@ -82,7 +84,7 @@ def map(
     ------
     ParameterError
         If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if
-        radii are wanted and neither axis is a number of the robot.
+        radii are wanted and neither axis is a number of the robot; if the map would take too long.
     """
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:
@@ -94,7 +96,7 @@ def map(
     grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
     if file is not None:
         _take(grid, file)
-    _announce(grid, remark)
+    _announce(grid, remark, points, file is not None)
     wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
     grid.refine(wanted, part(progress, 0.0, 0.5))
     search = Search(plane, grid, "folds" in also, part(progress, 0.5, 1.0))
@@ -107,25 +109,31 @@ def map(
     lost: list[str] = []
     if bending is not None:
         bent, lost = _radii(grid, bending, part(progress, 0.5, 1.0))
-    return _result(grid, search.curves, bent, [*dict.fromkeys(search.remarks), *_invalid(grid), *lost])
+    if sum(search.lost):
+        lost.append(f"the pitchfork is subcritical at {sum(search.lost)} points, but its folds were not found")
+    return _result(grid, search, bent, [*dict.fromkeys(search.remarks), *_invalid(grid), *lost])
 
 
-def _result(grid: Grid, curves: Sequence[MapCurve], radius: Array, remarks: Sequence[str]) -> StabilityMap:
+def _result(grid: Grid, search: Search, radius: Array, remarks: Sequence[str]) -> StabilityMap:
     plane, values = grid.plane, grid.values
     whole = values[UNSTABLE].astype(np.int16), values[FATE].astype(np.int8)
     columns = plane.x, plane.y, grid.x, grid.y, values[GROWTH], values[FREQUENCY], values[ERROR]
-    return StabilityMap(plane.robot, *columns, *whole, grid.computed, radius, tuple(curves), tuple(remarks))
+    curves, lost = tuple(search.curves), bool(search.lost)
+    return StabilityMap(plane.robot, *columns, *whole, grid.computed, radius, curves, tuple(remarks), lost)
 
 
 def _invalid(grid: Grid) -> list[str]:
-    """A sentence about the values that have no robot, with the reason at one of them."""
+    """A sentence about the values that have no robot, with the reasons at the first of every row and column."""
     rows, columns = np.nonzero(grid.values[FATE] == FATES.index(Fate.INVALID))
-    reasons = [*grid.robots(grid.x[columns[:1]].tolist(), grid.y[rows[:1]].tolist())]
-    return [f"at {rows.size} of the values there is no robot: {why}" for why in reasons]
+    first = np.unique([*np.unique(rows, return_index=True)[1], *np.unique(columns, return_index=True)[1]]).astype(int)
+    found = grid.robots(grid.x[columns[first]].tolist(), grid.y[rows[first]].tolist())
+    reasons = {(why.field, why.problem): str(why) for why in found if isinstance(why, ChilopodError)}
+    return [f"at {rows.size} of the values there is no robot: {'; or '.join(reasons.values())}"] if reasons else []
 
 
-def _announce(grid: Grid, remark: Callable[[str], None]) -> None:
-    """Say how long a map will take, if that is long, from the time of its corners."""
+def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
+    """Say how long a map will take, if that is long, from the time of its corners; refuse one of many hours if its
+    growth rates are not kept."""
     corners = grid.robots(grid.x[[0, -1]].tolist(), grid.y[[-1, 0]].tolist())
     robots = [robot for robot in corners if isinstance(robot, Robot)]
     growth_rates([grid.plane.robot.with_value("body.modules", 2)], 1)  # compiles
@@ -140,6 +148,9 @@ def _announce(grid: Grid, remark: Callable[[str], None]) -> None:
     if each * rates > _LONG:
         hours = each * rates / 3600.0
         said = f"{hours:.2g} hours" if hours > 1.0 else f"{60.0 * hours:.2g} minutes"
+        if hours > _LONGEST and not kept:
+            allowed = f"{_LONGEST:g} hours, more if growth rates are kept (--out); fewer points or modules take less"
+            raise ParameterError(f"the map would take about {said}", field="points", value=points, allowed=allowed)
         remark(f"the map takes about {said}: {each:.2g} s a growth rate; fewer points or modules take less")
 
 

@@ -3,6 +3,7 @@ unstable multipliers, and continued from there."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import stability
+from chilopod.analysis.branch import TOLERANCE
 from chilopod.analysis.map_axes import Plane
 from chilopod.analysis.map_grid import Grid
 from chilopod.analysis.straight_walk import coefficient_of
@@ -26,6 +28,8 @@ _MOST = 12  # curves
 _COVERED = 1.5  # cells between an edge of the grid and the curve that crosses it
 _FOLD_TOLERANCE = 1e-12  # of the flow; a fold is known to about its square root
 _FOLD_POINTS = 100
+_PIECES, _PIECE = 12, 5  # parts in which a branch is followed to its fold, and points of each
+_ON_CIRCLE = 1.0 + 1e-6  # modulus of a critical multiplier, at most
 _ENDS = Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS
 
 
@@ -85,8 +89,8 @@ class Search:
 
     Attributes
     ----------
-    curves, remarks
-        Curves found so far; sentences about those that may be missing.
+    curves, remarks, lost
+        Curves found so far; sentences about those that may be missing; numbers of pitchforks without their folds.
     """
 
     plane: Plane
@@ -95,6 +99,7 @@ class Search:
     progress: Progress
     curves: list[MapCurve] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    lost: list[int] = field(default_factory=list)
     _tried: set[Edge] = field(default_factory=set)
 
     def run(self) -> None:
@@ -167,39 +172,72 @@ class Search:
         return float(self.grid.y[edge.j] if edge.across else self.grid.x[edge.i])
 
     def _located(self, edge: Edge) -> list[BifurcationPoint]:
+        """Bifurcations on an edge; at a number of modules the folds of the curved walks that begin there, too."""
         values, first = (self.grid.x, edge.i) if edge.across else (self.grid.y, edge.j)
-        beside = self._beside(edge)
+        beside, whole = self._beside(edge), self.plane.x.whole or self.plane.y.whole
 
         def family(value: float) -> PlanarModel:
             return self.plane.model(*edge.ordered(value, beside))
 
         try:
             ends = float(values[first]), float(values[first + 1])
-            return list(stability.locate(family, ends, normal_form=self.plane.x.whole or self.plane.y.whole))
+            points = list(stability.locate(family, ends, normal_form=whole))
         except ChilopodError as error:
             self.remarks.append(f"a bifurcation between two neighbours is not located: {error}")
             return []
+        gives_way = 0 in self.grid.unstable[edge.j : edge.j + 2 - edge.across, edge.i : edge.i + 1 + edge.across]
+        for point in [*points] if whole and self.with_folds and gives_way else ():
+            if point.kind is Kind.PITCHFORK and (point.coefficient or 0.0) > 0.0:
+                points += self._fold(edge, point, point.value, beside, 1)
+        return points
+
+    def _fold(self, edge: Edge, at: BifurcationPoint | Point2, p: float, q: float, n: int) -> list[BifurcationPoint]:
+        """Fold of the curved walks that leave one of n subcritical pitchforks, as the number along an edge changes, if
+        it is found on the map."""
+
+        def family(value: float) -> PlanarModel:
+            return FollowedModel(self.plane.at(*edge.ordered(value, q)), TOLERANCE)
+
+        fork = BifurcationPoint(Kind.PITCHFORK, p, 0.0, at.orbit, at.mode, at.multiplier, 0.0, period=at.period)
+        ends, *_ = edge.ordered(*self._box())
+        with suppress(ChilopodError):
+            branch: Any = stability.switch(family, fork)[0]  # the other is its mirror image
+            for _ in range(_PIECES):
+                branch = stability.follow(family, branch, ends, points=_PIECE, closely=False, precision=TOLERANCE)
+                folds = [each.bifurcation for each in branch.points if each.special is Kind.FOLD]
+                if folds:
+                    return folds[:1]
+        self.lost.append(n)
+        return []
 
     def _follow(self, point: BifurcationPoint, edge: Edge) -> None:
         """Continue a curve through a located point, and the folds that begin on it."""
         between = edge.ordered(*self._box())
         how: dict[str, Any] = {"between": between, "longest": _LONGEST, "progress": self._told}
+        few: dict[str, Any] = {**how, "points": _FOLD_POINTS, "coefficients": False}
 
         def family(p: float, q: float) -> PlanarModel:
             return self.plane.model(*edge.ordered(p, q))
 
         def loose(p: float, q: float) -> PlanarModel:
-            return FollowedModel(family(p, q).robot, _FOLD_TOLERANCE)
+            return FollowedModel(family(p, q).robot, _FOLD_TOLERANCE, use_symmetry=False)
 
         try:
             curve = follow2(family, point, second=self._beside(edge), points=400, **how)
             self._add(curve, edge)
-            for special in curve.special if self.with_folds else ():
-                if special.kind is CodimensionTwo.DEGENERATE_PITCHFORK:
-                    # Both starts are mirror images of one curve.
-                    start, *_ = switch2(family, special, between)
-                    self._add(follow2(loose, start, points=_FOLD_POINTS, coefficients=False, **how), edge)
+            turns = [each for each in curve.special if each.kind is CodimensionTwo.DEGENERATE_PITCHFORK]
+            for turn in turns if self.with_folds else ():
+                # Both starts are mirror images of one curve.
+                self._add(follow2(loose, switch2(family, turn, between)[0], **few), edge)
+            leading = [each for each in curve.points if np.abs(each.multipliers).max() < _ON_CIRCLE]
+            hard = [each for each in leading if (each.coefficient or 0.0) > 0.0]
+            if self.with_folds and curve.kind is Kind.PITCHFORK and hard and not turns:
+                at = hard[len(hard) // 2]
+                p, q = at.values.tolist()
+                for fold in self._fold(edge, at, p, q, len(hard)):
+                    self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
+            self.lost += [0] * self.with_folds
             self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
 
     def _add(self, curve: Curve2, edge: Edge) -> None:

@@ -46,8 +46,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         Radius of the curved walks, m, shape (rows, columns), NaN where there is none or it was not computed.
     curves
         Curves of bifurcations.
-    remarks
-        Sentences about what may be missing, and why robots are invalid.
+    remarks, folds_lost
+        Sentences about what may be missing, and why robots are invalid; True if folds were searched in vain.
     """
 
     robot: Robot
@@ -64,6 +64,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
     radius: Array
     curves: tuple[MapCurve, ...]
     remarks: tuple[str, ...]
+    folds_lost: bool = False
 
     @property
     def special(self) -> tuple[MapPoint, ...]:
@@ -152,7 +153,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "values": [self.x_values.size, self.y_values.size],
             "computed": int(self.computed.sum()),
             "shares": {fate.label: share for fate, share in self.shares.items()},
-            "folded_share": float(self.folded.mean()),
+            "folded_share": None if self.folds_lost else float(self.folded.mean()),
             "curves": [
                 {**plain(curve), "coefficients": [*map(finite, curve.coefficient.tolist())], "line": curve.line}
                 for curve in self.curves
@@ -200,11 +201,13 @@ def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) ->
     """Places along an axis where folds, or subcritical pitchforks, have a value of the other number, in SI units."""
     places = [np.empty(0)]
     for curve in curves:
-        if curve.kind is kind and curve.line:
+        if curve.kind is kind:
             along, across = curve.values[:, axis], curve.values[:, 1 - axis]
-            meets = np.diff(np.sign(across - value)) != 0.0
-            if kind is not Kind.FOLD:
-                meets &= np.nan_to_num(curve.coefficient[:-1]) > 0.0
-            part = (value - across[:-1][meets]) / np.diff(across)[meets]
-            places.append(along[:-1][meets] + part * np.diff(along)[meets])
+            chosen = (np.nan_to_num(curve.coefficient) > 0.0) | (kind is Kind.FOLD)
+            if curve.line:
+                meets = (np.diff(np.sign(across - value)) != 0.0) & chosen[:-1]
+                part = (value - across[:-1][meets]) / np.diff(across)[meets]
+                places.append(along[:-1][meets] + part * np.diff(along)[meets])
+            else:  # points at numbers of modules
+                places.append(along[chosen & (across == value)])
     return np.concatenate(places)

@@ -216,7 +216,12 @@ def uncertainty(
         if not (math.isfinite(tolerance) and tolerance > 0.0):
             raise ParameterError("must be positive and finite", field=f"tolerance of {path}", value=tolerance)
         for end in (robot.get(path) - tolerance, robot.get(path) + tolerance):
-            robot.with_value(path, end)  # a number that no robot has is refused
+            try:
+                robot.with_value(path, end)
+            except ChilopodError as error:
+                error.problem = f"{path} = {units.format(end, robot.unit_of(path), digits=4)}: {error.problem}"
+                error.field, error.value = "tolerances", tolerance
+                raise
         if onset.parameter in (path, path.partition("[")[0]):
             said = "must not be the number whose critical value is searched"
             raise ParameterError(said, field="tolerances", value=path)

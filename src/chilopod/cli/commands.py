@@ -12,7 +12,7 @@ from chilopod.errors import ChilopodError, ParameterError
 
 _TYPED_AS = {
     **{"joint_angles": "initial_joints", "spring": "k1", "twin": "engine", "body.modules": "modules"},
-    "quantities": "show",
+    **{"quantities": "show", "tolerances": "uncertain"},
 }
 """Options that are called otherwise than the argument of the function that they are for."""
 

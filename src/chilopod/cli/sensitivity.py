@@ -85,7 +85,7 @@ def compare(
             "walk), settling, margin, friction, work.",
         ),
     ] = "onset,growth,speed",
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of orders, for more than 8 differences.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of orders, for more than 9 differences.")] = 0,
 ) -> None:
     """Differing numbers of two robots, and the part of each in the difference of where they bend.
 
@@ -106,6 +106,7 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
     """Tolerances by path, SI; a share of all numbers leaves out those that are zero and that which varies."""
     from chilopod import units
     from chilopod.analysis.parameters import check_parameter, numbers_read
+    from chilopod.robot.parameters import place_of
 
     found: dict[str, float] = {}
     named: set[str] = set()
@@ -125,7 +126,8 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
                     said = "must not be the number whose critical value is searched"
                     raise ParameterError("must be given once" if path in named else said, value=text)
                 named.add(path)
-                paths = [each for each in others if each.partition("[")[0] == path] or [path]
+                stem, joints = path.partition("[")[0], place_of(path).joints(robot.body.modules - 1)
+                paths = [each for each in others if each in [f"{stem}[{i}]" for i in joints]] or [path]
             else:
                 paths = [each for each in others if robot.get(each) and each not in found]
             for each in paths:

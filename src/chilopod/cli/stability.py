@@ -108,7 +108,7 @@ def bifurcation(
     parameter: ParameterOption,
     between: OnsetBetweenOption = None,
     seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.0, help="Time limit of the search, s; it ends with what it has found.")
+        float, typer.Option(metavar="S", min=0.0, help="Time limit, s, above 0; the search ends with what it found.")
     ] = 60.0,
     out: OutOption = None,
 ) -> None:
