@@ -38,7 +38,7 @@ def data(*files, free=FREE, **more):
 
 def test_states_at_any_times_are_those_of_a_simulation():
     record = walked(SOFT, 2.0)
-    there = np.array([3, 6, 7, 40])  # 6 and 12 are switches of the gait
+    there = np.array([0, 3, 6, 7, 40])  # 6 and 12 are switches of the gait
     states = states_at([PlanarModel(SOFT)], np.repeat(START, 2, axis=0), 0.0, record.time.values[there], 1e-9)
     for each in np.moveaxis(states, 1, 0):
         np.testing.assert_allclose(each[:, 3:8], record.joint_angle.values[there, 0], atol=1e-8)
@@ -60,6 +60,21 @@ def test_intervals_cover_the_constants_of_robots_that_are_recorded_from_any_mome
         assert each["value_si"] == pytest.approx(robot.get(path), rel=0.01)
         covered.append(each["interval_si"][0] <= robot.get(path) <= each["interval_si"][1])
     assert sum(covered) >= 2  # by chance fewer of three in one of thirty-five
+
+
+@pytest.mark.parametrize("first", [0, 11])
+def test_a_walk_is_identified_from_its_release_or_any_later_moment(tmp_path, first):
+    # Where both legs of a module are up, joints swing for some time after the release.
+    robot = SOFT.set_from_text(["gait.side_phase=150 deg"])
+    record = walked(robot, 3.4, 50.0).isel(time=slice(first, None, 2))
+    (tmp_path / "walk.nc").write_bytes(netcdf(record))
+    given = RecordedWalks(
+        free={"ground.friction": FREE["ground.friction"]}, trajectory=[{"file": "walk.nc", "settings": [SPRING]}]
+    )
+    found = identify_recorded(robot.with_value("ground.friction", 235.0), given, tmp_path)
+    assert found.scatter < 1e-7
+    assert found.as_json()["phases"] == pytest.approx([first / 50.0 / robot.gait.period], abs=1e-5)
+    assert found.best.get("ground.friction") == pytest.approx(ROBOT.get("ground.friction"), rel=1e-6)
 
 
 def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):

@@ -10,29 +10,38 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.frozen import Array
+from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import RecordedWalks, Trajectory
 from chilopod.text_file import read_text
 
 _LARGEST, _LONGEST = 50_000_000, 3600.0  # bytes, s
 _CYCLES, _NUMBERS = 5, 100  # of the gait, and angles, which a recording must have
+_PARTS, _PHASES, _FORGOTTEN = (0.25, 0.5, 0.75), 6, 1e-3  # of a cycle, number, and what is left of rates, relative
 _UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
 _NUMBER = re.compile(r"(\d+)\W*$")
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Recorded walk: name of the file, numbers of the robot in this walk, times from the first sample on, s, shape
-    (samples,), and joint angles, rad, NaN in gaps, shape (samples, N-1)."""
+    """Recorded walk: name of the file, numbers of the robot in this walk, time in which rates are forgotten, s,
+    times from the first sample on, s, shape (samples,), and joint angles, rad, NaN in gaps, shape (samples, N-1)."""
 
     name: str
     settings: tuple[str, ...]
+    forgotten: float
     times: Array
     angles: Array
+
+    @property
+    def counts(self) -> NDArray[np.bool_]:
+        """True for samples after the rates at the first one, which nothing tells, are forgotten."""
+        return self.times >= self.forgotten
 
 
 def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Recording]:
@@ -62,10 +71,23 @@ def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Record
         for sample, at in np.argwhere(np.isinf(table))[:1].tolist():
             said = f"must be finite, or empty in gaps: sample {sample + 1}"
             raise ParameterError(said, field=f"column {names[at]}", value=table[sample, at])
-        return Recording(given.file, given.settings, *_checked(robot, table * _sizes(names, given.unit)))
+        times, angles = _checked(robot, table * _sizes(names, given.unit))
+        return Recording(given.file, given.settings, _forgotten(PlanarModel(robot)), times, angles)
     except ChilopodError as error:
         error.source = str(path)
         raise
+
+
+def _forgotten(model: PlanarModel) -> float:
+    """Time after which the motion about the straight walk hardly depends on the rates at its start, at any phase, if
+    its joint angles there are free: most of a cycle where the legs of a module leave the floor together. s."""
+    joints, phases = range(3, model.modules + 2), model.period * np.arange(_PHASES) / _PHASES
+    for time in model.period * np.array(_PARTS):
+        flows = [model.flow(model.orbit, at, at + time)[1] / model.scale[:, None] * model.scale for at in phases]
+        pairs = [(np.linalg.qr(flow[:, joints])[0], np.delete(flow, joints, axis=1)) for flow in flows]
+        if all(np.abs(rates - known @ (known.T @ rates)).max() < _FORGOTTEN for known, rates in pairs):
+            return float(time)
+    return model.period
 
 
 def _netcdf(path: Path) -> xr.Dataset:
