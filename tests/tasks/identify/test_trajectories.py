@@ -114,7 +114,11 @@ ANGLES = np.full((200, 5), 10.0)
         (as_csv(TIMES, np.nan * ANGLES), None, r"0 angles in 0 s.*allowed: 3 s \(5 cycles of the gait\)"),
         (as_csv(TIMES[:30], ANGLES[:30]), None, "150 angles in 1.45 s"),
         (as_csv(TIMES, ANGLES[:, :4], "time,a [deg],b [deg],c [deg],d [deg]"), None, "columns = 4: must be 5 besides"),
-        (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), "rad", "angle = '10 rad': too large.*degrees"),
+        (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), "rad", "column a = '10 rad': too large: sample 1, line 2.*degrees"),
+        (
+            "# from the lab\n" + as_csv(TIMES, ANGLES).replace("10.0000\n", "-104.0000\n", 1), None,
+            r"column joint \[deg\] = '-104 deg': too large: sample 1, line 3; allowed: at most 90 deg$",
+        ),
         (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), None, "column = 'a': must have a unit"),
         (as_csv(TIMES, ANGLES, "time [deg],a,b,c,d,e"), "deg", r"column = 'time \[deg\]': must have a unit"),
         (
