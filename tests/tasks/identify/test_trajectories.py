@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from chilopod.cli import main
 from chilopod.errors import ChilopodError
@@ -12,6 +13,7 @@ from chilopod.planar import PlanarModel, initial_states, simulate
 from chilopod.planar.sampled import states_at
 from chilopod.robot import load_robot
 from chilopod.tasks.identify import RecordedWalks, identify_recorded, trajectories
+from chilopod.tasks.identify.constants import Estimates, FreeConstants
 from chilopod.tasks.identify.recordings import read_recordings
 
 ROBOT = load_robot("aoi2022-planar")
@@ -92,6 +94,26 @@ def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):
     assert known["changes"]["ground.friction"] == pytest.approx(-known["changes"]["springs.stiffness"], rel=0.1)
     assert wide["open"]
     assert found["constants"]["body.mass"]["interval_text"].endswith("(left open by the data)")
+
+
+def test_changes_of_a_constant_that_is_about_zero_are_relative_to_its_range():
+    free = FreeConstants.read({"springs.damping": ["0 N*m*s/rad", "1 N*m*s/rad"], "legs.half_width": (0.03, 0.15)})
+    values, spread = np.array([1.3e-21, 0.07]), np.diag([0.02, 0.007]) ** 2
+    found = trajectories.RecordedIdentification(
+        Estimates(ROBOT, free, values, np.array([[0.0, 0.02], [0.063, 0.077]]), spread),
+        xr.Dataset(),
+        (),
+        0.0,
+        1.0,
+        True,
+    )
+    known = found.as_json()
+    assert known["of_range"] == ["springs.damping"]
+    assert [max(each["changes"].values()) for each in known["combinations"]] == pytest.approx([0.02, 0.1])
+    _, cells, said = found._content()
+    assert cells[1][1:] == ("0 N*m*s/rad", "0 N*m*s/rad to 0.02 N*m*s/rad (cut by the range searched)")
+    assert "springs.damping +2 % of its range" in said[1]
+    assert said[2].endswith("legs.half_width +10 %")
 
 
 def test_residuals_that_are_alike_enlarge_variances():
