@@ -13,7 +13,7 @@ from chilopod.planar.model import PlanarModel, without_commands
 
 
 def states_at(models: Sequence[PlanarModel], states: Array, begin: float, times: Array, tolerance: float) -> Array:
-    """States of walks without commands at rising times after their begin (s), shape (times, walks, 2N+4), NaN after a
+    """States of walks without commands at rising times from their begin on (s), shape (times, walks, 2N+4), NaN after a
     walk fails. Models of one gait and size start in ``states`` with poses, shape (walks, 2N+4); the tolerance is that
     of a step, relative to max(1, |state|)."""
     count, schedule = len(states), models[0].schedule
@@ -25,6 +25,7 @@ def states_at(models: Sequence[PlanarModel], states: Array, begin: float, times:
     sample[times[np.minimum(sample, times.size - 1)] != ends] = -1
     parts = here - begin, starts[at] + here - switches[at], ends - here, interval[at], sample
     record, robots = np.full((times.size, *states.shape), np.nan), without_commands(models, count)
+    record[times == begin] = states
     walked = stretch.Pieces(*parts, schedule.contact, schedule.stroke)
     step, status = np.zeros(count), np.full(count, stretch.WALKING)
     stretch.carry(np.arange(count), walked, robots, tolerance, states.copy(), step, status, record)

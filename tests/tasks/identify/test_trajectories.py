@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from chilopod.cli import main
 from chilopod.errors import ChilopodError
@@ -12,6 +13,7 @@ from chilopod.planar import PlanarModel, initial_states, simulate
 from chilopod.planar.sampled import states_at
 from chilopod.robot import load_robot
 from chilopod.tasks.identify import RecordedWalks, identify_recorded, trajectories
+from chilopod.tasks.identify.constants import Estimates, FreeConstants
 from chilopod.tasks.identify.recordings import read_recordings
 
 ROBOT = load_robot("aoi2022-planar")
@@ -38,7 +40,7 @@ def data(*files, free=FREE, **more):
 
 def test_states_at_any_times_are_those_of_a_simulation():
     record = walked(SOFT, 2.0)
-    there = np.array([3, 6, 7, 40])  # 6 and 12 are switches of the gait
+    there = np.array([0, 3, 6, 7, 40])  # 6 and 12 are switches of the gait
     states = states_at([PlanarModel(SOFT)], np.repeat(START, 2, axis=0), 0.0, record.time.values[there], 1e-9)
     for each in np.moveaxis(states, 1, 0):
         np.testing.assert_allclose(each[:, 3:8], record.joint_angle.values[there, 0], atol=1e-8)
@@ -62,6 +64,21 @@ def test_intervals_cover_the_constants_of_robots_that_are_recorded_from_any_mome
     assert sum(covered) >= 2  # by chance fewer of three in one of thirty-five
 
 
+@pytest.mark.parametrize("first", [0, 11])
+def test_a_walk_is_identified_from_its_release_or_any_later_moment(tmp_path, first):
+    # Where both legs of a module are up, joints swing for some time after the release.
+    robot = SOFT.set_from_text(["gait.side_phase=150 deg"])
+    record = walked(robot, 3.4, 50.0).isel(time=slice(first, None, 2))
+    (tmp_path / "walk.nc").write_bytes(netcdf(record))
+    given = RecordedWalks(
+        free={"ground.friction": FREE["ground.friction"]}, trajectory=[{"file": "walk.nc", "settings": [SPRING]}]
+    )
+    found = identify_recorded(robot.with_value("ground.friction", 235.0), given, tmp_path)
+    assert found.scatter < 1e-7
+    assert found.as_json()["phases"] == pytest.approx([first / 50.0 / robot.gait.period], abs=1e-5)
+    assert found.best.get("ground.friction") == pytest.approx(ROBOT.get("ground.friction"), rel=1e-6)
+
+
 def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):
     robot = ROBOT.set_from_text(["springs.stiffness=12 N*mm/deg"])
     record = walked(robot, 8.0).isel(time=slice(20, None))
@@ -77,6 +94,26 @@ def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):
     assert known["changes"]["ground.friction"] == pytest.approx(-known["changes"]["springs.stiffness"], rel=0.1)
     assert wide["open"]
     assert found["constants"]["body.mass"]["interval_text"].endswith("(left open by the data)")
+
+
+def test_changes_of_a_constant_that_is_about_zero_are_relative_to_its_range():
+    free = FreeConstants.read({"springs.damping": ["0 N*m*s/rad", "1 N*m*s/rad"], "legs.half_width": (0.03, 0.15)})
+    values, spread = np.array([1.3e-21, 0.07]), np.diag([0.02, 0.007]) ** 2
+    found = trajectories.RecordedIdentification(
+        Estimates(ROBOT, free, values, np.array([[0.0, 0.02], [0.063, 0.077]]), spread),
+        xr.Dataset(),
+        (),
+        0.0,
+        1.0,
+        True,
+    )
+    known = found.as_json()
+    assert known["of_range"] == ["springs.damping"]
+    assert [max(each["changes"].values()) for each in known["combinations"]] == pytest.approx([0.02, 0.1])
+    _, cells, said = found._content()
+    assert cells[1][1:] == ("0 N*m*s/rad", "0 N*m*s/rad to 0.02 N*m*s/rad (cut by the range searched)")
+    assert "springs.damping +2 % of its range" in said[1]
+    assert said[2].endswith("legs.half_width +10 %")
 
 
 def test_residuals_that_are_alike_enlarge_variances():
@@ -99,7 +136,11 @@ ANGLES = np.full((200, 5), 10.0)
         (as_csv(TIMES, np.nan * ANGLES), None, r"0 angles in 0 s.*allowed: 3 s \(5 cycles of the gait\)"),
         (as_csv(TIMES[:30], ANGLES[:30]), None, "150 angles in 1.45 s"),
         (as_csv(TIMES, ANGLES[:, :4], "time,a [deg],b [deg],c [deg],d [deg]"), None, "columns = 4: must be 5 besides"),
-        (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), "rad", "angle = '10 rad': too large.*degrees"),
+        (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), "rad", "column a = '10 rad': too large: sample 1, line 2.*degrees"),
+        (
+            "# from the lab\n" + as_csv(TIMES, ANGLES).replace("10.0000\n", "-104.0000\n", 1), None,
+            r"column joint \[deg\] = '-104 deg': too large: sample 1, line 3; allowed: at most 90 deg$",
+        ),
         (as_csv(TIMES, ANGLES, "time,a,b,c,d,e"), None, "column = 'a': must have a unit"),
         (as_csv(TIMES, ANGLES, "time [deg],a,b,c,d,e"), "deg", r"column = 'time \[deg\]': must have a unit"),
         (

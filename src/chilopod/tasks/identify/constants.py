@@ -21,6 +21,8 @@ CONFIDENCE = 0.9
 
 _OPEN = 0.4  # half of an interval, over the range, that leaves a constant open; where all are as likely it is 0.45
 _AT = 1e-9  # distance from the end of a range that counts as none, over the range
+_ZERO = 0.01  # best value, over the range, below which changes are relative to the range
+_HIDDEN = 0.005  # value, over half of its interval, that two digits of this do not show
 _SMALL = 0.02  # change in a combination that is not said, over the largest
 _LOGARITHMIC = 4.0  # ratio of the ends of a range from which its scale is logarithmic
 _STEP = 1e-6  # of differences, in parts of ranges
@@ -187,14 +189,18 @@ class Estimates:
 
     def as_json(self) -> dict[str, Any]:
         """Constants with their intervals, correlations, and combinations that are independent: relative changes by half
-        of the 90 % interval along each, best known first, and whether the data leave it open."""
+        of the 90 % interval along each, best known first, and whether the data leave it open. Changes of constants
+        that are about zero, those of ``of_range``, are relative to the range."""
         half, paths = np.sqrt(np.diag(self.spread)), self.free.paths
         found: dict[str, Any] = {path: self._constant(at, self.ends[at]) for at, path in enumerate(paths)}
-        found = {"constants": found, "correlations": None, "combinations": []}
+        found = {"constants": found, "correlations": None, "combinations": [], "of_range": []}
         if np.isfinite(self.spread).all():
             found["correlations"] = (self.spread / np.maximum(np.outer(half, half), 1e-300)).tolist()
             widths = np.ptp(self.free.limits(self.values), axis=1)
-            scale = np.where(self.values == 0.0, widths, np.abs(self.values))
+            linear = np.array([not each.logarithmic for each in self.free.each])
+            zero = linear & (np.abs(self.values) < _ZERO * widths)
+            found["of_range"] = [path for path, is_zero in zip(paths, zero, strict=True) if is_zero]
+            scale = np.where(zero, widths, np.abs(self.values))
             squares, directions = np.linalg.eigh(self.spread / np.outer(scale, scale))
             signs = np.where(directions.sum(axis=0) < 0.0, -1.0, 1.0)
             for change in (signs * np.sqrt(np.abs(squares)) * directions).T:
@@ -224,6 +230,7 @@ class Estimates:
     def _text(self, at: int, value: float, ends: Array) -> str:
         """A value of a constant, with two digits of half of a range."""
         half = 0.5 * float(np.ptp(ends)) or np.nan
+        value = 0.0 if abs(value) < _HIDDEN * half and not self.free.each[at].logarithmic else value
         digits = 2 + int(np.clip(np.ceil(np.log10(abs(value) / half)), 0, 6)) if value and np.isfinite(half) else 4
         return units.format(value, self.given.unit_of(self.free.paths[at]), digits)
 
@@ -260,9 +267,10 @@ class Identified(Summary):
         for (path, each), *texts in zip(found["constants"].items(), *more.values(), strict=True):
             cells.append((path, each["text"], each["interval_text"], *texts))
         said = [f"independent combinations, by half of their {CONFIDENCE:.0%} interval:"] * bool(found["combinations"])
+        of = dict.fromkeys(found["of_range"], " of its range")
         for each in found["combinations"]:
-            least = _SMALL * max(map(abs, each["changes"].values()))
-            shown = [(path, x, ".2g" if abs(x) < 1.0 else ".0f") for path, x in each["changes"].items()]
-            texts = [f"{path} {100.0 * x:+{digits}} %" for path, x, digits in shown if abs(x) >= least]
+            least = 100.0 * _SMALL * max(map(abs, each["changes"].values()))
+            shown = [(path, 100.0 * x, ".2g" if abs(x) < 1.0 else ".0f") for path, x in each["changes"].items()]
+            texts = [f"{path} {x:+{digits}} %{of.get(path, '')}" for path, x, digits in shown if abs(x) >= least]
             said.append(f"  {', '.join(texts)}{' (left open)' if each['open'] else ''}")
         return [], cells, [*said, *self._remarks()]

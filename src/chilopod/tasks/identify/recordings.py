@@ -10,29 +10,38 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.frozen import Array
+from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import RecordedWalks, Trajectory
 from chilopod.text_file import read_text
 
 _LARGEST, _LONGEST = 50_000_000, 3600.0  # bytes, s
 _CYCLES, _NUMBERS = 5, 100  # of the gait, and angles, which a recording must have
+_PARTS, _PHASES, _FORGOTTEN = (0.25, 0.5, 0.75), 6, 1e-3  # of a cycle, number, and what is left of rates, relative
 _UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
 _NUMBER = re.compile(r"(\d+)\W*$")
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Recorded walk: name of the file, numbers of the robot in this walk, times from the first sample on, s, shape
-    (samples,), and joint angles, rad, NaN in gaps, shape (samples, N-1)."""
+    """Recorded walk: name of the file, numbers of the robot in this walk, time in which rates are forgotten, s,
+    times from the first sample on, s, shape (samples,), and joint angles, rad, NaN in gaps, shape (samples, N-1)."""
 
     name: str
     settings: tuple[str, ...]
+    forgotten: float
     times: Array
     angles: Array
+
+    @property
+    def counts(self) -> NDArray[np.bool_]:
+        """True for samples after the rates at the first one, which nothing tells, are forgotten."""
+        return self.times >= self.forgotten
 
 
 def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Recording]:
@@ -57,15 +66,36 @@ def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Record
             data = _netcdf(path)
             _check_settings(robot, data, free)
             names, table = _columns(data)
+            places = [f"sample {at + 1}" for at in range(len(table))]
         else:
-            names, table = _csv(read_text(path, "recording", RobotFileError, _LARGEST))
+            names, table, places = _csv(read_text(path, "recording", RobotFileError, _LARGEST))
         for sample, at in np.argwhere(np.isinf(table))[:1].tolist():
-            said = f"must be finite, or empty in gaps: sample {sample + 1}"
+            said = f"must be finite, or empty in gaps: {places[sample]}"
             raise ParameterError(said, field=f"column {names[at]}", value=table[sample, at])
-        return Recording(given.file, given.settings, *_checked(robot, table * _sizes(names, given.unit)))
+        used = _units(names, given.unit)
+        table_si = table * [float(units.unit(each).size) for each in used]
+        for sample, joint in np.argwhere(np.abs(table_si[:, 1:]) > 0.5 * np.pi)[:1].tolist():
+            unit, value = used[joint + 1], table[sample, joint + 1]
+            allowed = f"at most 90 deg{'; if these are degrees, say so by the unit deg' * (unit == 'rad')}"
+            said, field = f"too large: {places[sample]}", f"column {names[joint + 1]}"
+            raise ParameterError(said, field=field, value=f"{value:.6g} {unit}", allowed=allowed)
+        times, angles = _checked(robot, table_si)
+        return Recording(given.file, given.settings, _forgotten(PlanarModel(robot)), times, angles)
     except ChilopodError as error:
         error.source = str(path)
         raise
+
+
+def _forgotten(model: PlanarModel) -> float:
+    """Time after which the motion about the straight walk hardly depends on the rates at its start, at any phase, if
+    its joint angles there are free: most of a cycle where the legs of a module leave the floor together. s."""
+    joints, phases = range(3, model.modules + 2), model.period * np.arange(_PHASES) / _PHASES
+    for time in model.period * np.array(_PARTS):
+        flows = [model.flow(model.orbit, at, at + time)[1] / model.scale[:, None] * model.scale for at in phases]
+        pairs = [(np.linalg.qr(flow[:, joints])[0], np.delete(flow, joints, axis=1)) for flow in flows]
+        if all(np.abs(rates - known @ (known.T @ rates)).max() < _FORGOTTEN for known, rates in pairs):
+            return float(time)
+    return model.period
 
 
 def _netcdf(path: Path) -> xr.Dataset:
@@ -84,8 +114,9 @@ def _netcdf(path: Path) -> xr.Dataset:
 def _columns(data: xr.Dataset) -> tuple[list[str], Array]:
     """Names of columns and the columns of a record."""
     time, angles = data["time"], data["joint_angle"]
-    names = [f"{each.name} [{each.attrs.get('units', '')}]" for each in (time, angles)]
-    return [names[0], *names[1:] * angles.sizes["joint"]], np.column_stack([time.values, angles.values])
+    heads = ["time", *(f"joint_angle {joint + 1}" for joint in range(angles.sizes["joint"]))]
+    names = [f"{head} [{(angles if at else time).attrs.get('units', '')}]" for at, head in enumerate(heads)]
+    return names, np.column_stack([time.values, angles.values])
 
 
 def _check_settings(robot: Robot, data: xr.Dataset, free: set[str]) -> None:
@@ -107,8 +138,8 @@ def _check_settings(robot: Robot, data: xr.Dataset, free: set[str]) -> None:
             raise ParameterError(said, field=path, value=value, allowed=allowed)
 
 
-def _csv(text: str) -> tuple[list[str], Array]:
-    """Names of columns in the first line, and the columns."""
+def _csv(text: str) -> tuple[list[str], Array, list[str]]:
+    """Names of columns in the first line, the columns, and places of the rows in words."""
     lines = {at: line for at, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")}
     comma = max(",;\t", key=next(iter(lines.values()), "").count)
     names, *rows = ([cell.strip(' "') for cell in line.split(comma)] for line in lines.values() or [""])
@@ -124,22 +155,22 @@ def _csv(text: str) -> tuple[list[str], Array]:
     if len(numbers) == len(told) > 0 and numbers != list(range(numbers[0], numbers[0] + len(numbers))):
         said = "must be the joints, front to rear"
         raise ParameterError(said, field="columns", value=", ".join(names[1:]), allowed="names whose numbers rise by 1")
-    return names, table
+    return names, table, [f"sample {sample}, line {at}" for sample, at in enumerate(list(lines)[1:], 1)]
 
 
-def _sizes(names: list[str], unit: str | None) -> Array:
-    """SI sizes of the units of columns, of which the first is time."""
-    sizes = []
+def _units(names: list[str], unit: str | None) -> list[str]:
+    """Units of columns, of which the first is time."""
+    found = []
     for at, name in enumerate(names):
         named = match[1] if (match := _UNIT.search(name)) else ""
         if at and named and unit and units.unit(named) != units.unit(unit):
             raise ParameterError(f"contradicts unit = {unit!r} in the file of data", field="column", value=name)
-        used = units.unit(named or (unit if at else "s") or "")
-        if used.dimension != units.unit("rad" if at else "s").dimension:
+        used = named or (unit if at else "s") or ""
+        if units.unit(used).dimension != units.unit("rad" if at else "s").dimension:
             allowed = "time and joint angles, with a unit such as [deg] in the name of the column, or the key unit"
             raise ParameterError("must have a unit of its kind", field="column", value=name, allowed=allowed)
-        sizes.append(float(used.size))
-    return np.array(sizes)
+        found.append(used)
+    return found
 
 
 def _checked(robot: Robot, table: Array) -> tuple[Array, Array]:
@@ -153,9 +184,6 @@ def _checked(robot: Robot, table: Array) -> tuple[Array, Array]:
         pair = f"times of samples {at + 1} and {at + 2}"
         raise ParameterError("must rise", field=pair, value=times[at : at + 2].tolist())
     known = np.isfinite(angles)
-    if (largest := np.abs(angles[known]).max(initial=0.0)) > 0.5 * np.pi:
-        allowed = "joint angles up to 90 deg; if these are degrees, say so by the unit deg"
-        raise ParameterError("too large", field="angle", value=f"{largest:.4g} rad", allowed=allowed)
     times, angles = times[known.any(axis=1)], angles[known.any(axis=1)]
     least, span = _CYCLES * robot.gait.period, float(np.ptp(times)) if times.size else 0.0
     if not least <= span <= _LONGEST or known.sum() < _NUMBERS:

@@ -1,8 +1,8 @@
 """Identification of constants of the planar model from recorded walks, by nonlinear least squares.
 
 Unknown are the free constants and, for each walk, the phase of the gait and the joint angles when the recording begins.
-Rates are forgotten within a fraction of a step, so each walk begins at rest in its joints a quarter of a cycle earlier.
-Derivatives are differences of walks that run together.
+Each walk begins at rest in its joints there, as one does that is released. The true rates there are forgotten within a
+part of a cycle, so samples count from then on. Derivatives are differences of walks that run together.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _STEP, _TOLERANCE = 1e-5, 1e-8  # of differences, in units of ranges, cycles and rad, and of walks
-_EARLIER, _FAR = 0.25, np.pi  # cycles from the start of a walk to its first sample, and angles after it has failed, rad
+_FAR = np.pi  # angles after a walk has failed, rad
 _PHASES, _CYCLES = 6, 10  # number of phases to start from, each tried on so many cycles
 _ROUGH, _FINE = (1e-3, 12), (1e-9, 40)  # change of the sum of squares, relative, that ends a fit, and most steps
 _RESOLVED = 1e-7  # rad, least error of angles, of a recording or computed
@@ -43,11 +43,13 @@ _ALIKE = 2.0  # factor of variances that is said
 @dataclass(frozen=True)
 class RecordedIdentification(Identified):
     """Result of an identification from recorded walks: the constants, with intervals of linear residuals; measured and
-    fitted joint angles, rad; the scatter of the residuals, rad, and the factor by which variances grow where
-    neighbouring residuals are alike; and whether the search converged."""
+    fitted joint angles, rad, these NaN before they count; the phase of the gait at the first sample of each walk,
+    cycles; the scatter of the residuals, rad, and the factor by which variances grow where neighbouring residuals are
+    alike; and whether the search converged."""
 
     estimates: Estimates
     walks: xr.Dataset
+    phases: tuple[float, ...]
     scatter: float
     variance_factor: float
     converged: bool
@@ -55,12 +57,12 @@ class RecordedIdentification(Identified):
     @property
     def title(self) -> str:
         """Robot, and the scatter of the residuals."""
-        count, scatter = int(self.walks.measured.count()), np.rad2deg(self.scatter)
+        count, scatter = int((self.walks.fitted - self.walks.measured).count()), np.rad2deg(self.scatter)
         return f"{self.estimates.given.name}: residuals of {count} joint angles scatter by {scatter:.3g} deg"
 
     def as_json(self) -> dict[str, Any]:
-        """Constants with intervals, correlations and combinations, scatter, and the factor of variances."""
-        rest = {"variance_factor": self.variance_factor, "converged": self.converged}
+        """Constants with intervals, correlations and combinations, phases, scatter, and the factor of variances."""
+        rest = {"phases": list(self.phases), "variance_factor": self.variance_factor, "converged": self.converged}
         return {**super().as_json(), "scatter_rad": self.scatter, **rest}
 
     def plot(self, axes: Axes | None = None) -> Axes:
@@ -93,8 +95,8 @@ def identify_recorded(
     unknown, count = _fit(walks, progress), len(data.free.each)
     measured = [each.angles for each in walks.recordings]
     fitted = [each[:, 0] for each in walks.computed(unknown[None])]
-    off = np.concatenate([(one - other)[np.isfinite(other)] for one, other in zip(fitted, measured, strict=True)])
-    factor = max(_alike(one - other) for one, other in zip(fitted, measured, strict=True))
+    apart = [one - other for one, other in zip(fitted, measured, strict=True)]
+    off, factor = np.concatenate([each[np.isfinite(each)] for each in apart]), max(map(_alike, apart))
     scatter = float(np.linalg.norm(off) / np.sqrt(off.size - unknown.size))
     error = max(scatter, _RESOLVED)
     wide = float(stdtrit(max(off.size / factor - unknown.size, 1.0), 0.5 + 0.5 * CONFIDENCE))
@@ -108,7 +110,8 @@ def identify_recorded(
     for name, angles in (("measured", measured), ("fitted", fitted)):
         record[name] = ("sample", "joint"), np.vstack(angles), {"units": "rad"}
     estimates = Estimates(robot, data.free, values, ends, spread)
-    return RecordedIdentification(estimates, record, scatter, factor, walks.converged)
+    phases = tuple((unknown[count:].reshape(len(measured), -1)[:, 0] % 1.0).tolist())
+    return RecordedIdentification(estimates, record, phases, scatter, factor, walks.converged)
 
 
 class _Walks:
@@ -120,20 +123,23 @@ class _Walks:
         self.given: Array = np.clip(free.parts_of(free.of(robot)), 0.0, 1.0)
 
     def computed(self, frees: Array) -> list[Array]:
-        """Angles of each walk, rad, shape (samples, sets, N-1), with sets of unknowns, shape (sets, unknowns)."""
+        """Angles of each walk, rad, NaN at samples that do not count, shape (samples, sets, N-1), with sets of
+        unknowns, shape (sets, unknowns)."""
         count, starts = self.given.size, np.split(frees[:, self.given.size :], len(self.recordings), axis=1)
         out = []
         for one, start in zip(self.recordings, starts, strict=True):
             rows, which = np.unique(np.hstack([frees[:, :count], start]), axis=0, return_inverse=True)
             robots = [self.free.robot_with(self.robot, self.free.values_at(row)) for row in rows[:, :count]]
             robots = [each.set_from_text(one.settings) for each in robots]
-            out.append(_angles(one.times, robots, rows[:, count:])[:, which])
+            angles = _angles(one.times, robots, rows[:, count:])[:, which]
+            out.append(np.where(one.counts[:, None, None], angles, np.nan))
         return out
 
     def residuals(self, frees: Array) -> Array:
         """Computed less measured angles, then a weak prior: constants less those given, shape (residuals, sets)."""
         pairs = zip(self.computed(frees), self.recordings, strict=True)
-        off = [np.moveaxis(each - one.angles[:, None], 1, 2)[np.isfinite(one.angles)] for each, one in pairs]
+        apart = [np.moveaxis(each - one.angles[:, None], 1, 2) for each, one in pairs]
+        off = [each[np.isfinite(each[..., 0])] for each in apart]
         return np.vstack([*off, _PRIOR * (frees[:, : self.given.size] - self.given).T])
 
     def jacobian(self, free: Array) -> Array:
@@ -206,7 +212,6 @@ def _angles(times: Array, robots: Sequence[Robot], starts: Array) -> Array:
     for gait, phase in {(robot.gait, phase) for robot, phase in zip(robots, starts[:, 0].tolist(), strict=True)}:
         at = [k for k, robot in enumerate(robots) if robot.gait == gait and starts[k, 0] == phase]
         begin, states = phase % 1.0 * gait.period, initial_states(robots[at[0]], starts[at, 1:])
-        moments = begin + _EARLIER * gait.period + times
-        walked = states_at([models[k] for k in at], states, begin, moments, _TOLERANCE)
+        walked = states_at([models[k] for k in at], states, begin, begin + times, _TOLERANCE)
         out[:, at] = walked[..., 3 : starts.shape[1] + 2]
     return np.nan_to_num(out, nan=_FAR)
