@@ -230,3 +230,41 @@ def test_a_multiplier_that_is_zero_lies_within_its_bound(method, guess):
 
     found = multipliers(from_rhs(rhs, 2, None, guess_period=7.0, method=method), guess)
     assert abs(found.values[-1]) <= found.error_bounds[-1] < 1e-7  # exp(-68193.9), by the integral of the divergence
+
+
+def rimless_wheel(slope):
+    """The next spoke hits the ground at a lean of pi/8 + slope, and cos(pi/4) of the speed is left."""
+    step = np.pi / 8.0
+    hit = Event(lambda t, x: x[0] - step - slope, lambda t, x: [slope - step, np.cos(2.0 * step) * x[1]], 1)
+    return from_rhs(lambda t, x: [x[1], np.sin(x[0])], 2, None, events=[hit], guess_period=2.2)
+
+
+def test_a_search_moves_time_0_away_from_an_event():
+    """The lean just after a hit passes the one at which the orbit begins; the multiplier is 1/2 at every slope."""
+    low, lean = 0.125, -0.226
+    after = 4.0 * np.sin(np.pi / 8.0) * np.sin(low)  # square of the speed after a hit
+    start = [lean, np.sqrt(after + 2.0 * (np.cos(low - np.pi / 8.0) - np.cos(lean)))]
+    found = locate(rimless_wheel, (low, 0.31), start)
+    assert found.complete
+    assert len(found) == 0
+    assert found.searched == (low, 0.31)
+    assert "time 0 was moved along the orbit, away from an event" in found.remarks[-1]
+
+
+def test_a_search_stays_on_an_orbit_beside_an_event():
+    """Five neurons fire in turn; next to their orbit one beyond the threshold never fires. The turn's stability changes
+    where neurons do not act on each other."""
+    count, drive, low = 5, 1.2, -0.2
+
+    def family(pulse):
+        def fires(i):
+            return Event(lambda t, x: x[i] - 1.0, lambda t, x: [0.0 if j == i else x[j] + pulse for j in range(5)], 1)
+
+        fire = [fires(i) for i in range(count)]
+        return from_rhs(lambda t, x: [drive - each for each in x], count, None, events=fire, guess_period=3.731)
+
+    start = [0.6161448, 0.7713021, 0.8448762, 0.8797623, 0.2889129]
+    found = locate(family, (low, 0.03), start, normal_form=False)
+    (point,) = found
+    assert found.complete
+    assert abs(point.value) <= point.error_bound < 1e-10

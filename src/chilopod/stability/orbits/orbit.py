@@ -22,6 +22,7 @@ from chilopod.stability.interface import (
     is_autonomous,
     is_stiff,
     offers,
+    returns_per_period,
     sizes,
 )
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
@@ -167,6 +168,8 @@ def searched_orbit(
     x = finite_array(guess, (system.dimension,), "orbit")
     shortened = shortest and section is None
     duration = return_duration(system) if section is None else section.duration
+    if isinstance(guess, Orbit) and section is None and is_autonomous(system):
+        duration = guess.period / returns_per_period(system)
     try:
         found = near_orbit(system, Nodes(x[None], duration), with_error, budget, section)
         return _shortest(system, found, with_error, budget) if shortened else found

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.carrying import numerical_balance
-from chilopod.flows.deadline import Budget, SpentError
+from chilopod.flows.deadline import Budget, Deadline, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
 from chilopod.stability.crossing_place import Course, Sample, crossings_in, orbit_blocks, past_singular, place_error
@@ -24,7 +24,7 @@ from chilopod.stability.equilibria import has_centre
 from chilopod.stability.interface import Family, checked_flow, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.returns import MOVED, ReturnMap
 from chilopod.stability.search.samples import NEAR_FOLD, SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, rows, said
 from chilopod.stability.spectrum import spectrum
@@ -161,6 +161,7 @@ _DESCRIBING = 400  # budget of return maps for the orbits beside a point
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of followed ones
 _LEAST_ERROR = 1e-15
 _GRACE = 0.7  # s, for the description of found points after the time limit
+_SAME = 1e-9  # distance of values of one point on the border of two pieces, relative to the interval
 _BESIDE = 1e-6  # distance from a crossing at which rates of change are computed, relative to the interval
 
 
@@ -284,13 +285,52 @@ def locate(
     """
     low, high = checked_interval(between)
     check_arguments(family=family, normal_form=normal_form, budget=budget)
-    samples = Samples(family, orbit, low, high, budget, seconds)
+    limit, samples = Deadline(seconds), Samples(family, orbit, low, high, budget, seconds)
+    pieces = [_piece(samples, budget, normal_form)]
+    while (first := samples.onward) is not None:
+        left, moved = budget - sum(each.evaluations for each in pieces), MOVED.format(samples.high)
+        try:
+            samples = Samples(family, first, samples.high, high, left, limit.remaining)
+            found = _piece(samples, left, normal_form)
+            pieces.append(replace(found, remarks=(*found.remarks, moved)))
+        except SpentError as error:
+            ending = f"{error.problem} before the orbit was followed beyond {samples.high:.9g}"
+            pieces[-1] = replace(pieces[-1], status=SearchStatus.BUDGET, ending=ending)
+            break
+    return joined(pieces)
+
+
+def _piece(samples: Samples, budget: int, normal_form: bool) -> Located:
+    """Bifurcations along samples with one time 0."""
     return located(
         samples,
         lambda start, end: _crossings(samples, start, end, budget),
         lambda each, block: [_described(samples, one, block, normal_form) for one in _resolved(samples, each)],
         lambda fold: fold if normal_form else replace(fold, normal_form=None),
         _DESCRIBING,
+    )
+
+
+def joined(pieces: Sequence[Located]) -> Located:
+    """The result of searches of neighbouring intervals, with the end of the last."""
+    points: list[BifurcationPoint] = []
+    searched = pieces[0].searched[0], pieces[-1].searched[1]
+    near = _SAME * (searched[1] - searched[0])
+    for each in pieces:  # a point on the border of two is found in both
+        points += [
+            new
+            for new in each
+            if all(new.value - old.value > min(near, new.error_bound + old.error_bound) for old in points)
+        ]
+    remarks = [pieces[-1].ending] + [remark for each in pieces for remark in each.remarks]
+    return replace(
+        pieces[-1],
+        points=tuple(points),
+        status=SearchStatus.COMPLETE.worst(*(each.status for each in pieces)),
+        remarks=tuple(dict.fromkeys(filter(None, remarks))),
+        evaluations=sum(each.evaluations for each in pieces),
+        searched=searched,
+        spacing=max(each.spacing for each in pieces),
     )
 
 
