@@ -268,3 +268,25 @@ def test_a_search_stays_on_an_orbit_beside_an_event():
     (point,) = found
     assert found.complete
     assert abs(point.value) <= point.error_bound < 1e-10
+
+
+def test_an_orbit_may_be_given_just_before_or_after_an_impact():
+    slope = 0.1
+    after = 2.0 * np.sqrt(np.sin(np.pi / 8.0) * np.sin(slope))
+    for lean, speed in ((slope - np.pi / 8.0, after), (slope + np.pi / 8.0, np.sqrt(2.0) * after)):
+        assert multipliers(rimless_wheel(slope), [lean, speed]).values == pytest.approx([0.5], abs=1e-12)
+
+
+@pytest.mark.parametrize("guess", [[0.2, 0.3, 1.0], [1.0, 0.3, 0.0], [1.0, 0.3, 1.0], [0.1, 0.3, 1.0]])
+def test_a_mode_of_an_orbit_is_one_of_its_values(guess):
+    """A block sticks to a belt from 0.2 to 1, where it begins to slip; the third state says which."""
+    period = np.pi + 2.0 * np.arctan(0.75) + 0.8 / 0.3
+
+    def rhs(t, x):
+        return [np.where(x[2] > 0.5, 0.3, x[1]), np.where(x[2] > 0.5, 0.0, 0.6 - x[0]), 0.0]
+
+    catch = Event(lambda t, x: x[1] - 0.3 - x[2], lambda t, x: [x[0], 0.3, 1.0], 1)
+    slip = Event(lambda t, x: x[0] - 1.0 + 10.0 * (x[2] - 1.0), lambda t, x: [1.0, 0.3, 0.0], 1)
+    found = find_orbit(from_rhs(rhs, 3, None, events=[catch, slip], guess_period=period), guess)
+    assert found.period == pytest.approx(period, rel=1e-9)
+    assert found.state[2] in (0.0, 1.0)

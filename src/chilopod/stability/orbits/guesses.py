@@ -14,13 +14,14 @@ from chilopod.flows.arguments import finite_array
 from chilopod.frozen import Array
 from chilopod.stability.interface import Autonomous, SystemLike, checked_flow, is_autonomous, returns_per_period, sizes
 from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
-from chilopod.stability.returns import carried, return_duration, returned_states
+from chilopod.stability.returns import carried, return_duration, returned_states, velocity_at
 
 _OF_GUESS = 16  # nodes of a guess that is a whole orbit
 _FEWEST_ROWS = 5
 _FEWEST_NODES = 3
 _SAME_PERIOD = 1e-6
 _ONWARD = 0.382  # distance along the motion of the next guess, relative to the guessed return
+_EARLIER = 1e-10  # distance back along the motion of a guess that may be just before an event
 _LONGEST_SETTLING = 300  # returns
 _MARCHED, _MARCHES = 48, 8  # steps per guessed period, and guessed periods, within which a motion must return
 _COMES_BACK = 0.1  # distance of a return, relative to the size of the motion
@@ -72,8 +73,9 @@ def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
             yield nodes_along(system, x, duration, count), False
     if is_autonomous(system):
         # At an event, such as an impact, round-off decides whether a motion that ends there is before or after it.
-        with contextlib.suppress(AnalysisError):
-            yield Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration), False
+        for start in (x, x - _EARLIER * duration * velocity_at(system, x)):
+            with contextlib.suppress(AnalysisError):
+                yield Nodes(carried(system, start[None], 0.0, _ONWARD * duration), duration), False
     for nodes in _settled(system, x):
         yield nodes, False
 

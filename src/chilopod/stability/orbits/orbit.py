@@ -27,7 +27,7 @@ from chilopod.stability.interface import (
 )
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
-from chilopod.stability.orbits.shooting import Nodes, Problem, shot
+from chilopod.stability.orbits.shooting import Nodes, Problem, nodes_along, shot
 from chilopod.stability.returns import (
     REPEATED,
     ReturnMap,
@@ -296,6 +296,12 @@ def near_orbit(
             start = start._replace(states=start.states / size @ basis @ basis.T * size)
         found = shot(Problem(lambda _: system, None, shared, budget, careful), start, size, section)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
+        # A state that only jumps, such as a mode, is free where no event happens: the corrector may put it anywhere.
+        free = (found.jacobian == np.eye(x.size)).all(axis=1) & (np.abs(x - start.states[0]) > _RESTS * size)
+        later = nodes_along(system, start.states[0], 1.5 * duration, 4 if free.any() else 1).states
+        if (later != start.states[0])[:, free].any():
+            said = "no event happens on the orbit that the corrector found near the guess"
+            raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
     if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
