@@ -348,10 +348,9 @@ def find_fold(
 def _at_event(curve: Curve, last: BranchPoint) -> bool:
     """True if an event is about to pass time 0 of an orbit, where returns are not smooth."""
     system = curve.system(last.value)
-    try:
+    with contextlib.suppress(ChilopodError):
         return jumps_at_ends(system, last.orbit, _duration(system, last))
-    except ChilopodError:
-        return False
+    return False
 
 
 def _grazes(curve: Curve, last: BranchPoint) -> bool:

@@ -300,8 +300,7 @@ def near_orbit(
         free = (found.jacobian == np.eye(x.size)).all(axis=1) & (np.abs(x - start.states[0]) > _RESTS * size)
         later = nodes_along(system, start.states[0], 1.5 * duration, 4 if free.any() else 1).states
         if (later != start.states[0])[:, free].any():
-            said = "no event happens on the orbit that the corrector found near the guess"
-            raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
+            raise AnalysisError("no event happens on the orbit found", field="orbit", allowed="a guess closer to it")
     if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= _RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")

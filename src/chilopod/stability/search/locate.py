@@ -286,52 +286,37 @@ def locate(
     low, high = checked_interval(between)
     check_arguments(family=family, normal_form=normal_form, budget=budget)
     limit, samples = Deadline(seconds), Samples(family, orbit, low, high, budget, seconds)
-    pieces = [_piece(samples, budget, normal_form)]
-    while (first := samples.onward) is not None:
-        left, moved = budget - sum(each.evaluations for each in pieces), MOVED.format(samples.high)
-        try:
-            samples = Samples(family, first, samples.high, high, left, limit.remaining)
-            found = _piece(samples, left, normal_form)
-            pieces.append(replace(found, remarks=(*found.remarks, moved)))
-        except SpentError as error:
-            ending = f"{error.problem} before the orbit was followed beyond {samples.high:.9g}"
-            pieces[-1] = replace(pieces[-1], status=SearchStatus.BUDGET, ending=ending)
-            break
-    return joined(pieces)
-
-
-def _piece(samples: Samples, budget: int, normal_form: bool) -> Located:
-    """Bifurcations along samples with one time 0."""
-    return located(
+    found = located(
         samples,
         lambda start, end: _crossings(samples, start, end, budget),
         lambda each, block: [_described(samples, one, block, normal_form) for one in _resolved(samples, each)],
         lambda fold: fold if normal_form else replace(fold, normal_form=None),
         _DESCRIBING,
     )
+    if samples.onward is None:
+        return found
+    at, left = samples.high, max(budget - found.evaluations, 1)
+    try:
+        rest = locate(family, (at, high), samples.onward, normal_form, left, limit.remaining)
+    except (AnalysisError, SpentError) as error:
+        ending = f"{error.problem} before the orbit was followed beyond {at:.9g}"
+        status = SearchStatus.BUDGET if isinstance(error, SpentError) else SearchStatus.INCOMPLETE
+        rest = replace(found, points=(), status=status, evaluations=0, ending=ending)
+    return joined([found, replace(rest, remarks=(MOVED.format(at), *rest.remarks))])
 
 
 def joined(pieces: Sequence[Located]) -> Located:
     """The result of searches of neighbouring intervals, with the end of the last."""
-    points: list[BifurcationPoint] = []
-    searched = pieces[0].searched[0], pieces[-1].searched[1]
+    searched, points = (pieces[0].searched[0], pieces[-1].searched[1]), list[BifurcationPoint]()
     near = _SAME * (searched[1] - searched[0])
     for each in pieces:  # a point on the border of two is found in both
-        points += [
-            new
-            for new in each
-            if all(new.value - old.value > min(near, new.error_bound + old.error_bound) for old in points)
-        ]
+        apart = [[b.value - a.value > min(near, a.error_bound + b.error_bound) for a in points] for b in each]
+        points += itertools.compress(each, map(all, apart))
+    status = SearchStatus.COMPLETE.worst(*(each.status for each in pieces))
     remarks = [pieces[-1].ending] + [remark for each in pieces for remark in each.remarks]
-    return replace(
-        pieces[-1],
-        points=tuple(points),
-        status=SearchStatus.COMPLETE.worst(*(each.status for each in pieces)),
-        remarks=tuple(dict.fromkeys(filter(None, remarks))),
-        evaluations=sum(each.evaluations for each in pieces),
-        searched=searched,
-        spacing=max(each.spacing for each in pieces),
-    )
+    about = searched, max(each.spacing for each in pieces), pieces[-1].ending, pieces[-1].dimension
+    shown, evaluations = tuple(dict.fromkeys(filter(None, remarks))), sum(each.evaluations for each in pieces)
+    return Located(tuple(points), status, shown, evaluations, *about)
 
 
 def located(

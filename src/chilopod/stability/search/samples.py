@@ -198,10 +198,9 @@ class Samples:
         """A sample between two others, from their orbits."""
         around = self._around(min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1))
         try:
-            guess = self._foreseen(around, value)
-            found = self._sampled(value, guess, around[0])
-            other = found.passes(around[0]) and found.passes(around[1]) and not self._goes_through(around[0], found)
-            if other or not self._continues(around[0], guess, found):
+            found = self._sampled(value, guess := self._foreseen(around, value), around[0])
+            passes = found.passes(around[0]) and found.passes(around[1])
+            if (passes and not self._goes_through(around[0], found)) or not self._continues(around[0], guess, found):
                 raise AnalysisError("is another orbit", field="orbit")
             return found
         except AnalysisError:
