@@ -290,3 +290,16 @@ def test_a_mode_of_an_orbit_is_one_of_its_values(guess):
     found = find_orbit(from_rhs(rhs, 3, None, events=[catch, slip], guess_period=period), guess)
     assert found.period == pytest.approx(period, rel=1e-9)
     assert found.state[2] in (0.0, 1.0)
+
+
+@pytest.mark.parametrize("left", [0.0, 1e-13, 1e-6])
+def test_an_orbit_given_beside_an_event_is_not_left_for_another(left):
+    """Two neurons in antiphase, the second about to fire."""
+    fire = [
+        Event(lambda t, x: x[0] - 1.0, lambda t, x: [0.0, x[1] - 0.1], 1),
+        Event(lambda t, x: x[1] - 1.0, lambda t, x: [x[0] - 0.1, 0.0], 1),
+    ]
+    period = 1.6262946371279092
+    antiphase = from_rhs(lambda t, x: [1.3 - x[0], 1.3 - x[1]], 2, None, events=fire, guess_period=period)
+    found = multipliers(antiphase, [1.3 - 1.3 * np.exp(-period / 2.0) - left, 1.0 - left])
+    assert found.period == pytest.approx(period, rel=1e-9)

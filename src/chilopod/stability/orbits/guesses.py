@@ -21,7 +21,7 @@ _FEWEST_ROWS = 5
 _FEWEST_NODES = 3
 _SAME_PERIOD = 1e-6
 _ONWARD = 0.382  # distance along the motion of the next guess, relative to the guessed return
-_EARLIER = 1e-10  # distance back along the motion of a guess that may be just before an event
+_EARLIER, _JUMPS = 1e-10, 1e-6  # part of a return round a guess, and a motion within it, relative to it, of a jump
 _LONGEST_SETTLING = 300  # returns
 _MARCHED, _MARCHES = 48, 8  # steps per guessed period, and guessed periods, within which a motion must return
 _COMES_BACK = 0.1  # distance of a return, relative to the size of the motion
@@ -61,6 +61,17 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     return Nodes(CubicSpline(times - times[0], states)(nodes), duration)
 
 
+def past_impact(system: SystemLike, x: Array, duration: float) -> Array:
+    """The state, moved along its motion if that jumps there, as round-off decides whether it is before the jump."""
+    if is_autonomous(system):
+        with contextlib.suppress(AnalysisError):
+            before = x - _EARLIER * duration * velocity_at(system, x)
+            after = carried(system, before[None], 0.0, 2.0 * _EARLIER * duration)[0]
+            if (np.abs(after - before) > _JUMPS * np.abs(before).max()).any():
+                return carried(system, before[None], 0.0, _ONWARD * duration)[0]
+    return x
+
+
 def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
     """Further starts after Newton's method has failed at a guessed state, each with a flag for careful steps."""
     duration = return_duration(system)
@@ -73,9 +84,8 @@ def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
             yield nodes_along(system, x, duration, count), False
     if is_autonomous(system):
         # At an event, such as an impact, round-off decides whether a motion that ends there is before or after it.
-        for start in (x, x - _EARLIER * duration * velocity_at(system, x)):
-            with contextlib.suppress(AnalysisError):
-                yield Nodes(carried(system, start[None], 0.0, _ONWARD * duration), duration), False
+        with contextlib.suppress(AnalysisError):
+            yield Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration), False
     for nodes in _settled(system, x):
         yield nodes, False
 

@@ -26,7 +26,7 @@ from chilopod.stability.interface import (
     sizes,
 )
 from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
-from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
+from chilopod.stability.orbits.guesses import nearer_orbits, past_impact, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, nodes_along, shot
 from chilopod.stability.returns import (
     REPEATED,
@@ -171,6 +171,7 @@ def searched_orbit(
     if isinstance(guess, Orbit) and section is None and is_autonomous(system):
         duration = guess.period / returns_per_period(system)
     try:
+        x = past_impact(system, x, duration) if section is None else x
         found = near_orbit(system, Nodes(x[None], duration), with_error, budget, section)
         return _shortest(system, found, with_error, budget) if shortened else found
     except TooManySteps as error:
@@ -298,6 +299,7 @@ def near_orbit(
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
         # A state that only jumps, such as a mode, is free where no event happens: the corrector may put it anywhere.
         free = (found.jacobian == np.eye(x.size)).all(axis=1) & (np.abs(x - start.states[0]) > _RESTS * size)
+        free &= is_autonomous(system) and velocity_at(system, x) == 0.0
         later = nodes_along(system, start.states[0], 1.5 * duration, 4 if free.any() else 1).states
         if (later != start.states[0])[:, free].any():
             raise AnalysisError("no event happens on the orbit found", field="orbit", allowed="a guess closer to it")
