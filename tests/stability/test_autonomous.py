@@ -230,3 +230,76 @@ def test_a_multiplier_that_is_zero_lies_within_its_bound(method, guess):
 
     found = multipliers(from_rhs(rhs, 2, None, guess_period=7.0, method=method), guess)
     assert abs(found.values[-1]) <= found.error_bounds[-1] < 1e-7  # exp(-68193.9), by the integral of the divergence
+
+
+def rimless_wheel(slope):
+    """The next spoke hits the ground at a lean of pi/8 + slope, and cos(pi/4) of the speed is left."""
+    step = np.pi / 8.0
+    hit = Event(lambda t, x: x[0] - step - slope, lambda t, x: [slope - step, np.cos(2.0 * step) * x[1]], 1)
+    return from_rhs(lambda t, x: [x[1], np.sin(x[0])], 2, None, events=[hit], guess_period=2.2)
+
+
+def test_a_search_moves_time_0_away_from_an_event():
+    """The lean just after a hit passes the one at which the orbit begins; the multiplier is 1/2 at every slope."""
+    low, lean = 0.125, -0.226
+    after = 4.0 * np.sin(np.pi / 8.0) * np.sin(low)  # square of the speed after a hit
+    start = [lean, np.sqrt(after + 2.0 * (np.cos(low - np.pi / 8.0) - np.cos(lean)))]
+    found = locate(rimless_wheel, (low, 0.31), start)
+    assert found.complete
+    assert len(found) == 0
+    assert found.searched == (low, 0.31)
+    assert "time 0 was moved along the orbit, away from an event" in found.remarks[-1]
+
+
+def test_a_search_stays_on_an_orbit_beside_an_event():
+    """Five neurons fire in turn; next to their orbit one beyond the threshold never fires. The turn's stability changes
+    where neurons do not act on each other."""
+    count, drive, low = 5, 1.2, -0.2
+
+    def family(pulse):
+        def fires(i):
+            return Event(lambda t, x: x[i] - 1.0, lambda t, x: [0.0 if j == i else x[j] + pulse for j in range(5)], 1)
+
+        fire = [fires(i) for i in range(count)]
+        return from_rhs(lambda t, x: [drive - each for each in x], count, None, events=fire, guess_period=3.731)
+
+    start = [0.6161448, 0.7713021, 0.8448762, 0.8797623, 0.2889129]
+    found = locate(family, (low, 0.03), start, normal_form=False)
+    (point,) = found
+    assert found.complete
+    assert abs(point.value) <= point.error_bound < 1e-10
+
+
+def test_an_orbit_may_be_given_just_before_or_after_an_impact():
+    slope = 0.1
+    after = 2.0 * np.sqrt(np.sin(np.pi / 8.0) * np.sin(slope))
+    for lean, speed in ((slope - np.pi / 8.0, after), (slope + np.pi / 8.0, np.sqrt(2.0) * after)):
+        assert multipliers(rimless_wheel(slope), [lean, speed]).values == pytest.approx([0.5], abs=1e-12)
+
+
+@pytest.mark.parametrize("guess", [[0.2, 0.3, 1.0], [1.0, 0.3, 0.0], [1.0, 0.3, 1.0], [0.1, 0.3, 1.0]])
+def test_a_mode_of_an_orbit_is_one_of_its_values(guess):
+    """A block sticks to a belt from 0.2 to 1, where it begins to slip; the third state says which."""
+    period = np.pi + 2.0 * np.arctan(0.75) + 0.8 / 0.3
+
+    def rhs(t, x):
+        return [np.where(x[2] > 0.5, 0.3, x[1]), np.where(x[2] > 0.5, 0.0, 0.6 - x[0]), 0.0]
+
+    catch = Event(lambda t, x: x[1] - 0.3 - x[2], lambda t, x: [x[0], 0.3, 1.0], 1)
+    slip = Event(lambda t, x: x[0] - 1.0 + 10.0 * (x[2] - 1.0), lambda t, x: [1.0, 0.3, 0.0], 1)
+    found = find_orbit(from_rhs(rhs, 3, None, events=[catch, slip], guess_period=period), guess)
+    assert found.period == pytest.approx(period, rel=1e-9)
+    assert found.state[2] in (0.0, 1.0)
+
+
+@pytest.mark.parametrize("left", [0.0, 1e-13, 1e-6])
+def test_an_orbit_given_beside_an_event_is_not_left_for_another(left):
+    """Two neurons in antiphase, the second about to fire."""
+    fire = [
+        Event(lambda t, x: x[0] - 1.0, lambda t, x: [0.0, x[1] - 0.1], 1),
+        Event(lambda t, x: x[1] - 1.0, lambda t, x: [x[0] - 0.1, 0.0], 1),
+    ]
+    period = 1.6262946371279092
+    antiphase = from_rhs(lambda t, x: [1.3 - x[0], 1.3 - x[1]], 2, None, events=fire, guess_period=period)
+    found = multipliers(antiphase, [1.3 - 1.3 * np.exp(-period / 2.0) - left, 1.0 - left])
+    assert found.period == pytest.approx(period, rel=1e-9)

@@ -27,7 +27,7 @@ from chilopod.stability.crossing_place import Course, Sample, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.interface import Autonomous, Family, SystemLike, offers
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.search.locate import Found, Located, located
+from chilopod.stability.search.locate import Found, Located, joined, located
 from chilopod.stability.search.samples import Samples
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.symmetry.isotypic import Block
@@ -41,7 +41,6 @@ _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, rel
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
 _KEPT = 64  # cached systems
 _WIDE, _SHORTER = 3.7, 0.25  # ratio of the ends of a piece, on no round number, and factor on its width after a failure
-_SAME = 1e-9  # distance of values of one point on the border of two pieces, relative to the interval
 _NARROWEST = 1e-6  # width, relative to the interval, below which a piece is not made shorter
 _LEAST = 50  # least budget of a piece
 _WORDS = (
@@ -102,23 +101,14 @@ def locate_hopf(
         if last.value < end:  # a fold, or the search cannot go on
             break
         at, state = end, last.orbit
-    status = SearchStatus.COMPLETE.worst(*(each.status for each in pieces))
-    remarks = [remark for each in pieces for remark in each.remarks]
+    found = joined(pieces)
+    status, remarks = found.status, list(found.remarks)
     if last.value == at < high and not pieces[-1].ending:
         status = SearchStatus.BUDGET
         limited = "the time (`seconds`) was" if limit.late else "the equilibria (`budget`) were"
         remarks.append(f"{limited} spent before the orbit was followed beyond {at:.9g}")
-    points: list[BifurcationPoint] = []
-    for each in pieces:  # a point on the border of two is found in both
-        near = _SAME * (high - low)
-        points += [
-            new
-            for new in each
-            if all(new.value - old.value > min(near, new.error_bound + old.error_bound) for old in points)
-        ]
-    said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(pieces[-1].ending)
-    about = (low, pieces[-1].searched[1]), max(each.spacing for each in pieces), ending, last.orbit.size
-    return Located(tuple(points), status, said, budget - left, *about)
+    said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(found.ending)
+    return replace(found, status=status, remarks=said, evaluations=budget - left, ending=ending)
 
 
 def _piece(

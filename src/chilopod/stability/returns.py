@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
@@ -39,11 +39,15 @@ _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
 _CROSSING_ROUNDS = 30
 _BENT = 0.5  # largest part of a correction of the time that the change of the speed adds
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
-_ENDS = 1e-3, 1e-4  # parts of a return, at its ends
+_ENDS, _NEAR_ENDS = (1e-3, 1e-4), (1e-2, 1e-3)  # parts of a return, at its ends
+_PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _PAST = 1.5e-5  # distance along a curve, in its units, at which an orbit is past a grazing
 _JUMPS, _HALVINGS = 0.3, 20  # least jump of the derivative in a grazing, relative to it, and halvings to its place
 _FALLING = 0.5  # least fall of the residual that is progress
+
+MOVED = "at {:.9g} time 0 was moved along the orbit, away from an event"
+"""Remark on a value of the parameter."""
 
 EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
 """Sentence on the end of a curve at an event that reaches time 0."""
@@ -283,7 +287,7 @@ def _arrival(system: Autonomous, before: Array, section: Section, rest: float) -
     return None
 
 
-def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
+def jumps_at_ends(system: SystemLike, x: Array, duration: float, ends: tuple[float, float] = _ENDS) -> bool:
     """True if the motion jumps at an end of a return: the derivative there does not tend to 1 over shorter times."""
     size, one = sizes(system, x, duration), np.eye(x.size)
 
@@ -292,10 +296,19 @@ def jumps_at_ends(system: SystemLike, x: Array, duration: float) -> bool:
         derivative = checked_flow(system, there, start * duration, (start + part) * duration)[1]
         return float((np.abs(derivative - one) * size / size[:, None]).max())
 
-    if change(0.5, _ENDS[0]) == 0.0:
+    if change(0.5, ends[0]) == 0.0:
         return False  # a map has no parts
-    pairs = [(change(0.0, part), change(1.0 - part, part)) for part in _ENDS]
-    return any(near > max(_ENDS[0], 0.5 * far) for far, near in zip(*pairs, strict=True))
+    pairs = [(change(0.0, part), change(1.0 - part, part)) for part in ends]
+    return any(near > max(ends[0], 0.5 * far) for far, near in zip(*pairs, strict=True))
+
+
+def starts(system: SystemLike, x: Array, duration: float) -> Iterator[Array]:
+    """Later states of a motion that may be at time 0 instead, if an event passes it and it may be moved."""
+    if is_autonomous(system) and jumps_at_ends(system, x, duration, _NEAR_ENDS):
+        for part in _PARTS:
+            there = carried(system, x[None], 0.0, part * duration)[0]
+            if not jumps_at_ends(system, there, duration, _NEAR_ENDS):
+                yield there
 
 
 def event_beside(system: SystemLike, x: Array, duration: float, derivative: Callable[[float], Array]) -> str:

@@ -30,10 +30,10 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, inspect
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, outward, trace
-from chilopod.stability.interface import Family, SystemLike, is_autonomous, returns_per_period
+from chilopod.stability.interface import Family, SystemLike, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import EVENT_AT_ZERO, carried, event_beside, jumps_at_ends, return_duration
+from chilopod.stability.returns import EVENT_AT_ZERO, MOVED, event_beside, return_duration, starts
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum import VERDICTS
 
@@ -51,7 +51,6 @@ BUDGET = 200_000
 """Default budget of flows of a branch."""
 
 _MEETING = 1e-6  # distance of a multiplier from +1 at a special point where branches meet
-_PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
 _STEADY = 1e-6  # largest value of the parameter, relative to its scale, along a family by energy
@@ -312,7 +311,7 @@ def followed(
             reason = event_beside(system, last.orbit, _duration(system, last), derivative) or reason
             moved = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
         if moved is not None:
-            remarks.append(f"at {found[-1].value:.9g} time 0 was moved along the orbit, away from an event")
+            remarks.append(MOVED.format(found[-1].value))
     said = tuple(dict.fromkeys([*remarks, *_unpaired_folds(found)]))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
 
@@ -360,13 +359,10 @@ def _derivative(curve: Curve, last: BranchPoint, distance: float) -> Array:
 def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
     """The anchor at another state of the orbit of a point; None if time 0 is fixed, or no state suits."""
     system = curve.system(last.value)
-    for part in _PARTS if is_autonomous(system) else ():
-        with contextlib.suppress(ChilopodError):
-            x = carried(system, last.orbit[None], 0.0, part * _duration(system, last))[0]
+    with contextlib.suppress(ChilopodError):
+        for x in starts(system, last.orbit, _duration(system, last)):
             rising = bool(last.tangent[-1] > 0.0)
-            anchor = anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)
-            if not jumps_at_ends(system, x, _duration(system, anchor.last)):
-                return anchor
+            return anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)
     return None
 
 

@@ -14,13 +14,14 @@ from chilopod.flows.arguments import finite_array, shape_of
 from chilopod.frozen import Array
 from chilopod.stability.interface import Autonomous, SystemLike, checked_flow, is_autonomous, returns_per_period, sizes
 from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
-from chilopod.stability.returns import carried, return_duration, returned_states
+from chilopod.stability.returns import carried, return_duration, returned_states, velocity_at
 
 _OF_GUESS = 16  # nodes of a guess that is a whole orbit
 _FEWEST_ROWS = 5
 _FEWEST_NODES = 3
 _SAME_PERIOD = 1e-6
 _ONWARD = 0.382  # distance along the motion of the next guess, relative to the guessed return
+_EARLIER, _JUMPS = 1e-10, 1e-6  # part of a return round a guess, and a motion within it, relative to it, of a jump
 _LONGEST_SETTLING = 300  # returns
 _MARCHED, _MARCHES = 48, 8  # steps per guessed period, and guessed periods, within which a motion must return
 _COMES_BACK = 0.1  # distance of a return, relative to the size of the motion
@@ -55,6 +56,17 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     duration = lasts / returns_per_period(system)
     nodes = (first + np.arange(_OF_GUESS) * duration / _OF_GUESS) % lasts
     return Nodes(CubicSpline(times - times[0], states)(nodes), duration)
+
+
+def past_impact(system: SystemLike, x: Array, duration: float) -> Array:
+    """The state, moved along its motion if that jumps there, as round-off decides whether it is before the jump."""
+    if is_autonomous(system):
+        with contextlib.suppress(AnalysisError):
+            before = x - _EARLIER * duration * velocity_at(system, x)
+            after = carried(system, before[None], 0.0, 2.0 * _EARLIER * duration)[0]
+            if (np.abs(after - before) > _JUMPS * np.abs(before).max()).any():
+                return carried(system, before[None], 0.0, _ONWARD * duration)[0]
+    return x
 
 
 def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:

@@ -15,10 +15,19 @@ from chilopod.flows.arguments import check_arguments, finite_array
 from chilopod.flows.carrying import REPEATED, TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
-from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
+from chilopod.stability.interface import (
+    Capabilities,
+    SystemLike,
+    check_system,
+    is_autonomous,
+    is_stiff,
+    offers,
+    returns_per_period,
+    sizes,
+)
 from chilopod.stability.krylov import LARGE, RESTS, TangentMap, closed_orbit, tangent_map, tangent_sizes
-from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
-from chilopod.stability.orbits.shooting import Nodes, Problem, shot
+from chilopod.stability.orbits.guesses import nearer_orbits, past_impact, whole_orbit
+from chilopod.stability.orbits.shooting import Nodes, Problem, nodes_along, shot
 from chilopod.stability.returns import (
     BESIDE,
     ReturnMap,
@@ -156,7 +165,10 @@ def searched_orbit(
     x = finite_array(guess, (system.dimension,), "orbit")
     shortened = shortest and section is None
     duration = return_duration(system) if section is None else section.duration
+    if isinstance(guess, Orbit) and section is None and is_autonomous(system):
+        duration = guess.period / returns_per_period(system)
     try:
+        x = past_impact(system, x, duration) if section is None else x
         found = near_orbit(system, Nodes(x[None], duration), with_error, budget, section)
         return _shortest(system, found, with_error, budget) if shortened else found
     except TooManySteps as error:
@@ -282,6 +294,12 @@ def near_orbit(
             start = start._replace(states=start.states / size @ basis @ basis.T * size)
         found = shot(Problem(lambda _: system, None, shared, budget, careful), start, size, section)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
+        # A state that only jumps, such as a mode, is free where no event happens: the corrector may put it anywhere.
+        free = (found.jacobian == np.eye(x.size)).all(axis=1) & (np.abs(x - start.states[0]) > RESTS * size)
+        free &= is_autonomous(system) and velocity_at(system, x) == 0.0
+        later = nodes_along(system, start.states[0], 1.5 * duration, 4 if free.any() else 1).states
+        if (later != start.states[0])[:, free].any():
+            raise AnalysisError("no event happens on the orbit found", field="orbit", allowed="a guess closer to it")
     if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")

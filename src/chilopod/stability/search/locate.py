@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
-from chilopod.flows.deadline import Budget, SpentError
+from chilopod.flows.deadline import Budget, Deadline, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
 from chilopod.stability.crossing_place import Course, Sample, crossings_in, orbit_blocks, past_singular, place_error
@@ -23,6 +23,7 @@ from chilopod.stability.equilibria import has_centre
 from chilopod.stability.interface import Family, checked_flow, returns_per_period
 from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
+from chilopod.stability.returns import MOVED
 from chilopod.stability.search.samples import NEAR_FOLD, SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, rows, said
 from chilopod.stability.spectrum import spectrum
@@ -155,6 +156,7 @@ def _at_rest(samples: Samples, value: float, state: Array, period: float) -> boo
 
 _DESCRIBING = 400  # budget of return maps for the orbits beside a point
 _GRACE = 0.7  # s, for the description of found points after the time limit
+_SAME = 1e-9  # distance of values of one point on the border of two pieces, relative to the interval
 _BESIDE = 1e-6  # distance from a crossing at which rates of change are computed, relative to the interval
 
 
@@ -278,14 +280,37 @@ def locate(
     """
     low, high = checked_interval(between)
     check_arguments(family=family, normal_form=normal_form, budget=budget)
-    samples = Samples(family, orbit, low, high, budget, seconds)
-    return located(
+    limit, samples = Deadline(seconds), Samples(family, orbit, low, high, budget, seconds)
+    found = located(
         samples,
         lambda start, end: _crossings(samples, start, end, budget),
         lambda each, block: [_described(samples, one, block, normal_form) for one in _resolved(samples, each)],
         lambda fold: fold if normal_form else replace(fold, normal_form=None),
         _DESCRIBING,
     )
+    if samples.onward is None:
+        return found
+    at, left = samples.high, max(budget - found.evaluations, 1)
+    try:
+        rest = locate(family, (at, high), samples.onward, normal_form, left, limit.remaining)
+    except SpentError as error:
+        ending = f"{error.problem} before the orbit was followed beyond {at:.9g}"
+        rest = replace(found, points=(), status=SearchStatus.BUDGET, evaluations=0, ending=ending)
+    return joined([found, replace(rest, remarks=(MOVED.format(at), *rest.remarks))])
+
+
+def joined(pieces: Sequence[Located]) -> Located:
+    """The result of searches of neighbouring intervals, with the end of the last."""
+    searched, points = (pieces[0].searched[0], pieces[-1].searched[1]), list[BifurcationPoint]()
+    near = _SAME * (searched[1] - searched[0])
+    for each in pieces:  # a point on the border of two is found in both
+        apart = [[b.value - a.value > min(near, a.error_bound + b.error_bound) for a in points] for b in each]
+        points += itertools.compress(each, map(all, apart))
+    status = SearchStatus.COMPLETE.worst(*(each.status for each in pieces))
+    remarks = [pieces[-1].ending] + [remark for each in pieces for remark in each.remarks]
+    about = searched, max(each.spacing for each in pieces), pieces[-1].ending, pieces[-1].dimension
+    shown, evaluations = tuple(dict.fromkeys(filter(None, remarks))), sum(each.evaluations for each in pieces)
+    return Located(tuple(points), status, shown, evaluations, *about)
 
 
 def located(

@@ -16,16 +16,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.flows.arguments import UserCode
 from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
-from chilopod.stability.orbits.orbit import from_known, known_state, near_orbit, searched_orbit
+from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.returns import BESIDE, return_duration, return_map, return_maps, section_at
+from chilopod.stability.returns import BESIDE, return_duration, return_map, return_maps, section_at, starts
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -62,6 +62,8 @@ class Samples:
     From a guess at the lower end, or the state that its system gives, the orbit is followed to the upper end, within
     ``budget`` orbits, twice as many return maps, and ``seconds``; as many return maps again serve the samples in
     between. Without a guess the orbits of systems that depend on time are known.
+
+    Where an event passes time 0 they end at a lower ``high``: ``onward`` is the orbit there with another time 0.
     """
 
     def __init__(
@@ -88,7 +90,10 @@ class Samples:
             self._keep(Sample(low, self.first.state, self.first.image))
         with self.budget:
             self.path = [] if self.known else self._up_to_merging(self._whole_path())
-        self.end = self.path[-1].value if self.path else high
+            self.end = self.path[-1].value if self.path else high
+            lost = self.end < high and not (self.spent or self.merges)
+            self.onward = self._past_event() if lost and (self.end > low or not isinstance(guess, Orbit)) else None
+        self.high = high if self.onward is None else self.end
         self.budget.left = allowed
 
     def at(self, values: Array) -> list[Sample]:
@@ -197,8 +202,9 @@ class Samples:
         """A sample between two others, from their orbits."""
         around = self._around(min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1))
         try:
-            found = self._sampled(value, self._predicted(around, value), around[0])
-            if found.passes(around[0]) and found.passes(around[1]) and not self._goes_through(around[0], found):
+            found = self._sampled(value, guess := self._predicted(around, value), around[0])
+            passes = found.passes(around[0]) and found.passes(around[1])
+            if (passes and not self._goes_through(around[0], found)) or not self._continues(around[0], guess, found):
                 raise AnalysisError("is another orbit", field="orbit")
             return found
         except AnalysisError:
@@ -244,6 +250,14 @@ class Samples:
                 self.spent = self.budget.spent or (SPENT if self.count >= self.orbits else "")
                 break
         return path
+
+    def _past_event(self) -> Orbit | None:
+        """The last orbit with another time 0 if an event passes that; else None."""
+        last, system = self.path[-1], self.family(self.end)
+        with contextlib.suppress(ChilopodError):
+            for x in starts(system, last.orbit, last.image.duration):
+                return near_orbit(system, Nodes(x[None], last.image.duration), False, self.budget)
+        return None
 
     def _up_to_merging(self, path: list[Sample]) -> list[Sample]:
         """The path up to a pitchfork where the orbit meets another one: a multiplier comes to +1 and turns back."""
@@ -321,15 +335,18 @@ class Samples:
         return bool(passes or (abs(ahead) < abs(rates[1]) < abs(rates[2])))
 
     def _on_same_branch(self, last: Sample, guess: Array, found: Sample) -> bool:
-        """True if an orbit that was not predicted is on the branch of the last one: then another lies about halfway
-        between them, in a fold at the square root of a half; towards another branch a jump remains."""
-        change = found.orbit - last.orbit
-        size = self.size * float((np.abs(change) / self.size).max())
+        """True if an orbit is on the branch of the last one."""
         # Where a multiplier passes +1 another orbit may be arbitrarily near.
         passes = found.passes(last)
         if passes and not self._goes_through(last, found):
             return False
-        small = _SAME if passes else _SMALL
+        return self._continues(last, guess, found, _SAME if passes else _SMALL)
+
+    def _continues(self, last: Sample, guess: Array, found: Sample, small: float = _SMALL) -> bool:
+        """True if an orbit was predicted, or another lies about halfway between it and the last one: in a fold at the
+        square root of a half, while towards another branch a jump remains."""
+        change = found.orbit - last.orbit
+        size = self.size * float((np.abs(change) / self.size).max())
         if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, small * self.size)).all():
             return True
         try:
