@@ -14,7 +14,7 @@ from chilopod.flows.arguments import finite_array, shape_of
 from chilopod.frozen import Array
 from chilopod.stability.interface import Autonomous, SystemLike, checked_flow, is_autonomous, returns_per_period, sizes
 from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
-from chilopod.stability.returns import carried, return_duration, returned_states, velocity_at
+from chilopod.stability.returns import carried, return_duration, returned_states, turned, velocity_at
 
 _OF_GUESS = 16  # nodes of a guess that is a whole orbit
 _FEWEST_ROWS = 5
@@ -59,13 +59,20 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
 
 
 def past_impact(system: SystemLike, x: Array, duration: float) -> Array:
-    """The state, moved along its motion if that jumps there, as round-off decides whether it is before the jump."""
+    """The state, or one further along its motion if that jumps there and then comes back nearer: round-off decides
+    whether the state is before the jump or after it."""
     if is_autonomous(system):
         with contextlib.suppress(AnalysisError):
             before = x - _EARLIER * duration * velocity_at(system, x)
             after = carried(system, before[None], 0.0, 2.0 * _EARLIER * duration)[0]
-            if (np.abs(after - before) > _JUMPS * np.abs(before).max()).any():
-                return carried(system, before[None], 0.0, _ONWARD * duration)[0]
+            fastest = np.maximum(*(np.abs(velocity_at(system, each)) for each in (before, after)))
+            if (np.abs(after - before) > _JUMPS * np.abs(before) + 20.0 * _EARLIER * duration * fastest).any():
+                later = carried(system, before[None], 0.0, _ONWARD * duration)[0]
+                both = np.array([x, later])
+                missed = np.abs(turned(system, carried(system, both, 0.0, duration)) - both)
+                size = np.abs(both).max(axis=0)
+                near, far = (missed / np.where(size > 0.0, size, 1.0)).max(axis=1)
+                return x if near <= far else later
     return x
 
 
