@@ -89,12 +89,12 @@ class TaylorFlow:
         n = self.tape.dimension
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
-        derivative, bound, shaken = np.eye(n), np.zeros((n, n)) if bounded else _NOTHING, x * self._shaken
+        derivative, bound, start = np.eye(n), np.zeros((n, n)) if bounded else _NOTHING, x.copy()
         steps = self._run(x, (t0, t1), params, derivative, bound)
         if not bounded:
             return Passage(x, derivative, bound, steps)
         other = np.eye(n)
-        self._run(shaken, (t0, t1), params, other, other=True)
+        self._run(start * self._shaken, (t0, t1), params, other, other=True)
         difference = np.abs(other - derivative)
         # An entry that is zero within round-off gives no information on the others' differences.
         beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))
