@@ -10,7 +10,9 @@ from chilopod.stability import (
     Ending,
     Event,
     Kind,
+    Orbit,
     PeriodicSystem,
+    SearchStatus,
     begin,
     exponents,
     find_orbit,
@@ -20,6 +22,7 @@ from chilopod.stability import (
     multipliers,
     switch,
 )
+from chilopod.stability.search.samples import Samples
 from helpers.systems import lorenz, roessler
 
 STEP = 1e-30
@@ -249,6 +252,20 @@ def test_a_search_moves_time_0_away_from_an_event():
     assert len(found) == 0
     assert found.searched == (low, 0.31)
     assert "time 0 was moved along the orbit, away from an event" in found.remarks[-1]
+
+
+def test_what_was_found_before_time_0_was_moved_is_kept(monkeypatch):
+    class Lost(Samples):
+        def __init__(self, family, guess, *others):
+            if isinstance(guess, Orbit):
+                raise AnalysisError("no periodic orbit found", field="orbit")
+            super().__init__(family, guess, *others)
+
+    monkeypatch.setattr("chilopod.stability.search.locate.Samples", Lost)
+    found = locate(rimless_wheel, (0.125, 0.31), [-0.226, 0.4416])
+    assert found.status is SearchStatus.INCOMPLETE
+    assert found.ending.startswith("no periodic orbit found before the orbit was followed beyond 0.18")
+    assert 0.18 < found.searched[1] < 0.2
 
 
 def test_a_search_stays_on_an_orbit_beside_an_event():

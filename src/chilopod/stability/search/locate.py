@@ -293,9 +293,10 @@ def locate(
     at, left = samples.high, max(budget - found.evaluations, 1)
     try:
         rest = locate(family, (at, high), samples.onward, normal_form, left, limit.remaining)
-    except SpentError as error:
+    except (SpentError, AnalysisError) as error:
         ending = f"{error.problem} before the orbit was followed beyond {at:.9g}"
-        rest = replace(found, points=(), status=SearchStatus.BUDGET, evaluations=0, ending=ending)
+        status = SearchStatus.BUDGET if isinstance(error, SpentError) else SearchStatus.INCOMPLETE
+        rest = replace(found, points=(), status=status, evaluations=0, ending=ending)
     return joined([found, replace(rest, remarks=(MOVED.format(at), *rest.remarks))])
 
 
