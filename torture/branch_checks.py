@@ -26,6 +26,8 @@ _LARGEST = 2e4  # a return that magnifies more is beyond this program
 _TESTS = {"period doubling": 1, "Neimark-Sacker": 2, "Krein collision": 2}
 _VAGUE = 0.03  # of a segment: a crossing of this program so uncertain is none
 _PARTS = 16
+_TOUCHED = 0.01  # of a segment: orbits nearer to a touch of the circle are not used
+_NEAR = 0.1  # of a segment: the value of a point tells its place badly where the curve turns
 
 
 @dataclass
@@ -260,6 +262,8 @@ def _compared(
         if each.error > _VAGUE * abs(orbits.value(segment.end - segment.start)):
             found.own.append(f"a crossing at {each.value!r} is uncertain by {each.error:.1e}")
             continue
+        if _on_either(segment, each, stated):
+            continue
         remark = _remark(branch, orbits, segment, each)
         name = ("+1", "-1", "pair")[each.test]
         if remark:
@@ -304,23 +308,36 @@ def _turn(segment: Segment, place: float) -> float:
 
 
 def _touches(found: Verdict, segment: Segment, point: Any, place: float, test: int) -> bool:
-    """Whether a test function touches zero there, by one of three causes: two multipliers cross at once; two meet at +1
-    or -1 and stay on the circle; or one comes to +1 and goes back where the curve turns, on a branch that goes through
-    the point where it leaves another one."""
+    """Whether a test function touches zero there; compares the values."""
+    touch = _touch(segment, point, place, test)
+    if touch is None:
+        return False
+    _, value, wrong = touch
+    if abs(value - point.value) > point.bifurcation.error_bound + wrong:
+        found.fault("off", f"{point.special.label} at {point.value!r}: it is at {value!r}")
+    else:
+        found.counts["confirmed"] += 1
+    return True
+
+
+def _touch(segment: Segment, point: Any, place: float, test: int) -> tuple[float, float, float] | None:
+    """Place where a test function touches zero, the parameter there and its error, by one of three causes: two
+    multipliers cross at once; two meet at +1 or -1 and stay on the circle; or one comes to +1 and goes back where the
+    curve turns, on a branch that goes through the point where it leaves another one."""
     double = point.bifurcation.multiplicity == 2 and test < 2
     if test and not double:
-        return False
-    values, n, target = [], segment.orbits.n, (1.0, -1.0, 0.0)[test]
+        return None
+    places, values, n, target = [], [], segment.orbits.n, (1.0, -1.0, 0.0)[test]
     place = place if double else _turn(segment, place)
-    for width in (0.01, 0.03):
+    for width in (_TOUCHED, 3.0 * _TOUCHED):
         sides = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]) * width
         try:
             nodes = [segment.at(place + side) for side in sides]
         except NoOrbit:
-            return False
+            return None
         near = [np.sort(np.abs(node.multipliers - target))[int(double)] for node in nodes]
         if max(near) > 0.1 or (not double and nodes[0].tangent[n] * nodes[-1].tangent[n] > 0.0):
-            return False
+            return None
         course = np.polynomial.Polynomial.fit(sides, [segment.orbits.value(node.z) for node in nodes], 5)
         vanishing = course.deriv()
         if double:
@@ -330,15 +347,19 @@ def _touches(found: Verdict, segment: Segment, point: Any, place: float, test: i
         if double and not zeros:
             zeros = [zero for zero in real_roots(vanishing.deriv(), 3 * width) if abs(vanishing(zero)) < 1e-5]
         if not zeros:
-            return False
-        values.append(float(course(min(zeros, key=abs))))
+            return None
+        places.append(place + min(zeros, key=abs))
+        values.append(float(course(places[-1] - place)))
     # Orbits so near a point where branches meet are uncertain; what two widths differ by tells how much.
-    value, wrong = values[1], 3.0 * abs(values[1] - values[0])
-    if abs(value - point.value) > point.bifurcation.error_bound + wrong:
-        found.fault("off", f"{point.special.label} at {point.value!r}: it is at {value!r}")
-    else:
-        found.counts["confirmed"] += 1
-    return True
+    return places[1], values[1], 3.0 * abs(values[1] - values[0])
+
+
+def _on_either(segment: Segment, crossing: Crossing, stated: list[tuple[Any, float]]) -> bool:
+    """True for a crossing at +1 beside a stated one where branches meet: orbits there lie on either of them."""
+    if crossing.test:
+        return False
+    touches = (_touch(segment, *each, 0) for each in stated if abs(each[1] - crossing.place) < _NEAR)
+    return any(touch is not None and abs(touch[0] - crossing.place) < _TOUCHED for touch in touches)
 
 
 def _remark(branch: Any, orbits: Orbits, segment: Segment, crossing: Crossing) -> str:
