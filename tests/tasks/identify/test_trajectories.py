@@ -75,8 +75,25 @@ def test_a_walk_is_identified_from_its_release_or_any_later_moment(tmp_path, fir
     )
     found = identify_recorded(robot.with_value("ground.friction", 235.0), given, tmp_path)
     assert found.scatter < 1e-7
+    assert "alike" not in str(found)  # what is left is rounding
     assert found.as_json()["phases"] == pytest.approx([first / 50.0 / robot.gait.period], abs=1e-5)
     assert found.best.get("ground.friction") == pytest.approx(ROBOT.get("ground.friction"), rel=1e-6)
+
+
+def test_a_heavy_robot_remembers_its_rates_for_cycles(tmp_path):
+    robot = SOFT.set_from_text(["body.mass=85 kg"])
+    record = walked(robot, 6.0, 50.0).isel(time=slice(11, None, 2))
+    given = RecordedWalks(
+        free={"ground.friction": FREE["ground.friction"]}, trajectory=[{"file": "walk.nc", "settings": [SPRING]}]
+    )
+    (tmp_path / "walk.nc").write_bytes(netcdf(record))
+    found = identify_recorded(robot.with_value("ground.friction", 240.0), given, tmp_path)
+    assert found.best.get("ground.friction") == pytest.approx(ROBOT.get("ground.friction"), rel=1e-4)
+    (recording,) = read_recordings(robot, given, tmp_path)
+    assert recording.forgotten > robot.gait.period
+    poor = robot.set_from_text(["ground.friction=30 N*s/m"])
+    with pytest.raises(ChilopodError, match=r"too short for this robot, which forgets .* or more"):
+        read_recordings(poor, given, tmp_path)
 
 
 def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):

@@ -22,7 +22,7 @@ from chilopod.text_file import read_text
 
 _LARGEST, _LONGEST = 50_000_000, 3600.0  # bytes, s
 _CYCLES, _NUMBERS = 5, 100  # of the gait, and angles, which a recording must have
-_PARTS, _PHASES, _FORGOTTEN = (0.25, 0.5, 0.75), 6, 1e-3  # of a cycle, number, and what is left of rates, relative
+_PARTS, _MOST, _PHASES, _FORGOTTEN = (0.25, 0.5, 0.75), 20, 6, 1e-3  # cycles, number, and what is left of rates
 _UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
 _NUMBER = re.compile(r"(\d+)\W*$")
 
@@ -80,7 +80,11 @@ def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Record
             said, field = f"too large: {places[sample]}", f"column {names[joint + 1]}"
             raise ParameterError(said, field=field, value=f"{value:.6g} {unit}", allowed=allowed)
         times, angles = _checked(robot, table_si)
-        return Recording(given.file, given.settings, _forgotten(PlanarModel(robot)), times, angles)
+        forgotten = _forgotten(PlanarModel(robot))
+        if not 2.0 * forgotten <= times[-1]:
+            said = f"too short for this robot, which forgets the rates at its start within {forgotten:.3g} s only"
+            raise ParameterError(said, value=f"{times[-1]:.4g} s", allowed=f"{2.0 * forgotten:.3g} s or more")
+        return Recording(given.file, given.settings, forgotten, times, angles)
     except ChilopodError as error:
         error.source = str(path)
         raise
@@ -88,14 +92,15 @@ def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Record
 
 def _forgotten(model: PlanarModel) -> float:
     """Time after which the motion about the straight walk hardly depends on the rates at its start, at any phase, if
-    its joint angles there are free: most of a cycle where the legs of a module leave the floor together. s."""
+    its joint angles there are free: most of a cycle where the legs of a module leave the floor together, several cycles
+    for heavy robots with poor grip; infinite if that is far longer. s."""
     joints, phases = range(3, model.modules + 2), model.period * np.arange(_PHASES) / _PHASES
-    for time in model.period * np.array(_PARTS):
+    for time in model.period * np.array([*_PARTS, *range(1, _MOST + 1)]):
         flows = [model.flow(model.orbit, at, at + time)[1] / model.scale[:, None] * model.scale for at in phases]
         pairs = [(np.linalg.qr(flow[:, joints])[0], np.delete(flow, joints, axis=1)) for flow in flows]
         if all(np.abs(rates - known @ (known.T @ rates)).max() < _FORGOTTEN for known, rates in pairs):
             return float(time)
-    return model.period
+    return np.inf
 
 
 def _netcdf(path: Path) -> xr.Dataset:

@@ -77,7 +77,7 @@ class RecordedIdentification(Identified):
 
     def _remarks(self) -> list[str]:
         said = [f"the search ended after {_FINE[1]} steps, before it converged"] * (not self.converged)
-        if self.variance_factor > _ALIKE:
+        if self.variance_factor > _ALIKE and self.scatter > _RESOLVED:  # else they are rounding
             wide = f"intervals are {np.sqrt(self.variance_factor):.1f} times as wide as those of independent ones"
             said.append(f"neighbouring residuals are alike: the model or the recording is off; {wide}")
         return said
