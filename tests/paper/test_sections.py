@@ -139,12 +139,13 @@ def test_one_that_fails_leaves_the_others_alone():
     assert found[ONE] == 1
     assert after in found.values
     assert found[after] is None
-    assert found.planar_rows() == {"chapter": [one(1)]}
+    assert repr(found.planar_rows()) == repr({"chapter": [one(1)]})  # NaN differs from itself
 
 
 def test_lines_stand_by_chapter():
     rows = {MODE: [one(1)], ONE: [one(2)], UNIFORM: [one(3)]}
-    assert Found(rows=rows).planar_rows() == {MODE.chapter: [one(1), one(3)], "chapter": [one(2)]}
+    shown = {MODE.chapter: [one(1), one(3)], "chapter": [one(2)]}
+    assert repr(Found(rows=rows).planar_rows()) == repr(shown)  # NaN differs from itself
 
 
 def test_trials_that_another_process_walks_ahead_are_those_that_this_one_walks(tmp_path, monkeypatch):

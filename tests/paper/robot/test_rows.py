@@ -78,7 +78,8 @@ def test_what_a_quick_report_has_is_judged_as_in_the_whole_one_and_the_rest_need
     few = walks(variants={}, lower_steps={}, uniform=None)
     tasks = turning(tasks={"A": turning().tasks["A"]}, hopf=None)
     quick = [*walk_rows(few), *turning_rows(tasks, few)]
-    assert [row for row in whole() if row in quick] == quick
+    shown = [repr(row) for row in quick]  # from Python 3.13 on rows with NaN differ from themselves
+    assert [row for row in map(repr, whole()) if row in shown] == shown
     found = Found(Context(size=Size.QUICK), rows={WALKS: [*quick, OfPlanar(statements.UNIFORM, Result("6.5"))]})
     (left_out,) = [row for row in found.robot_rows() if row.twin is None]
     assert left_out.data()["twin"] == "needs more trials"

@@ -255,7 +255,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
     block = _Block(np.empty((blocks, n, n)), np.empty((blocks, n, n)))
     factor, work = np.empty((n, columns)), np.empty(order + 1)
     t, last, unit = t0, t0 - (t1 - t0), (t1 - t0) / 8.0
-    steps, in_place, in_block, noise, status = 0, 0, 0, 1, DONE
+    steps, crowded, in_block, noise, status = 0, 0, 0, 1, DONE
     at_once = _AT_ONCE * max(abs(t0), abs(t1))
     if directions is not None:
         start(tape, motion, t)
@@ -274,11 +274,12 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         when = t, unit, remaining, soon
         h, crossing, direction = _chosen(tape, directions, clock, motion, control, when, steps, work)
         reached = t1 if h >= remaining else min(t + h * unit, t1)
-        in_place = in_place + 1 if reached == t else 0
-        if in_place > 0 and crossing < 0:
+        if crossing >= 0:
+            crowded = crowded + 1 if reached - last <= at_once else 0
+        elif reached == t:
             status = STALLED
             break
-        if in_place > 2 * switches + 8:
+        if crowded > 2 * switches + 8:
             status = CHATTERS
             break
         h = (reached - t) / unit
