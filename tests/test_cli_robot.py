@@ -169,6 +169,12 @@ def test_check_warns_of_walks_that_cannot_be(robot, change, said):
     assert said in run("robot", "check", robot, "--set", change)[1]
 
 
+def test_a_check_that_would_take_long_says_what_it_leaves_out(monkeypatch):
+    monkeypatch.setattr("chilopod.cli.robot._PATIENCE", 0.0)
+    code, out, _ = run("robot", "check", PRESET, "--set", "springs.stiffness[0]=3 N*mm/deg")
+    assert (code, "more than 0 s to compute" in out) == (0, True)
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [

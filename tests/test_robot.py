@@ -4,6 +4,7 @@ import copy
 import math
 import pickle
 import tomllib
+from decimal import Decimal
 
 import numpy as np
 import pytest
@@ -254,6 +255,20 @@ def test_numeric_path_refuses_too(robot):
             robot.with_value("springs.stiffness[0]", value)
 
 
+def test_numbers_of_any_type_become_floats_that_nobody_can_change(robot):
+    mass = np.array(3.0)
+    heavier = robot.with_value("body.mass", mass)
+    mass[...] = -7.0
+    assert heavier.body.mass == 3.0
+    assert hash(heavier) == hash(robot.with_value("body.mass", Decimal(3)))
+    assert type(robot.with_value("body.modules", np.array(5)).body.modules) is int
+    for value in (np.array([3.0]), [3.0, 4.0], "7", None, 3 + 0j):
+        with pytest.raises(ParameterError, match=r"body\.mass.*must be one number"):
+            robot.with_value("body.mass", value)
+    with pytest.raises(ParameterError, match=r"joint_angles.*one for each joint"):
+        robot.axis_radius([0.1] * 4)
+
+
 # -- bad files
 
 
@@ -411,6 +426,8 @@ def test_remarks(robot):
     assert remarks(edited) == ["Numbers that are not those of the preset, with its provenance: body.mass."]
     for text, shown in (
         ("gait.stance=310", "gait.stance = 310 s is unusually large for gait.swing = 0.29 s."),
+        ("springs.damping=1000", "springs.damping[0] = 1000 N*m*s/rad is unusually large for springs.stiffness[0]"),
+        ("body.yaw_inertia=6", "body.yaw_inertia = 6 kg*m^2 is unusually large for body.mass"),
         ("springs.stiffness=41", "springs.stiffness[0] = 715.585 N*mm/deg is unusually large for ground.friction = "),
     ):
         first, *_, note = remarks(robot.set_from_text([text]))

@@ -15,7 +15,7 @@ from chilopod.analysis.map_axes import Plane
 from chilopod.analysis.map_curves import MapCurve, Search
 from chilopod.analysis.map_grid import Grid
 from chilopod.analysis.parameters import K1, stiffness
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, OutputError, ParameterError
 from chilopod.progress import silent
 from chilopod.robot import load_robot
 from chilopod.stability import CodimensionTwo, Kind
@@ -298,7 +298,15 @@ def test_a_map_that_was_cut_off_goes_on(tmp_path, monkeypatch):
     assert (whole.computed.all(), whole.fate.any()) == (True, False)
     mapped(ROBOT, *axes, points=13, kept=file)
     assert len(counts) == 3
-    mapped(ROBOT.with_value("body.mass", 8.0), *axes, points=13, kept=file)
+    other = (K1, 0.9, 2.1), axes[1]
+    for robot, given in ((ROBOT.with_value("body.mass", 8.0), axes), (ROBOT, other)):
+        with pytest.raises(OutputError, match="has the growth rates of another map"):
+            mapped(robot, *given, points=13, kept=file)
+    file.write_bytes(file.read_bytes()[:-9])
+    with pytest.raises(OutputError, match="is damaged or was edited"):
+        mapped(ROBOT, *axes, points=13, kept=file)
+    assert len(counts) == 3
+    mapped(ROBOT.with_value("body.mass", 8.0), *axes, points=13, kept=file, replace=True)
     assert counts[3:] == [100, 69]
 
 

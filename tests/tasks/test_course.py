@@ -128,6 +128,14 @@ def test_every_target_has_a_verdict(ready):
     assert nothing.as_json()["walks"][0]["steering_cost_of_transport"] is None
 
 
+def test_a_robot_may_arrive_at_the_last_moment(ready):
+    # Straight ahead it is 0.149 m before the target after 10 s, where the walk ends, and farther at the look before.
+    way = 10.0 * ROBOT.gait.speed + 0.149
+    walked = drive(replace(ready, controller=LegYawController()), course_named(f"0 deg, {way} m", 10.0)).records[0]
+    assert walked.goal_verdict.item() == Verdict.ARRIVED.label
+    assert walked.goal_nearest.item() == pytest.approx(0.149, abs=1e-6)
+
+
 def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
     monkeypatch.setattr("chilopod.tasks.course.radius_law", lambda *asked: ready.law)
     named = ["springs.adjustable[0]=true", "springs.softest=9 N*mm/deg"]

@@ -20,7 +20,7 @@ from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE,
 from chilopod.analysis.map_result import StabilityMap
 from chilopod.analysis.parameters import ALL
 from chilopod.analysis.quantities import Measured, Onset
-from chilopod.errors import ChilopodError, ParameterError, known_names
+from chilopod.errors import ChilopodError, OutputError, ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
 from chilopod.output import write_atomic
@@ -50,6 +50,7 @@ def map(
     points: int = POINTS,
     also: Collection[str] = (),
     kept: str | Path | None = None,
+    replace: bool = False,
     remark: Callable[[str], None] = lambda sentence: None,
     progress: Progress = silent,
 ) -> StabilityMap:
@@ -75,6 +76,8 @@ def map(
     kept
         File that holds growth rates while they are computed; a map that was cut off goes on from it. Without it a map
         that would take more than four hours is refused.
+    replace
+        True if that file may be replaced although it is damaged or belongs to another map.
     remark
         Function that receives a sentence if the map will take long.
     progress
@@ -95,7 +98,7 @@ def map(
     file = None if kept is None else Path(kept)
     grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
     if file is not None:
-        _take(grid, file)
+        _take(grid, file, replace)
     _announce(grid, remark, points, file is not None)
     wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
     grid.refine(wanted, part(progress, 0.0, 0.5))
@@ -192,8 +195,8 @@ def _radii(grid: Grid, bending: Onset, progress: Progress) -> tuple[Array, list[
 
 
 def _key(plane: Plane) -> str:
-    # Numbers that vary do not matter, but then neither do their axes.
-    said = repr((VERSION, plane.robot.to_toml(), plane.x.path, plane.y.path))
+    axes = [(axis.path, axis.low, axis.high) for axis in (plane.x, plane.y)]
+    said = repr((VERSION, plane.robot.to_toml(), axes))
     return hashlib.sha256(said.encode()).hexdigest()
 
 
@@ -208,14 +211,18 @@ def _keep(grid: Grid, file: Path) -> None:
     write_atomic(file, sealed(netcdf(data)))
 
 
-def _take(grid: Grid, file: Path) -> None:
-    """Take growth rates from a file, if they are of this robot and these axes."""
+def _take(grid: Grid, file: Path, replace: bool) -> None:
+    """Take growth rates from a file of this robot and these axes. Any other one may be replaced, or is refused."""
     try:
         data = xr.load_dataset(io.BytesIO(unsealed(file)), engine="h5netcdf")
-    except (FileNotFoundError, UnsoundError):
+        if data.attrs.get("key") != _key(grid.plane):
+            raise UnsoundError("has the growth rates of another map")
+    except FileNotFoundError:
         return
-    if data.attrs.get("key") != _key(grid.plane):
-        return
+    except UnsoundError as error:
+        if replace:
+            return
+        raise OutputError(f"{error} (--force replaces it)", source=str(file)) from None
     at = [
         np.searchsorted(axis, data[name].values).clip(max=axis.size - 1)
         for axis, name in ((grid.x, "x"), (grid.y, "y"))

@@ -67,7 +67,7 @@ def stability_map(
         free(files_of_map(out), options.force)
     with progress_bar("map") as tell:
         found = mapped(
-            robot, x, y, points=points, also=also, kept=out and out / "map-rates.nc",
+            robot, x, y, points=points, also=also, kept=out and out / "map-rates.nc", replace=options.force,
             remark=lambda sentence: typer.echo(f"note: {sentence}", err=True), progress=partial(tell, "map"),
         )  # fmt: skip
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 _FOLLOWED = 12  # modules of robots whose curved walks a check follows, which takes seconds
+_PATIENCE = 10.0  # s for that, without compilation
 
 app = new_app("Make, show, check and export robot files.")
 
@@ -140,6 +141,7 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
 def _out_of_reach(robot: Robot) -> Iterator[str]:
     """Sentences about legs that cannot follow their paths, and joints that bend too far on the curved walk."""
     from chilopod.analysis.quantities import Measured, Onset, leading_mode
+    from chilopod.flows.deadline import Deadline
     from chilopod.planar.stretch import MOST_BENT
 
     if robot.twin is not None:
@@ -151,9 +153,13 @@ def _out_of_reach(robot: Robot) -> Iterator[str]:
             yield f"The robot cannot walk in three dimensions: {error}."
     if robot.body.modules > _FOLLOWED:
         return
-    with suppress(ChilopodError):  # no curved walk is known
-        if leading_mode(robot).growth > 0.0 and Measured(Onset()).most_bent(robot) > MOST_BENT:
-            yield "A joint bends beyond a right angle on the curved walk, where walks end: the springs are too soft."
+    bends = False
+    with Deadline(_PATIENCE) as limit, suppress(ChilopodError):  # no curved walk is known
+        bends = leading_mode(robot).growth > 0.0 and Measured(Onset()).most_bent(robot) > MOST_BENT
+    if bends:
+        yield "A joint bends beyond a right angle on the curved walk, where walks end: the springs are too soft."
+    elif limit.late:
+        yield f"The curved walk takes more than {_PATIENCE:g} s to compute: whether its joints bend too far is unknown."
 
 
 @app.command(short_help="Write the robot in 3-D for other programs (MJCF, URDF).")

@@ -142,9 +142,13 @@ class Robot(Description):
     def axis_radius(self, joint_angles: ArrayLike) -> NDArray[np.float64]:
         """Radius of the arc that the body axis makes, the paper's (N-1) L / sum |theta|, m, shape (...), of mean joint
         angles, rad, shape (..., N-1): infinite where all are zero, NaN where one is."""
-        bent = np.abs(np.asarray(joint_angles, dtype=np.float64)).sum(-1)
+        angles, joints = np.asarray(joint_angles, dtype=np.float64), self.body.modules - 1
+        if angles.shape[-1:] != (joints,):
+            allowed = f"(..., {joints}), one for each joint"
+            raise ParameterError("has the wrong shape", field="joint_angles", value=angles.shape, allowed=allowed)
+        bent = np.abs(angles).sum(-1)
         with np.errstate(divide="ignore", over="ignore"):  # a negligible bend is straight
-            return np.asarray((self.body.modules - 1) * self.module_length / bent)
+            return np.asarray(joints * self.module_length / bent)
 
     @property
     def module_mass(self) -> float:

@@ -58,15 +58,20 @@ def _out_of_proportion(robot: Robot) -> Iterator[str]:
     soft, stiff = (f"springs.stiffness[{springs.index(each)}]" for each in (min(springs), max(springs)))
     drag = robot.ground.friction * gait.speed * gait.duty * module  # N*m
     feet = ("legs.half_width", "legs.forward_offset")
+    rod = robot.module_mass * module**2 / 12.0
+    damping = max(robot.springs.damping)
+    damper = f"springs.damping[{robot.springs.damping.index(damping)}]"
     lengths = (*feet, "twin.hip_height", "twin.body_width", "twin.body_height") if robot.twin else feet
     pairs = [
         ("body.mass", "body.length", body.mass / (body.length**2 * module), 0.05, 5000.0),  # kg/m^3
+        ("body.yaw_inertia", "body.mass", (robot.body.yaw_inertia or rod) / rod, 0.02, 50.0),
         *((path, "body.length", abs(robot.get(path)) / body.length, 0.0, 0.5) for path in lengths),
         ("gait.stride", "body.length", gait.stride / body.length, 1e-3 / body.modules, 1.0),
         ("gait.stance", "gait.swing", gait.stance / gait.swing, 0.02, 50.0),
         ("gait.stride", "gait.stance", gait.speed / module, 0.005, 500.0),  # 1/s
         (soft, "ground.friction", min(springs) / drag, 0.01, math.inf),
         (stiff, "ground.friction", max(springs) / drag, 0.0, body.modules),
+        (damper, stiff, damping / (max(springs) * gait.period), 0.0, 100.0),
     ]
     text = {path: shown for path, shown, _ in robot.listed()}
     odd = [each for each in pairs if not each[3] <= each[2] <= each[4]]

@@ -180,9 +180,12 @@ class CourseReferee:
 
     def add_to(self, data: xr.Dataset, walk: Walk) -> None:
         """Add the outcomes of all targets and the observations of the controller to the record of a finished walk."""
-        busy = self.busy
+        busy, (_, away) = self.busy, self._away(walk)  # the last look, as the walk ends between two
         stopped = busy & np.array([each is not Status.WALKED for each in walk.status])
         self._judge(stopped, walk.time, Verdict.STOPPED)
+        arrived = busy & ~stopped & (away < ARRIVAL_RADIUS)
+        self._judge(arrived, walk.time, Verdict.ARRIVED)
+        busy &= ~arrived
         self._judge(busy & ~stopped & self._seen_once, walk.time, Verdict.LATE)
         self._judge(busy & ~stopped & ~self._seen_once, walk.time, Verdict.UNSEEN)
         over = ("robot", "goal")

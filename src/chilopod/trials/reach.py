@@ -224,8 +224,8 @@ class Reach:
         found: dict[str, ModuleType | None] = {}
         if nested:
             names = {*code.co_names}
-            if {"import_module", "__import__"} & names or {"sys", "modules"} <= names:
-                raise UnknownKindError(f"{path}: code that imports modules by name")
+            if {"import_module", "__import__", "eval", "exec"} & names or {"sys", "modules"} <= names:
+                raise UnknownKindError(f"{path}: code that imports modules by name, or may")
             for each in code.co_consts:
                 found |= self._imported(each, space, path) if isinstance(each, CodeType) else {}
         if _IMPORT not in code.co_code[::2]:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeGuard
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
@@ -16,6 +17,18 @@ from chilopod.units.expressions import format, kind_of, parse
 # Far outside anything that walks, and far inside what products and quotients of a few quantities need to stay finite.
 _SMALLEST: Final = 1e-12
 _LARGEST: Final = 1e9
+
+
+def _number(value: Any) -> float:
+    """A number of any type, or an array of no dimension, as a float: arrays could be changed later."""
+    if type(value) is float:
+        return value
+    try:
+        if isinstance(value, str | bytes) or np.ndim(value):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError("must be one number, in SI units", value=value) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +60,9 @@ class Quantity:
     optional: bool = False
 
     def check(self, value: float, given: object = None) -> float:
-        """Return `value` (SI units) if it is in range; an int for whole numbers. Otherwise the ParameterError shows
-        `given`, the user's text, if there is one."""
+        """Return `value` (SI units) as a float, an int for whole numbers, if it is in range; otherwise the error
+        shows `given`, the user's text, if there is one."""
+        value = _number(value)
         if self.at_least <= value <= self.at_most and not (self.integer and value != math.floor(value)):
             return int(value) if self.integer else value
         shown = value if given is None else given
@@ -109,7 +123,7 @@ class Flag(Quantity):
 
     def check(self, value: float, given: object = None) -> bool:
         """Return whether `value` is 1; a ParameterError if it is neither that nor 0."""
-        if value not in (0, 1):
+        if _number(value) not in (0, 1):
             raise ParameterError("must be true or false", value=value if given is None else given)
         return bool(value)
 
