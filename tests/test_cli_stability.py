@@ -145,6 +145,10 @@ def test_bad_input_is_one_line_that_names_it(parameter, between, expected):
         (("aoi2022", "--engine", "twin", "--amplitude", "3 deg/s"), "--amplitude"),
         (("aoi2022", "--engine", "twin", "--amplitude", "3 rad"), "must be a small angle"),
         ((PRESET, "--onset", K1, "5 N*mm/deg", "30 N*mm/deg"), "must be 'twin' for --onset"),
+        (
+            ("aoi2022", "--engine", "twin", "--onset", K1, "75 N*mm/deg", "20 N*mm/deg"),
+            f"--onset = '{K1} 75 N*mm/deg 20",
+        ),
         ((PRESET, "--amplitude", "2 deg"), "must be 'twin' for --amplitude"),
     ],
 )

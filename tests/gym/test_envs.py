@@ -384,6 +384,12 @@ def test_a_batch_has_a_number_of_robots(count):
         chilopod.gym.RobotVectorEnv(num_envs=count)
 
 
+def test_single_robots_of_a_vector_are_not_reset():
+    robots = chilopod.gym.RobotVectorEnv(num_envs=2)
+    with pytest.raises(ParameterError, match=r"reset_mask.*must be left out"):
+        robots.reset(options={"reset_mask": np.array([True, False])})
+
+
 def test_episodes_that_no_memory_holds_are_refused(monkeypatch):
     monkeypatch.setattr(episodes.memory, "available", lambda: 1e6)
     with pytest.raises(ParameterError, match=r"num_envs \* targets \* patience.*of memory"):

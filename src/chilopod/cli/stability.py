@@ -95,7 +95,11 @@ def _of_bends(
     from chilopod.analysis import bend_onset
 
     path, unit = onset[0], robot.unit_of(onset[0])
-    point = bend_onset(multipliers, robot, path, interval(robot, path, onset[1:]))
+    try:
+        point = bend_onset(multipliers, robot, path, interval(robot, path, onset[1:]))
+    except ParameterError as error:
+        error.field = "onset" if error.field in ("between", "parameter") else error.field
+        raise
     shown = [units.format(each, unit, digits=4) for each in (point.value, point.low, point.high)]
     said = f"{robot.name}: multiplier of bends passes 1 at {path} = {shown[0]}, 95 %: {shown[1]} to {shown[2]}"
     found = {"robot": robot.name, "parameter": path, "onset_si": point.value, "interval_si": [point.low, point.high]}
@@ -108,7 +112,7 @@ def bifurcation(
     parameter: ParameterOption,
     between: OnsetBetweenOption = None,
     seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.0, help="Time limit, s, above 0; the search ends with what it found.")
+        float, typer.Option(metavar="S", min=0.0, help="Time limit, s; the search ends with what it found.")
     ] = 60.0,
     out: OutOption = None,
 ) -> None:

@@ -89,6 +89,9 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     ) -> tuple[Row, dict[str, Any]]:
         """Begin an episode with every robot. Robot i has ``seed`` + i, or its own seed of a list; None continues the
         generators."""
+        if options and "reset_mask" in options:
+            said = "must be left out: each robot begins again where its episode ends"
+            raise ParameterError(said, field="options", value="reset_mask")
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:

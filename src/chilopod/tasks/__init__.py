@@ -6,7 +6,7 @@ from chilopod.lazy import exports
 
 if TYPE_CHECKING:
     from chilopod.tasks.course import Driven, Driver, drive, driver
-    from chilopod.tasks.identify import identify_planar, identify_twin
+    from chilopod.tasks.identify import Identification, TwinIdentification, identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
     from chilopod.tasks.sizing import size
     from chilopod.tasks.sizing.result import Sizing
@@ -17,7 +17,7 @@ else:
         __name__,
         {
             "course": ("Driven", "Driver", "drive", "driver"),
-            "identify": ("identify_planar", "identify_twin"),
+            "identify": ("Identification", "TwinIdentification", "identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
             "sizing": ("size",),
             "sizing.result": ("Sizing",),
@@ -30,9 +30,11 @@ __all__ = [
     "Driven",
     "Driver",
     "Ends",
+    "Identification",
     "RunOptions",
     "Sizing",
     "Turn",
+    "TwinIdentification",
     "Walks",
     "drive",
     "driver",
