@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from chilopod import load_robot
 from chilopod.analysis.map_axes import with_modules
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.deadline import Deadline, SpentError
 from chilopod.planar import PlanarModel
 from chilopod.stability import PeriodicSystem, SystemLike
 from helpers.planar_strategies import robots, state_of
@@ -177,3 +178,22 @@ def test_a_thousand_modules_have_a_right_hand_side_and_a_flow_without_derivative
     assert np.isfinite(slope).all()
     after = model.flow_states([model.orbit], 0.0, 0.01)[0]
     np.testing.assert_allclose(after, model.orbit, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_the_linear_flow_of_long_chains_ends_at_a_time_limit(count):
+    """It takes a second of one core, for each robot, and all are computed at once."""
+    robot = load_robot("aoi2022-planar").with_value("body.modules", 40.0)
+    models = [PlanarModel(robot.with_value("springs.stiffness", stiffness)) for stiffness in (0.1, 0.2, 0.3)[:count]]
+    short = [PlanarModel(model.robot.with_value("body.modules", 2.0)) for model in models]
+    PlanarModel.flow_many(short, 0.0, 0.1)  # compiles
+    begin, _ = time.process_time(), [model.contraction for model in models]
+    with pytest.raises(SpentError), Deadline(0.05):
+        PlanarModel.flow_many(models, 0.0, models[0].period)
+    assert time.process_time() - begin < 0.9 * count
+
+
+def test_the_nonlinear_flow_of_long_chains_looks_at_the_time_between_tangents():
+    model = PlanarModel(load_robot("aoi2022-planar").with_value("body.modules", 16.0))
+    with pytest.raises(SpentError), Deadline(0.05):
+        model.flow(1.1 * model.orbit, 0.0, model.period)

@@ -12,6 +12,7 @@ from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
+    Ending,
     Kind,
     PeriodicSystem,
     SearchStatus,
@@ -335,3 +336,24 @@ def test_every_orbit_is_counted_and_the_distance_of_neighbours_is_said():
     assert 0.1 < found.spacing < 0.2
     assert f"at most {found.spacing:.2g} apart" in str(found)
     assert found.to_dataset().attrs["spacing"] == found.spacing
+
+
+@pytest.mark.parametrize("at", [0.0, 0.15, 0.3])
+@pytest.mark.parametrize(("name", "times"), [("spatial_symmetry", 1), ("symmetry", 2)])
+def test_a_symmetry_of_one_system_is_none_of_its_family(name, times, at):
+    """The quadratic term vanishes at a single value, where -x is a symmetry in space, or one after half a period."""
+
+    def family(p, at=at):
+        def rhs(t, x):
+            return [x[1], (p - 0.05 - 0.1 * np.cos(times * t)) * x[0] - 0.2 * x[1] - (p - at) * x[0] ** 2 - x[0] ** 3]
+
+        return from_rhs(rhs, 2, 2.0 * pi, **{name: -np.eye(2)} if p == at else {})
+
+    found = locate(family, (0.0, 0.3), orbit=[0.0, 0.0])
+    assert found.status is SearchStatus.COMPLETE
+    (point,), (other,) = found, locate(lambda p: family(p, 0.5), (0.0, 0.3), orbit=[0.0, 0.0])
+    assert point.kind is Kind.TRANSCRITICAL
+    assert abs(point.value - other.value) <= point.error_bound + other.error_bound
+    branch = follow(family, [0.0, 0.0], (0.0, 0.3), symmetric=True)
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert [each.special for each in branch.special_points] == [Kind.TRANSCRITICAL]

@@ -341,6 +341,19 @@ def test_another_multiplier_like_the_critical_one(sign):
     np.testing.assert_allclose(found.values, 0.0, atol=1e-14)
 
 
+def test_a_pitchfork_is_not_followed_among_systems_without_its_symmetry():
+    def family2(p, q):
+        mirror = None if q else -np.eye(1)
+        return from_map(
+            lambda x: ([(1.0 + p) * x[0] + q - x[0] ** 3], [[1.0 + p - 3.0 * x[0] ** 2]]), 1, spatial_symmetry=mirror
+        )
+
+    (point,) = locate(lambda p: family2(p, 0.0), (-0.5, 0.3), orbit=[0.0])
+    assert point.kind is Kind.PITCHFORK
+    with pytest.raises(ParameterError, match="unfolds"):
+        follow2(family2, point, ((-0.5, 0.3), (-0.5, 0.5)), second=0.0)
+
+
 def test_a_pole_of_a_coefficient_is_no_zero():
     """(x, y) -> (y, p - q x - y^2 - 0.3 x y): the coefficient of its period doublings has a pole at a fold-flip,
     where its sign changes."""

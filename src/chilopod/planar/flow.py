@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chilopod.compiled import copy_into, parallel_njit
 from chilopod.errors import ParameterError
+from chilopod.flows import deadline
 from chilopod.frozen import Array, ComplexArray
 from chilopod.integrate import integrator
 from chilopod.planar.dynamics import SCRATCH, rhs
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 
 _integrate = integrator(rhs)
+_TOGETHER = 32  # rows that are carried without a look at the time; one of a chain of 40 modules takes a second
 
 
 @lru_cache(maxsize=256)
@@ -53,10 +55,14 @@ def advance(
     Pieces have start times in their contact intervals and durations, s, shape (pieces,). The robot is given by scalars,
     stiffness and damping as the right-hand side takes them (see :mod:`chilopod.planar.dynamics`), and by the contact
     moments at the start of the contact interval of every piece, shape (pieces, N, 8). The tolerance is relative to
-    max(1, |x|). Returns False if a motion diverges.
+    max(1, |x|). Returns False if a motion diverges; a SpentError says that the time of an analysis ended.
     """
     ok = np.ones(len(states), dtype=np.bool_)
-    _advance(starts, widths, *robot, states, tolerance, ok)
+    number = numba.get_num_threads() if len(states) > _TOGETHER else _TOGETHER
+    for first in range(0, len(states), number):
+        deadline.check()
+        some = slice(first, first + number)
+        _advance(starts, widths, *robot, states[some], tolerance, ok[some])
     return bool(ok.all())
 
 

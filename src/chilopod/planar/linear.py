@@ -24,6 +24,7 @@ import numpy as np
 
 from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.errors import ParameterError
+from chilopod.flows import deadline
 from chilopod.frozen import Array
 from chilopod.planar.contact import C_PP
 from chilopod.planar.series import PANEL, ROWS, series_term
@@ -191,7 +192,9 @@ def _copy_rows(source: Any, target: Any, at: int, count: int) -> None:
 
 
 @njit
-def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: float, state: Any) -> tuple[float, int]:
+def _propagate(
+    widths: Any, upper: Any, decay: Any, frequency: float, clock: float, state: Any, stop: Any
+) -> tuple[float, int]:
     """Carry one panel of columns through all intervals, in place; returns (error, orders).
 
     ``state`` has 2N+1 rows and then zeros, up to a multiple of ROWS. The error bounds that of the largest entry of the
@@ -218,6 +221,8 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
         # A multiple of 1/4, so that exp(-shift) undoes exactly what is added to the diagonal.
         shift = np.rint(2.0 * decay[s] * h) * 0.25
         for part in range(parts):
+            if stop[0] != 0.0:  # no more time: the caller says so
+                return np.nan, orders
             t = part * h
             for i in range(velocities):
                 for j in range(n):
@@ -276,9 +281,10 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
 
 @njit
 def propagate_all(
-    widths: Any, upper: Any, decay: Any, frequency: float, clock: float, matrix: Any
+    widths: Any, upper: Any, decay: Any, frequency: float, clock: float, matrix: Any, stop: Any
 ) -> tuple[float, int]:
-    """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel."""
+    """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel, unless ``stop``,
+    shape (1,), becomes other than zero."""
     n = matrix.shape[0]
     error = 0.0
     orders = 0
@@ -288,7 +294,7 @@ def propagate_all(
         state[:] = 0.0
         for i in range(n):
             copy_into(state[i, : last - first], matrix[i, first:last])
-        e, k = _propagate(widths, upper, decay, frequency, clock, state)
+        e, k = _propagate(widths, upper, decay, frequency, clock, state, stop)
         error = max(error, e)
         orders += k
         for i in range(n):
@@ -298,12 +304,12 @@ def propagate_all(
 
 @parallel_njit
 def propagate_batch(
-    widths: Any, upper: Any, decay: Any, frequency: Any, clock: float, matrices: Any, errors: Any
+    widths: Any, upper: Any, decay: Any, frequency: Any, clock: float, matrices: Any, errors: Any, stop: Any
 ) -> None:
     """:func:`propagate` for many robots with the same gait, on all cores: all but ``widths`` and ``clock`` have robots
     in front."""
     for r in numba.prange(matrices.shape[0]):
-        errors[r] = propagate_all(widths, upper[r], decay[r], frequency[r], clock, matrices[r])[0]
+        errors[r] = propagate_all(widths, upper[r], decay[r], frequency[r], clock, matrices[r], stop)[0]
 
 
 def propagate(
@@ -316,10 +322,12 @@ def propagate(
     decay, 1/s, shape (intervals,), which need not be exact, nor need the highest frequency at which the springs ring,
     1/s.
 
-    Returns the bound on the error of the largest entry, and the number of Taylor orders computed.
+    Returns the bound on the error of the largest entry, and the number of Taylor orders computed; a SpentError says
+    that the time of an analysis ended.
     """
     n, intervals = len(matrix), widths.size
     if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):
         raise ParameterError("must have the shapes of propagate()", field="upper", value=upper.shape)
-    error, orders = propagate_all(widths, upper, decay, frequency, clock, matrix)
+    error, orders = propagate_all(widths, upper, decay, frequency, clock, matrix, deadline.stop())
+    deadline.check()
     return float(error), int(orders)

@@ -62,9 +62,10 @@ def shape(robot: Robot) -> tuple[int, bool, int]:
 def _propagate(
     chosen: Any, widths: Any, upper: Any, decay: Any, frequency: Any, clocks: Any, start: Any, maps: Any, errors: Any
 ) -> None:
+    stop = np.zeros(1)  # never
     for r in chosen:
         maps[r] = start
-        errors[r] = linear.propagate_all(widths[r], upper[r], decay[r], frequency[r], clocks[r], maps[r])[0]
+        errors[r] = linear.propagate_all(widths[r], upper[r], decay[r], frequency[r], clocks[r], maps[r], stop)[0]
 
 
 def _equations(robots: Sequence[Robot], half: bool) -> tuple[Array, Array, Array, Array]:

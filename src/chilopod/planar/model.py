@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine.actuators import FROM, GOAL
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows import deadline
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, read_only
 from chilopod.integrate import COMPLEX_STEP
 from chilopod.planar import linear, stretch
@@ -227,7 +228,8 @@ class PlanarModel(ReadOnlyArrays):
             for i, matrix in enumerate(matrices):
                 errors[i], _ = linear.propagate(widths, upper[i], decay[i], frequency[i], clock, matrix)
         else:
-            linear.propagate_batch(widths, upper, decay, frequency, clock, matrices, errors)
+            linear.propagate_batch(widths, upper, decay, frequency, clock, matrices, errors, deadline.stop())
+            deadline.check()
         return to_joint @ matrices, _ROWS_DIFFER * errors
 
     def can_flow_with(self, other: PlanarModel) -> bool:

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Protocol, TypeGuard, runtime_checkable
+from types import SimpleNamespace
+from typing import Any, Protocol, TypeGuard, TypeVar, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +53,8 @@ class SystemLike(Protocol):
 Family = Callable[[float], SystemLike]
 """The system at a value of a parameter."""
 
+Search = TypeVar("Search", bound=Callable[..., Any])
+
 
 @runtime_checkable
 class Autonomous(SystemLike, Protocol):
@@ -82,7 +86,7 @@ class Capabilities(Autonomous, Protocol):
     @property
     def spatial_symmetry(self) -> Array | None:
         """A matrix P, shape (n, n), with P f(t, x) = f(t, P x), or several that generate a finite group, shape
-        (generators, n, n). Such symmetries, as a reflection, identify pitchforks."""
+        (generators, n, n). Such symmetries, as a reflection, identify pitchforks, if all of a family have them."""
 
     def flow_with_error(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array, float | Array]:
         """As :meth:`SystemLike.flow`, and a bound on the absolute error of the derivative: of every entry, shape
@@ -162,7 +166,7 @@ def returns_per_period(system: SystemLike) -> int:
     """Number of returns in one period: the order of the symmetry, 1 without one."""
     if system.symmetry is None:
         return 1
-    return int(getattr(system, "symmetry_order", 2))
+    return int(getattr(system, "symmetry_order", None) or 2)
 
 
 def _is_long(system: SystemLike, duration: float) -> bool:
@@ -345,3 +349,58 @@ class CheckedFamily:
 
     def _refuse(self, value: float, kind: str, why: str) -> None:
         self._refused.setdefault(kind, (f"{why} at {value:.9g}", set()))[1].add(value)
+
+
+class _Fewer(BaseException):
+    """Signal that a system lacks a symmetry of those before it; no error, which might count as a missing orbit."""
+
+
+class _Sharing:
+    """The systems of a family with the symmetries that all of them have so far: some may have more of their own."""
+
+    _shared: tuple[int, tuple[Array, ...]] | None = None  # returns in a period, and generators in space
+
+    def __init__(self, family: Callable[..., Any]) -> None:
+        self._family = family
+
+    def __call__(self, *values: float) -> Any:
+        system = self._family(*values)
+        if not hasattr(system, "symmetry"):
+            return system  # which is refused
+        returns, own = returns_per_period(system), spatial_symmetries(system)
+        before, known = self._shared = self._shared or (returns, own)
+        kept = tuple(each for each in known if any(_same(each, other) for other in own))
+        if returns != before > 1 or len(kept) < len(known):
+            self._shared = before if returns == before else 1, kept
+            raise _Fewer(self)
+        if returns == before and len(own) == len(kept):
+            return system
+        members = {name: getattr(system, name, None) for name in dir(Capabilities) if name[0] != "_"}
+        members["symmetry"] = system.symmetry if before > 1 else None
+        members |= {"spatial_symmetry": np.array(kept) if kept else None, "flow_many": None}  # for systems of one class
+        return SimpleNamespace(**members)
+
+
+def _same(first: Array, second: Array) -> bool:
+    return first.shape == second.shape and np.allclose(first, second, 1e-9, 1e-12)
+
+
+def with_shared_symmetries(search: Search) -> Search:
+    """A search along a family, its first argument, with the symmetries that all its systems have: it starts anew where
+    one has fewer. A symmetry of a single system, as of legs that move together, does not hold beside it."""
+
+    @functools.wraps(search)
+    def sharing(*args: Any, **kwargs: Any) -> Any:
+        given = inspect.signature(search).bind(*args, **kwargs)
+        name, family = next(iter(given.arguments.items()))
+        limit = deadline.Deadline(given.arguments.get("seconds", np.inf))
+        given.arguments[name] = shared = _Sharing(family) if callable(family) else family
+        while True:
+            try:
+                return search(*given.args, **given.kwargs)
+            except _Fewer as signal:
+                if signal.args[0] is not shared:  # but of an outer search
+                    raise
+            given.arguments["seconds"] = limit.remaining
+
+    return cast(Search, sharing)

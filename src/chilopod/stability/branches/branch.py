@@ -30,7 +30,7 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, inspect
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, outward, trace
-from chilopod.stability.interface import Family, SystemLike, returns_per_period
+from chilopod.stability.interface import Family, SystemLike, returns_per_period, with_shared_symmetries
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import EVENT_AT_ZERO, MOVED, event_beside, return_duration, starts
@@ -172,6 +172,7 @@ class Branch(Result):
         return dataset("point", {**values, **about, "verdict": verdicts}, periods=self.periods, **end)
 
 
+@with_shared_symmetries
 def follow(
     family: Family,
     start: Start | Branch | BranchPoint | Orbit | ArrayLike,

@@ -26,7 +26,7 @@ from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
-from chilopod.stability.interface import offers, sizes, system_of
+from chilopod.stability.interface import offers, sizes, system_of, with_shared_symmetries
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import event_beside, return_duration, whole_period
 from chilopod.stability.symmetry.groups import reverses
@@ -40,6 +40,7 @@ _MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
 Progress2 = Callable[[int, Point2], None]
 
 
+@with_shared_symmetries
 def follow2(
     family2: Family2,
     start: BifurcationPoint | Start2,

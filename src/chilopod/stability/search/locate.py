@@ -20,7 +20,7 @@ from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
 from chilopod.stability.crossing_place import Course, Sample, crossings_in, orbit_blocks, past_singular, place_error
 from chilopod.stability.equilibria import has_centre
-from chilopod.stability.interface import Family, checked_flow, returns_per_period
+from chilopod.stability.interface import Family, checked_flow, returns_per_period, with_shared_symmetries
 from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
 from chilopod.stability.returns import MOVED
@@ -243,6 +243,7 @@ class Located(Result, Sequence[BifurcationPoint]):
         return dataset("point", table, **about, **searched)
 
 
+@with_shared_symmetries
 def locate(
     family: Family,
     between: tuple[float, float],
