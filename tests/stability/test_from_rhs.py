@@ -378,6 +378,25 @@ REFUSED = {
 }
 
 
+def test_a_random_right_hand_side_is_named():
+    """As what it is, not as one of another period."""
+    random = np.random.default_rng(0)
+    with pytest.raises(ParameterError, match=r"^rhs: gives other values at the same time and state$"):
+        from_rhs(lambda t, x: [x[1], random.normal() - float(x[0])], 2, 1.0)
+
+
+def test_advice_names_what_is_not_set_yet(monkeypatch):
+    """Too many steps of the implicit method, and a tolerance of zero."""
+    monkeypatch.setattr("chilopod.flows.implicit.flow._MOST_WORK", 0.0)
+    monkeypatch.setattr("chilopod.flows.implicit.flow._FEWEST_STEPS", 3)
+    system = from_rhs(lambda t, x: [x[1], 50.0 * (1 - x[0] ** 2) * x[1] - x[0]], 2, 80.0, method="implicit")
+    with pytest.raises(AnalysisError, match=r"too many steps, though they are implicit") as refused:
+        system.flow(np.array([2.0, 0.1]), 0.0, 80.0)
+    assert "method" not in str(refused.value)
+    with pytest.raises(ParameterError, match=r"allowed: above 0 to 0\.001$"):
+        from_rhs(oscillator, 2, 1.0, tolerance=0.0)
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_bad_arguments_are_one_line(case):
     rhs, dimension, period, options, field = REFUSED[case]

@@ -24,7 +24,7 @@ _REASONS = {
     NOT_FINITE: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
     BUDGET: (
         "takes too many steps: the integration stopped at t = {t:g}",
-        "method='implicit' if it is stiff, or a shorter interval",
+        "method='implicit' if it is stiff and without events, or a shorter interval",
     ),
     STALLED: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
     SLIDES: (

@@ -143,7 +143,7 @@ class RightHandSide:
             raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
         self.dimension = checked_count("dimension", self.dimension, LARGEST)
         if not 0.0 < finite_array(self.tolerance, (), "tolerance") <= _COARSEST:
-            allowed = f"0 to {_COARSEST:g}"
+            allowed = f"above 0 to {_COARSEST:g}"
             raise ParameterError("is out of range", field="tolerance", value=self.tolerance, allowed=allowed)
         self.tolerance = float(self.tolerance)
         self.events = checked_events(self.events)
