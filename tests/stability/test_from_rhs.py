@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.special import bernoulli, factorial
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import called
-from chilopod.stability import NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, locate, multipliers
+from chilopod.stability import Event, NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, locate, multipliers
 
 
 def oscillator(t, x):
@@ -377,6 +378,25 @@ REFUSED = {
 }
 
 
+def test_a_random_right_hand_side_is_named():
+    """As what it is, not as one of another period."""
+    random = np.random.default_rng(0)
+    with pytest.raises(ParameterError, match=r"^rhs: gives other values at the same time and state$"):
+        from_rhs(lambda t, x: [x[1], random.normal() - float(x[0])], 2, 1.0)
+
+
+def test_advice_names_what_is_not_set_yet(monkeypatch):
+    """Too many steps of the implicit method, and a tolerance of zero."""
+    monkeypatch.setattr("chilopod.flows.implicit.flow._MOST_WORK", 0.0)
+    monkeypatch.setattr("chilopod.flows.implicit.flow._FEWEST_STEPS", 3)
+    system = from_rhs(lambda t, x: [x[1], 50.0 * (1 - x[0] ** 2) * x[1] - x[0]], 2, 80.0, method="implicit")
+    with pytest.raises(AnalysisError, match=r"too many steps, though they are implicit") as refused:
+        system.flow(np.array([2.0, 0.1]), 0.0, 80.0)
+    assert "method" not in str(refused.value)
+    with pytest.raises(ParameterError, match=r"allowed: above 0 to 0\.001$"):
+        from_rhs(oscillator, 2, 1.0, tolerance=0.0)
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_bad_arguments_are_one_line(case):
     rhs, dimension, period, options, field = REFUSED[case]
@@ -466,3 +486,28 @@ def test_a_fast_harmonic_has_the_period(harmonic):
     system = from_rhs(lambda t, x: [np.sin(harmonic * t) - x[0]], 1, 2 * pi)
     (multiplier,) = multipliers(system, [0.0]).values
     assert multiplier.real == pytest.approx(exp(-2 * pi), abs=1e-11)
+
+
+# Quotients 0 / 0
+
+
+@pytest.mark.parametrize("place", [0.01, 0.2])
+def test_a_motion_passes_a_quotient_of_zeros(place):
+    """x / (exp(x) - 1) is smooth at zero, where rounding spoils its Taylor series; against the polynomial there."""
+
+    def system(quotient):
+        return from_rhs(lambda t, x: [-0.3 * x[0] + 0.1 * quotient(x[0] - place) + np.cos(t)], 1, 2 * pi)
+
+    numbers = bernoulli(40) / factorial(np.arange(41))
+    found = multipliers(system(lambda u: u / np.expm1(u)), [0.1])
+    exact = multipliers(system(lambda u: np.polynomial.polynomial.polyval(u, numbers)), [0.1])
+    assert abs(found.values[0] - exact.values[0]) <= found.error_bound + exact.error_bound <= 1e-12
+
+
+def test_a_quotient_of_zeros_is_named_where_nothing_passes_it():
+    """Beside an event, which the implicit method does not know; not so a pole."""
+    event = Event(lambda t, x: x[0] - 5.0)
+    for term, said in ((lambda u: np.sin(u) / u, "divides 0 by 0"), (lambda u: 1.0 / u, "a singularity|not finite")):
+        system = from_rhs(lambda t, x, f=term: [f(x[0] - 0.1) + 1.0], 1, 2 * pi, events=[event])
+        with pytest.raises(AnalysisError, match=said):
+            system.flow(np.array([0.1]), 0.0, 1.0)

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
     Kind,
     PeriodicSystem,
@@ -104,6 +104,11 @@ def test_what_is_none_is_refused_in_one_line(build, said):
     with pytest.raises(ParameterError, match=said) as refused:
         build()
     assert "\n" not in str(refused.value)
+
+
+def test_progress_of_another_signature_is_one_line():
+    with pytest.raises(AnalysisError, match=r"^progress: raised TypeError: .* takes 1 positional argument"):
+        follow(logistic, [0.6], (2.5, 3.2), points=1, progress=lambda count: None)
 
 
 @pytest.mark.parametrize(

@@ -186,7 +186,7 @@ class CalledFlow:
             if calls > _MOST_CALLS or (calls > _PATIENCE and ahead):
                 self._check_precision(t, y[:n])
                 said = f"takes too many steps: the integration stopped at t = {t:g}"
-                allowed = "a less stiff right-hand side, or one without branches, which can be traced"
+                allowed = "switch_times at kinks, a less stiff right-hand side, or one that can be traced"
                 raise TooManySteps(said, field="rhs", allowed=allowed)
             if ended[0] != 0.0:
                 raise deadline.over()

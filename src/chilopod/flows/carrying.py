@@ -24,7 +24,7 @@ _REASONS = {
     NOT_FINITE: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
     BUDGET: (
         "takes too many steps: the integration stopped at t = {t:g}",
-        "method='implicit' if it is stiff, or a shorter interval",
+        "method='implicit' if it is stiff and without events, or a shorter interval",
     ),
     STALLED: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
     SLIDES: (
@@ -38,7 +38,11 @@ _REASONS = {
 
 
 class TooManySteps(AnalysisError):
-    """The budget of steps is spent, as for a stiff right-hand side."""
+    """Steps are too many, as for a stiff right-hand side, or too short, where Taylor series divide 0 by 0."""
+
+
+ZERO_BY_ZERO = "the right-hand side divides 0 by 0, which rounding spoils,"
+"""Cause of the end of a Taylor series where the right-hand side is smooth, as x / (1 - exp(-x)) is at zero."""
 
 
 def failure(status: int, t: float, cause: str = "") -> ChilopodError:
@@ -46,7 +50,8 @@ def failure(status: int, t: float, cause: str = "") -> ChilopodError:
     if status not in _REASONS:
         return deadline.over()
     reason, advice = (f"{cause} at t = {{t:g}}", None) if cause else _REASONS[status]
-    return (TooManySteps if status == BUDGET else AnalysisError)(reason.format(t=t), field="rhs", allowed=advice)
+    kind = TooManySteps if status == BUDGET or cause == ZERO_BY_ZERO else AnalysisError
+    return kind(reason.format(t=t), field="rhs", allowed=advice)
 
 
 def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[float, float]]:

@@ -11,10 +11,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import LARGEST, SIZES, Slopes, check_shape, checked_count, finite_array, numbers, sampled
 from chilopod.flows.called import CalledFlow, warn_of_jumps
-from chilopod.flows.carrying import TooManySteps, fast_parts
+from chilopod.flows.carrying import ZERO_BY_ZERO, TooManySteps, fast_parts
 from chilopod.flows.implicit.flow import ImplicitFlow, can_be_implicit
 from chilopod.flows.taylor.flow import TaylorFlow
 from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_series, trace
@@ -143,7 +143,7 @@ class RightHandSide:
             raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
         self.dimension = checked_count("dimension", self.dimension, LARGEST)
         if not 0.0 < finite_array(self.tolerance, (), "tolerance") <= _COARSEST:
-            allowed = f"0 to {_COARSEST:g}"
+            allowed = f"above 0 to {_COARSEST:g}"
             raise ParameterError("is out of range", field="tolerance", value=self.tolerance, allowed=allowed)
         self.tolerance = float(self.tolerance)
         self.events = checked_events(self.events)
@@ -232,16 +232,23 @@ class RightHandSide:
 
 
 def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
-    """Flows by Taylor series, or by the implicit method where these take too many steps. Every call decides anew."""
+    """Flows by Taylor series, or by the implicit method where these take too many steps, or end at a 0 / 0 of a smooth
+    function, which an implicit step passes. Every call decides anew."""
     latest: tuple[bytes, float, float] | None = None  # latest flow by Taylor series, to avoid a second computation
+
+    def instead(first: TooManySteps, name: str, x: Array, t0: float, t1: float) -> Any:
+        try:
+            return getattr(implicit(), name)(x, t0, t1)
+        except AnalysisError as second:
+            raise (first if ZERO_BY_ZERO in first.problem else second) from None
 
     def either(name: str) -> Callable[..., Any]:
         def flow(x: Array, t0: float, t1: float) -> Any:
             nonlocal latest
             try:
                 found = taylor[name](x, t0, t1)
-            except TooManySteps:
-                return getattr(implicit(), name)(x, t0, t1)
+            except TooManySteps as first:
+                return instead(first, name, x, t0, t1)
             latest = x.tobytes(), t0, t1
             return found
 
@@ -258,8 +265,8 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
     def flow_tangents(x: Array, along: Array, t0: float, t1: float) -> tuple[Array, Array]:
         try:
             state, images = taylor["flow_tangents"](x, along, t0, t1)
-        except TooManySteps:
-            state, derivative = implicit().flow(x, t0, t1)
+        except TooManySteps as first:
+            state, derivative = instead(first, "flow", x, t0, t1)
             images = derivative @ along
         return state, images
 

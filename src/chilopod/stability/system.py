@@ -182,7 +182,8 @@ def from_rhs(
     A stiff system, whose fastest decay is much faster than its motion, is integrated by an implicit method, Radau IIA
     collocation with the exact derivative of its steps. A function that branches on its arguments (``if x[0] > 0``) or
     calls other libraries cannot be traced: scipy's DOP853 integrates it from calls, hundreds of times slower, with a
-    derivative from a complex step or, if ``rhs`` does not accept complex states, from differences with nine digits.
+    derivative from a complex step or, if ``rhs`` does not accept complex states, from differences with nine digits. It
+    reads objects from outside, as a map does, at every call; a traced function has them as when the system was made.
 
     Parameters
     ----------
@@ -225,9 +226,14 @@ def from_rhs(
     if period is None:
         members["velocity"] = lambda x: slopes(np.zeros(1), x[:, None])[:, 0]
     found, first = slopes(stated.times, stated.states), 0
-    for claim in stated.claims:
-        claim.check(found[:, first : first + claim.times.size])
-        first += claim.times.size
+    try:
+        for claim in stated.claims:
+            claim.check(found[:, first : first + claim.times.size])
+            first += claim.times.size
+    except ParameterError:
+        if not np.array_equal(found, slopes(stated.times, stated.states), equal_nan=True):
+            raise ParameterError("gives other values at the same time and state", field="rhs") from None
+        raise
     system = object.__new__(PeriodicSystem)  # all but its functions is checked
     system.__dict__.update(stated.system.__dict__, **members)
     return system

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.carrying import REPEATED, RESOLUTION, failure, longest_step, numerical_balance, pieces
+from chilopod.flows.carrying import BUDGET, REPEATED, RESOLUTION, failure, longest_step, numerical_balance, pieces
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.tape import Tape
 from chilopod.flows.tracing.trace import branches_of, evaluate, evaluate_jacobian
@@ -26,6 +26,7 @@ _VOLUME_STEPS = 64  # fewest steps for the growth of volume
 _FINER = 0.2
 _SHAKE = 2.0**-52
 _ROUNDING = 2.0**-49
+_MANY = "takes too many steps, though they are implicit: the integration stopped"
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ class ImplicitFlow(ReadOnlyArrays):
             control = kernels.Control(a, b, limit, branches, tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, control, result)
             if status:
-                raise failure(status, report[1])
+                raise failure(status, report[1], _MANY if status == BUDGET else "")
             budget -= int(report[0])
         return x * units, derivative * (units[:, None] / units if derived else 1.0), float(report[2])
 

@@ -20,8 +20,8 @@ import numpy as np
 
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.carrying import NOT_FINITE, REPEATED, RESOLUTION, failure, pieces
-from chilopod.flows.tracing.tape import COSH, EXP, LOG, POWER, SINH, SQRT, Tape
+from chilopod.flows.carrying import NOT_FINITE, REPEATED, RESOLUTION, STALLED, ZERO_BY_ZERO, failure, pieces
+from chilopod.flows.tracing.tape import COSH, EXP, LOG, POWER, QUOTIENT, SINH, SQRT, Tape
 from chilopod.flows.tracing.trace import evaluate
 from chilopod.frozen import Array
 
@@ -38,6 +38,7 @@ _NOTHING = np.empty((0, 0))
 _OVERFLOWING = {EXP: "exp", SINH: "sinh", COSH: "cosh"}
 _LARGE = 300.0  # argument beyond which the series of these may overflow
 _ROOTS = {SQRT: "a root", POWER: "a power", LOG: "a logarithm"}
+_BESIDE, _PASSES, _ALIKE = 1e-9, 1e-3, 0.1  # shift past a 0 / 0, divisor there, and rates beside it, relative to them
 _ZERO = 1e-9  # argument, relative to states and rates, at which the series of these may overflow
 
 
@@ -146,17 +147,20 @@ class TaylorFlow:
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
             status = carry(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:
-                cause = self._cause(report[1], x.reshape(-1, n), params) if status == NOT_FINITE else ""
+                stuck = status in (NOT_FINITE, STALLED)
+                cause = self._cause(report[1], x.reshape(-1, n), params, span) if stuck else ""
                 raise failure(status, report[1], cause)
             steps += int(report[0])
         return steps
 
-    def _cause(self, t: float, states: Array, params: Array) -> str:
+    def _cause(self, t: float, states: Array, params: Array, span: tuple[float, float]) -> str:
         """The function without a finite series in one of some states; empty if none stands out."""
         nodes = np.arange(self.tape.layout[4])
         for x in states[np.isfinite(states).all(axis=1)]:
             values = evaluate(self.tape, nodes, t, x, params)
             rates = np.nan_to_num(values[self.tape.slopes], posinf=0.0, neginf=0.0)
+            if self._divides_zero(t, x, params, _BESIDE * np.maximum(np.abs(x), np.abs(rates) * (span[1] - span[0]))):
+                return ZERO_BY_ZERO
             zero = _ZERO * float(np.abs([x, rates]).max())
             for code, operand in self.tape.program[:2, : nodes.size].T.tolist():
                 if code in _OVERFLOWING and values[operand] > _LARGE:
@@ -165,6 +169,18 @@ class TaylorFlow:
                     what = "smooth" if values[operand] >= -zero else "finite"
                     return f"the right-hand side is not {what}: {_ROOTS[code]} of {values[operand]:.6g}"
         return ""
+
+    def _divides_zero(self, t: float, x: Array, params: Array, beside: Array) -> bool:
+        """True if a divisor passes zero at a state where the right-hand side is about constant on either side."""
+        program, slopes = self.tape.program, self.tape.slopes
+        divisors = program[2, : self.tape.layout[4]][program[0, : self.tape.layout[4]] == QUOTIENT]
+        beside = beside * np.cos(3.0 * np.arange(x.size) + 1.0)
+        around = x[:, None] + beside[:, None] * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+        below, zero, above = evaluate(self.tape, divisors, t, around, params)[:, 1:4].T
+        rates = evaluate(self.tape, slopes, t, around, params)[:, [0, 1, 3, 4]]
+        with np.errstate(invalid="ignore"):  # infinite divisors
+            passes = (np.abs(zero) <= _PASSES * np.abs(above - below)).any()
+            return bool(passes and (np.ptp(rates, axis=1) <= _ALIKE * np.abs(rates).max(axis=1)).all())
 
     def _clock_table(self, params: bytes) -> tuple[Array, float]:
         """Functions of time on a grid over the period, each with its largest modulus last, and the period."""

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import ChilopodError, ParameterError
-from chilopod.flows.arguments import check_arguments, checked_interval
+from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
 from chilopod.notebook import picture
@@ -213,7 +213,8 @@ def follow(
     symmetric
         True to follow orbits with the systems' symmetry in time, which orbits of interest have usually lost.
     budget, seconds
-        Number of flows, beside those of normal forms, and time in s, after which the branch ends.
+        Number of flows, beside those of normal forms, and time in s, after which the branch ends; a SpentError if the
+        time ends before the first orbit is found.
     progress
         Called with the number of points and the newest one.
     """
@@ -299,7 +300,8 @@ def followed(
         found.extend([*within.points, end])
         remarks.extend(within.remarks)
         done += 1
-        progress(done, end)
+        with UserCode("progress"):
+            progress(done, end)
 
     moved: Anchor | None = anchor
     while moved is not None:

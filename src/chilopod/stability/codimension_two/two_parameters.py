@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import check_arguments, checked_box, finite_array
+from chilopod.flows.arguments import UserCode, check_arguments, checked_box, finite_array
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
@@ -198,7 +198,8 @@ class _Half:
         if station is not None:
             self.points.append(station.point)
             self.last = station
-            self.progress(count, station.point)
+            with UserCode("progress"):
+                self.progress(count, station.point)
 
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
