@@ -15,6 +15,7 @@ from chilopod.stability import (
     from_map,
     from_rhs,
 )
+from chilopod.stability.returns import jumps_at_ends
 
 
 def of_map(function, dimension, size=1.0):
@@ -232,6 +233,25 @@ def test_the_end_of_a_map_is_no_event():
         branch = follow(family, begin(family, 0.1, [0.5]), (0.1, 0.5))
     assert branch.ending is Ending.LOST
     assert "event" not in branch.reason
+
+
+def test_a_map_over_two_periods_ends_without_an_event():
+    """It is applied in the middle of them."""
+
+    def family(p):
+        r = 3.3 + np.sqrt(0.3 - p)  # no such map beyond
+        return from_map(lambda x: ([r * x[0] * (1.0 - x[0])], [[r - 2.0 * r * x[0]]]), 1)
+
+    with np.errstate(invalid="raise"):
+        branch = follow(family, begin(family, 0.2, [0.45], periods=2), (0.2, 0.5))
+    assert branch.ending is Ending.LOST
+    assert "event" not in branch.reason
+
+
+def test_a_fast_motion_is_no_jump():
+    """It settles within the shortest part of a return that is looked at, as at a jump."""
+    system = from_rhs(lambda t, x: [x[1], -x[0], 1e4 * (x[0] - x[2])], 3, None, guess_period=6.3)
+    assert not jumps_at_ends(system, np.array([1.0, 0.0, 1.0]), 2.0 * np.pi)
 
 
 @pytest.mark.parametrize("width", [1e-5, 1e-3])

@@ -39,7 +39,8 @@ _FARTHEST = 0.8  # delay, in returns, that makes it another crossing
 _CROSSING_ROUNDS = 30
 _BENT = 0.5  # largest part of a correction of the time that the change of the speed adds
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
-_ENDS, _NEAR_ENDS = (1e-3, 1e-4), (1e-2, 1e-3)  # parts of a return, at its ends
+_END, _NEAR_END = 1e-4, 1e-3  # parts of a return, at its ends
+_LEAST_JUMP, _CLOSER = 1e-3, 30  # least jump of the derivative there, relative to it, and halvings to its place
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _PAST = 1.5e-5  # distance along a curve, in its units, at which an orbit is past a grazing
@@ -287,27 +288,41 @@ def _arrival(system: Autonomous, before: Array, section: Section, rest: float) -
     return None
 
 
-def jumps_at_ends(system: SystemLike, x: Array, duration: float, ends: tuple[float, float] = _ENDS) -> bool:
-    """True if the motion jumps at an end of a return: the derivative there does not tend to 1 over shorter times."""
+def jumps_at_ends(system: SystemLike, x: Array, duration: float, part: float = _END) -> bool:
+    """True if the motion jumps within a ``part`` of a return at one of its ends: the derivative over the time round the
+    jump does not tend to 1, however short. That of a motion that is merely fast does."""
     size, one = sizes(system, x, duration), np.eye(x.size)
 
-    def change(start: float, part: float) -> float:
-        there = carried(system, x[None], 0.0, start * duration)[0] if start else x
-        derivative = checked_flow(system, there, start * duration, (start + part) * duration)[1]
+    def at(state: Array, low: float, high: float) -> Array:
+        return carried(system, state[None], low * duration, high * duration)[0] if low < high else state
+
+    def change(state: Array, low: float, high: float) -> float:
+        derivative = checked_flow(system, state, low * duration, high * duration)[1]
         return float((np.abs(derivative - one) * size / size[:, None]).max())
 
-    if change(0.5, ends[0]) == 0.0:
-        return False  # a map has no parts
-    pairs = [(change(0.0, part), change(1.0 - part, part)) for part in ends]
-    return any(near > max(ends[0], 0.5 * far) for far, near in zip(*pairs, strict=True))
+    if any(change(at(x, 0.0, each), each, each + part) == 0.0 for each in _PARTS):
+        return False  # a map has no parts, but over several periods is applied within them too
+    for low, high in (0.0, part), (1.0 - part, 1.0):
+        there, left = at(x, 0.0, low), np.inf
+        for _ in range(_CLOSER):
+            middle = 0.5 * (low + high)
+            between = at(there, low, middle)
+            before, left = change(there, low, middle), change(between, middle, high)
+            if before > left:
+                high, left = middle, before
+            else:
+                low, there = middle, between
+        if left > _LEAST_JUMP:
+            return True
+    return False
 
 
 def starts(system: SystemLike, x: Array, duration: float) -> Iterator[Array]:
     """Later states of a motion that may be at time 0 instead, if an event passes it and it may be moved."""
-    if is_autonomous(system) and jumps_at_ends(system, x, duration, _NEAR_ENDS):
+    if is_autonomous(system) and jumps_at_ends(system, x, duration, _NEAR_END):
         for part in _PARTS:
             there = carried(system, x[None], 0.0, part * duration)[0]
-            if not jumps_at_ends(system, there, duration, _NEAR_ENDS):
+            if not jumps_at_ends(system, there, duration, _NEAR_END):
                 yield there
 
 
