@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CycleMode(ReadOnlyArrays):
-    """A mode of a walk: its multiplier over one gait cycle, half the interval of 95 %, and its yaw joints, front to
-    rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
+    """A mode of a walk: its multiplier over one gait cycle, its error (for bends of a given size an estimate), and its
+    yaw joints, front to rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
 
     multiplier: complex
     error: float
@@ -57,8 +57,7 @@ _GROWTH = {True: "decay", False: "grow", None: "neither decay nor grow for certa
 
 def _verdict(modes: Sequence[CycleMode]) -> bool | None:
     """True if all modes decay, False if one grows, None where errors leave it undecided or there are none."""
-    values, errors = np.array([(mode.multiplier, mode.error) for mode in modes]).reshape(-1, 2).T
-    return stable_within(values, errors.real) if modes else None
+    return stable_within(np.array([m.multiplier for m in modes]), np.array([m.error for m in modes])) if modes else None
 
 
 @dataclass(frozen=True, eq=False)

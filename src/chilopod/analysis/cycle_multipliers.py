@@ -3,7 +3,7 @@
 A foot that just touches makes the cycle map jump. A derivative exists only if the walk closes, and it holds for bends
 that change no contact. Bends of a given size are therefore followed besides: opposite ones along the leading modes,
 brought back to their size after every cycle. The mean over the cycles of the matrix that maps them has the multipliers
-of that size, with an interval from its scatter. The same matrix of tiny bends refines those of the derivative.
+of that size, with errors by its scatter and by what differs to both sides. That of tiny bends refines the derivative's.
 """
 
 from __future__ import annotations
@@ -45,8 +45,7 @@ _SETTLING, _CLOSING, _MEMORY = 30, 30, 10  # cycles: to settle, and of Anderson'
 _CLOSED = 1e-11  # m, rad, per second
 _STEPS = (1e-7, 1e-8)  # of the differences; the first that changes no contact
 _ROUNDING = float(np.finfo(float).eps)
-_SHORTER = 0.25  # second step over the first
-_KINK = 1e-3  # change of slope, relative to slopes, below which none is looked for
+_SHORTER, _KINK, _ACROSS = 0.25, 1e-3, 4  # second step over the first; least change of slopes; directions across
 _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
 _FORGOTTEN, _BLOCK, _MOST_CYCLES = 2, 4, 10_000  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
@@ -115,8 +114,9 @@ def cycle_multipliers(
         allowed = "a world that looks the same from everywhere along `travel`, and from wherever a free body stands"
         raise AnalysisError(f"must not depend on {place}, which is divided out", field="motion", allowed=allowed)
     for step in _STEPS:
-        basis, dual = _leading(_derivative(cycle, x, step), at)
-        beside = _switched(cycle, x, np.concatenate([np.eye(x.size), basis.T]), step)
+        derivative, ahead = _derivative(cycle, x, step)
+        basis, dual = _leading(derivative, at)
+        beside = np.concatenate([ahead, _switched(cycle, x, basis, step)])
         if not len(beside):
             break
     exact = _exact(cycle, x, basis, dual, at, step) if closes and not len(beside) else ()
@@ -154,7 +154,7 @@ def finite_modes(
     for _ in range(_SETTLING if basis is None else _FORGOTTEN * _BLOCK):
         x = cycle(x[None])[0][0]
     forgotten = _FORGOTTEN if basis is None else _BLOCK
-    modes, dual = basis or _leading(_derivative(cycle, x, _STEPS[0]), at)
+    modes, dual = basis or _leading(_derivative(cycle, x, _STEPS[0])[0], at)
     matrices = _followed(cycle, x, amplitude * modes, dual / amplitude, forgotten + cycles)[0]
     return _modes(matrices[forgotten:], modes[at], _BLOCK), x, (modes, dual)
 
@@ -195,15 +195,18 @@ def _closed(cycle: CycleMap, x: Array) -> tuple[Array, bool]:
     return settled, False
 
 
-def _derivative(cycle: CycleMap, x: Array, step: float) -> Array:
-    """Derivative at a state (n,) by differences to one side."""
-    images = cycle(np.concatenate([x[None], x + step * np.eye(x.size)]))[0]
-    return (images[1:] - images[0]).T / step
+def _derivative(cycle: CycleMap, x: Array, step: float) -> tuple[Array, Array]:
+    """Derivative at a state (n,) by differences to one side, and those states of them whose contacts are others."""
+    beside = x + step * np.eye(x.size)
+    images, counts = cycle(np.concatenate([x[None], beside]))
+    return (images[1:] - images[0]).T / step, beside[(counts[1:] != counts[0]).any(axis=1)]
 
 
-def _switched(cycle: CycleMap, x: Array, along: Array, step: float) -> Array:
-    """States a step to both sides of a state (n,) along directions (k, n) whose contacts are others, or where slopes to
-    both sides differ by what hardly falls with the step."""
+def _switched(cycle: CycleMap, x: Array, basis: Array, step: float) -> Array:
+    """States a step to both sides of a state (n,), along a basis (n, r) and across any switch, whose contacts are other
+    ones, or where slopes to both sides differ by what hardly falls with the step."""
+    across = np.random.default_rng(0).choice([-1.0, 1.0], (_ACROSS, x.size))
+    along = np.concatenate([basis.T, across / math.sqrt(x.size)])
     beside = x + step * np.concatenate([along, -along])
     images, counts = cycle(np.concatenate([x[None], beside, x + _SHORTER * (beside - x)]))
     moves = images[1:] - images[0]
@@ -233,9 +236,9 @@ def _largest(modes: NDArray[Any], at: _Indices) -> NDArray[Any]:
     return modes[size.argmax(axis=0), np.arange(modes.shape[1])]
 
 
-def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int) -> tuple[Array, Array, Array, Array]:
-    """Matrices that map bends (n, r) in each of some cycles, (cycles, r, r), states before each, (cycles, n), the same
-    matrices by bends to one side and to the other, (cycles, 2, r, r), and the bends after all, (n, r)."""
+def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int) -> tuple[Array, Array, Array]:
+    """Matrices that map bends (n, r) in each of some cycles, (cycles, r, r), states before each, (cycles, n), and the
+    same matrices by bends to one side and to the other, (cycles, 2, r, r)."""
     first, matrices, seen, sides = bends, [], [], []
     for _ in range(cycles):
         seen.append(x)
@@ -247,7 +250,7 @@ def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int)
         bends = after @ np.linalg.pinv(matrices[-1])
         if np.abs(bends).max() > _LARGER * np.abs(first).max():  # a jump has turned them all to one side
             bends = first
-    return np.array(matrices), np.array(seen), np.array(sides), bends
+    return np.array(matrices), np.array(seen), np.array(sides)
 
 
 def _exact(cycle: CycleMap, x: Array, basis: Array, dual: Array, at: _Indices, step: float) -> _Modes:
@@ -262,20 +265,19 @@ def _exact(cycle: CycleMap, x: Array, basis: Array, dual: Array, at: _Indices, s
 def _finite(cycle: CycleMap, x: Array, bends: Array, dual: Array, at: _Indices, cycles: int) -> tuple[_Modes, Array]:
     """Modes of bends of a size, and states before each cycle. Contacts do not add up, and differ to both sides: a bend
     along a single mode, to one side, grows by another factor. The error contains the changes to both sides."""
-    *found, _, after = _followed(cycle, x, bends, dual, _FORGOTTEN + cycles)
-    matrices, seen = (each[_FORGOTTEN:] for each in found)
+    matrices, seen, _ = (each[_FORGOTTEN:] for each in _followed(cycle, x, bends, dual, _FORGOTTEN + cycles))
     values, right, _ = eigensystem(matrices.mean(axis=0))
     turn = np.where(values.imag < 0.0, right.imag, right.real)
-    turn *= np.abs(_largest(bends, at) / _largest(after @ turn, at))
+    turn *= np.abs(_largest(bends, at) / _largest(bends @ turn, at))
     back = np.linalg.pinv(turn)
-    sides = _followed(cycle, seen[0], after @ turn, back @ dual, cycles)[2].mean(axis=0)
+    sides = _followed(cycle, x, bends @ turn, back @ dual, _FORGOTTEN + cycles)[2][_FORGOTTEN:].mean(axis=0)
     return _modes(matrices, bends[at], _BLOCK, apart=turn @ sides @ back - matrices.mean(axis=0)), seen
 
 
 def _modes(matrices: Array, angles: Array, block: int, least: float = _ROUNDING, apart: Array | None = None) -> _Modes:
     """Modes of the mean of matrices (m, r, r), with half their intervals of 95 % by Student's t, from means over blocks
-    of some of them in turn, at ``least`` relative to the norm of a matrix, and with the changes by
-    matrices that lie ``apart`` from the mean, (k, r, r); rows of ``angles`` (joints, r) are yaw joints."""
+    of some of them in turn, at ``least`` relative to the norm of a matrix, and with the changes by matrices that lie
+    ``apart`` from the mean, (k, r, r); rows of ``angles`` (joints, r) are yaw joints."""
     values, right, left = eigensystem(matrices.mean(axis=0))
     # To first order, a matrix changes an eigenvalue by left^H (M - mean) right.
     each = np.einsum("ji,kjl,li->ik", left.conj(), matrices, right)
@@ -289,9 +291,8 @@ def _modes(matrices: Array, angles: Array, block: int, least: float = _ROUNDING,
     errors = np.nan_to_num(np.fmax(errors, rounding), nan=np.inf, posinf=np.inf)
     turns = angles @ right
     largest = turns[np.abs(turns).argmax(axis=0), np.arange(len(values))]
-    scaled = np.where(np.abs(largest) > _NOT_BENT, turns / np.where(largest == 0.0, 1.0, largest), 0.0)
-    kept = np.flatnonzero(values.imag >= 0.0)
-    return tuple(CycleMode(complex(values[i]), float(errors[i]), scaled[:, i]) for i in kept)
+    turns = np.where(np.abs(largest) > _NOT_BENT, turns / np.where(largest == 0.0, 1.0, largest), 0.0)
+    return tuple(CycleMode(complex(values[i]), float(errors[i]), turns[:, i]) for i in np.flatnonzero(values.imag >= 0))
 
 
 def _reach(cycle: CycleMap, x: Array, basis: Array, low: float) -> tuple[float, tuple[str, ...]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -52,7 +51,7 @@ class CycleMap:
         look the same from wherever a free body stands; :meth:`depends_on_place` tells.
     """
 
-    def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: Sequence[str] = ()) -> None:
+    def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: tuple[str, ...] = ()) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ParameterError("must be a mujoco.MjModel", field="model", value=type(model).__name__)
         self.model, self.control = copy.copy(model), np.array(as_array("control", control))
@@ -74,7 +73,7 @@ class CycleMap:
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.model.opt.tolerance, self.period = _TOLERANCE, len(self.control) * float(self.model.opt.timestep)
         self._joints = joints = [self.model.joint(i).name or f"joint {i}" for i in range(free, len(kinds))]
-        if not isinstance(travel, tuple | list) or len(set(joints).intersection(travel)) != len(travel):
+        if type(travel) not in (tuple, list) or len(set(joints).intersection(travel)) != len(travel):
             raise ParameterError("must name joints", field="travel", value=travel, allowed=", ".join(joints))
         self._kept = np.array([i for i, name in enumerate(joints) if name not in travel], dtype=np.intp)
         measures = ["m" if kind == _PLAIN[1] else "rad" for kind in kinds[free:]]
