@@ -8,7 +8,7 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.analysis import cycle_multipliers, walk_multipliers
-from chilopod.analysis.cycle_modes import CycleMode
+from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
 from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, start, walk_cycle
@@ -288,3 +288,91 @@ def test_actuators_with_a_delay_are_refused():
     text = SLIDE.format(0).replace('<motor joint="p"/>', '<motor joint="p" delay="0.3" nsample="200"/>')
     with pytest.raises(ParameterError, match="state that can be put back"):
         CycleMap(mujoco.MjModel.from_xml_string(text), PUSH)
+
+
+STOP = """<mujoco><option timestep="0.002"/><worldbody><body>
+  <joint name="a" type="slide" axis="1 0 0" stiffness="3" damping="0.5" {}/>
+  <geom size="0.1" mass="1" contype="0" conaffinity="0"/></body></worldbody>{}</mujoco>"""
+SLACK = '<tendon><fixed stiffness="20" springlength="0 0.1"><joint joint="a" coef="1"/></fixed></tendon>'
+
+
+def free_map(text):
+    """Map of 250 steps of a model without controls."""
+    return CycleMap(mujoco.MjModel.from_xml_string(text), np.zeros((250, 0)))
+
+
+@pytest.mark.parametrize(
+    ("parts", "switching"), [(('limited="true" range="0 1"', ""), "limit of a at 0.000"), (("", SLACK), "none found")]
+)
+def test_a_motion_on_a_switch_has_no_derivative(parts, switching):
+    cycle, x = free_map(STOP.format(*parts)), np.array([0.01, 0.0])
+    for _ in range(50):
+        x = cycle(x)[0][0]
+    assert np.abs(x).max() < 1e-4  # it decays
+    found = cycle_multipliers("stop", cycle, np.zeros(2), ["a"])
+    assert not found.exact
+    assert found.stable is None
+    assert found.as_json()["closes"] is True
+    assert found.title.endswith("; the periodic motion has no derivative")
+    said = " ".join("\n".join(found.lines()).split())
+    assert f"lies on a switch, where there is no derivative. Contacts and limits that switch: {switching}" in said
+
+
+def test_a_weak_slack_spring_is_part_of_the_error():
+    found = cycle_multipliers("weak", free_map(STOP.format("", SLACK.replace("20", "0.001"))), np.zeros(2), ["a"])
+    for stiffness in (3.0, 3.001):  # to either side
+        step = np.array([[1.0 - 4e-6 * stiffness / 1.001, 0.002 / 1.001], [-0.002 * stiffness / 1.001, 1.0 / 1.001]])
+        pair = np.linalg.eigvals(step)[0] ** 250
+        assert abs(found.exact[0].multiplier - complex(pair.real, abs(pair.imag))) < found.exact[0].error < 2e-4
+
+
+def grown(cycle, bend, cycles):
+    """Mean factor by which a bend grows, brought back to its size after every cycle."""
+    size, growths = np.abs(bend[0]), []
+    for _ in range(cycles):
+        after = cycle(bend)[0][0]
+        growths.append(np.abs(after[0]) / size)
+        bend = after * size / np.abs(after[0])
+    return np.exp(np.log(growths[cycles // 2 :]).mean())
+
+
+def test_errors_of_bends_contain_the_growth_of_one_bend_to_one_side():
+    text = STOP.replace('type="slide" axis="1 0 0" stiffness="3"', 'axis="0 1 0" pos="0 0 -1" stiffness="9"')
+    cycle = free_map(text.format("", ""))
+    mode = cycle_multipliers("pendulum", cycle, np.zeros(2), ["a"]).finite[0]
+    assert 1e-9 < abs(mode.multiplier - grown(cycle, np.radians([1.0, 0.0]), 60)) < mode.error < 1e-7
+
+
+def test_bends_that_meet_a_stop_to_one_side_do_not_grow():
+    cycle = free_map(STOP.format('limited="true" range="-0.001 1" solreflimit="-1000 -10"', ""))
+    found = cycle_multipliers("stop", cycle, np.zeros(2), ["a"])
+    assert found.stable is True
+    assert max(grown(cycle, np.array([side * found.amplitude, 0.0]), 100) for side in (1.0, -1.0)) < 0.9
+    assert not any(abs(mode.multiplier) - mode.error > 1.0 for mode in found.finite)
+    assert "grow" not in "\n".join(found.lines())
+
+
+def test_modes_decay_each_within_its_own_error():
+    modes = tuple(CycleMode(complex(value), error, np.ones(2)) for value, error in ((0.986, 2e-4), (0.258, 0.064)))
+    found = CycleMultipliers("three", 0.6, np.zeros(2), 1e-3, (), None, 0.02, modes, np.zeros(2), ())
+    assert found.title == "three: bends of 1.15° decay; no periodic motion was found"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "complaint"),
+    [
+        (lambda cycle: CycleMap("x", cycle.control), "model = 'str': must be a mujoco.MjModel"),
+        (lambda cycle: CycleMap(cycle.model, cycle.control, None), "travel: must name joints"),
+        (
+            lambda cycle: cycle(np.zeros(3)),
+            r"x = \(3,\): must be coordinates; allowed: \(runs, 2\)",
+        ),
+        (lambda cycle: cycle(np.zeros((0, 2))), r"x = \(0, 2\): must be coordinates"),
+        (lambda cycle: cycle("x"), "x = 'x': must be an array of numbers"),
+    ],
+)
+def test_wrong_arguments_of_a_cycle_map_are_one_line(wrong, complaint):
+    cycle = free_map(STOP.format("", ""))
+    assert cycle([0.0, 0.0])[0].tolist() == [[0.0, 0.0]]
+    with pytest.raises(ParameterError, match=complaint):
+        wrong(cycle)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CycleMode(ReadOnlyArrays):
-    """A mode of a walk: its multiplier over one gait cycle, half the interval of 95 %, and its yaw joints, front to
-    rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
+    """A mode of a walk: its multiplier over one gait cycle, its error (for bends of a given size an estimate), and its
+    yaw joints, front to rear, (N-1,), of which the largest is 1 (all are 0 if none turns)."""
 
     multiplier: complex
     error: float
@@ -57,8 +57,7 @@ _GROWTH = {True: "decay", False: "grow", None: "neither decay nor grow for certa
 
 def _verdict(modes: Sequence[CycleMode]) -> bool | None:
     """True if all modes decay, False if one grows, None where errors leave it undecided or there are none."""
-    errors = np.array([mode.error for mode in modes])
-    return stable_within(np.array([mode.multiplier for mode in modes]), float(errors.max()), errors) if modes else None
+    return stable_within(np.array([m.multiplier for m in modes]), np.array([m.error for m in modes])) if modes else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +76,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
     contacts: tuple[str, ...]  # those that a larger bend than the reach changes, or that differ between cycles
     unit: str = "rad"  # unit of bends: rad (shown in degrees), m, rad/s, m/s, or "" if they differ
     heading: bool = False  # whether the motion depends on the heading, which is divided out
+    switch: bool = False  # whether the motion repeats, but lies on the switch of a contact, limit or slack spring
 
     @property
     def stable(self) -> bool | None:
@@ -89,7 +89,8 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         if self.exact:
             return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
         size = self._shown(self.amplitude, 3)
-        return f"{self.name}: bends of {size} {_GROWTH[_verdict(self.finite)]}; no periodic motion was found"
+        why = "the periodic motion has no derivative" if self.switch else "no periodic motion was found"
+        return f"{self.name}: bends of {size} {_GROWTH[_verdict(self.finite)]}; {why}"
 
     def as_json(self) -> dict[str, Any]:
         """The result as plain numbers; complex ones as [real, imaginary]."""
@@ -99,7 +100,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
             "period_s": self.period,
             "stable": self.stable,
             "verdict": VERDICTS[self.stable],
-            "closes": bool(self.exact),
+            "closes": bool(self.exact) or self.switch,
             "mismatch": self.mismatch,
             "multipliers": [mode.as_json(self.period) for mode in self.exact],
             "reach_rad": self.reach,
@@ -120,7 +121,9 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         head = ("bends", "multiplier", "error", "modulus", "shape", "joints")
         rows = [mode.cells("smallest") for mode in self.exact] + [mode.cells(size) for mode in self.finite]
         closes = f"The walk changes by {self.mismatch:.0e} in a cycle"
-        if self.reach is None:
+        if self.switch:
+            said = f"{closes} and lies on a switch, where there is no derivative. Contacts and limits that switch"
+        elif self.reach is None:
             scatter = f"bends scatter over {self._shown(float(self.spread.max()), 2)}"
             said = f"{closes}, {scatter}, and there is no derivative. Contacts change from cycle to cycle"
         else:

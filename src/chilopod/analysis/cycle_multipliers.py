@@ -3,7 +3,7 @@
 A foot that just touches makes the cycle map jump. A derivative exists only if the walk closes, and it holds for bends
 that change no contact. Bends of a given size are therefore followed besides: opposite ones along the leading modes,
 brought back to their size after every cycle. The mean over the cycles of the matrix that maps them has the multipliers
-of that size, with an interval from its scatter. The same matrix of tiny bends refines those of the derivative.
+of that size, with errors by its scatter and by what differs to both sides. That of tiny bends refines the derivative's.
 """
 
 from __future__ import annotations
@@ -34,6 +34,9 @@ from chilopod.statistics import LEVEL, Interval
 if TYPE_CHECKING:
     from chilopod.twin import CycleMap
 
+_Modes = tuple[CycleMode, ...]
+_Indices = NDArray[np.intp]
+
 AMPLITUDE = math.radians(1.0)
 """Default size of a bend, rad: the standard deviation of the trials' disturbance."""
 
@@ -42,7 +45,7 @@ _SETTLING, _CLOSING, _MEMORY = 30, 30, 10  # cycles: to settle, and of Anderson'
 _CLOSED = 1e-11  # m, rad, per second
 _STEPS = (1e-7, 1e-8)  # of the differences; the first that changes no contact
 _ROUNDING = float(np.finfo(float).eps)
-_SHORTER = 0.25  # second step over the first
+_SHORTER, _KINK, _ACROSS = 0.25, 1e-3, 4  # second step over the first; least change of slopes; directions across
 _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
 _FORGOTTEN, _BLOCK, _MOST_CYCLES = 2, 4, 10_000  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
@@ -110,30 +113,28 @@ def cycle_multipliers(
     if place not in ("", _HEADING):
         allowed = "a world that looks the same from everywhere along `travel`, and from wherever a free body stands"
         raise AnalysisError(f"must not depend on {place}, which is divided out", field="motion", allowed=allowed)
-    derivative, step = _derivative(cycle, x)
-    basis, dual = _leading(derivative, at)
-    exact: tuple[CycleMode, ...] = ()
-    if closes and step:
-        tiny = [_followed(cycle, x, size * basis, dual / size, 1)[0] for size in (step, _SHORTER * step)]
-        rounding = _ROUNDING * (1.0 + np.abs(x).max() / (_SHORTER * step))
-        exact = _modes(np.concatenate(tiny), basis[at], 1, rounding)
+    for step in _STEPS:
+        derivative, ahead = _derivative(cycle, x, step)
+        basis, dual = _leading(derivative, at)
+        beside = np.concatenate([ahead, _switched(cycle, x, basis, step)])
+        if not len(beside):
+            break
+    exact = _exact(cycle, x, basis, dual, at, step) if closes and not len(beside) else ()
     try:
-        found = _followed(cycle, x, amplitude * basis, dual / amplitude, _FORGOTTEN + cycles)
-        matrices, seen = (each[_FORGOTTEN:] for each in found)
-        finite = _modes(matrices, basis[at], _BLOCK)
+        finite, seen = _finite(cycle, x, amplitude * basis, dual / amplitude, at, cycles)
     except AnalysisError:  # so large bends fall
         if not exact:
             raise
         finite, seen = (), np.array([x, cycle(x[None])[0][0]])
     if not exact:
         _check_settled(cycle, seen)
-    reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(seen))
-    ahead, here = (cycle(x[None])[0][0], x) if exact else (seen[-1], seen[-2])  # beside an unstable walk others wander
+    others = np.concatenate([x[None], beside]) if closes else seen
+    reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(others))
+    ahead, here = (cycle(x[None])[0][0], x) if closes else (seen[-1], seen[-2])  # beside an unstable walk others wander
     mismatch, spread = float(np.abs(ahead - here).max()), np.ptp(seen[:, at], axis=0)
-    units = {cycle.units[each] for each in at}
-    unit = units.pop() if len(units) == 1 else ""
+    unit = cycle.units[at[0]] if len({cycle.units[each] for each in at}) == 1 else ""
     found_at = name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit
-    return CycleMultipliers(*found_at, heading=bool(place))
+    return CycleMultipliers(*found_at, heading=bool(place), switch=closes and not exact)
 
 
 def finite_modes(
@@ -147,18 +148,18 @@ def finite_modes(
     """Leading modes of bends of a given size alone, by falling modulus, :func:`cycle_multipliers` at half its cost.
 
     The arguments are the same, and ``basis``, leading modes (n, r) and their dual (r, n) of a similar walk that has
-    settled at ``start``. Returns the modes, the state that has settled, (n,), and the basis.
+    settled at ``start``. Returns the modes, with errors by scatter alone, the settled state, (n,), and the basis.
     """
     at, x = _indices(cycle, bends), start
     for _ in range(_SETTLING if basis is None else _FORGOTTEN * _BLOCK):
         x = cycle(x[None])[0][0]
     forgotten = _FORGOTTEN if basis is None else _BLOCK
-    modes, dual = basis or _leading(_derivative(cycle, x, _STEPS[:1])[0], at)
-    matrices, _ = _followed(cycle, x, amplitude * modes, dual / amplitude, forgotten + cycles)
+    modes, dual = basis or _leading(_derivative(cycle, x, _STEPS[0])[0], at)
+    matrices = _followed(cycle, x, amplitude * modes, dual / amplitude, forgotten + cycles)[0]
     return _modes(matrices[forgotten:], modes[at], _BLOCK), x, (modes, dual)
 
 
-def _indices(cycle: CycleMap, bends: Sequence[str]) -> NDArray[np.intp]:
+def _indices(cycle: CycleMap, bends: Sequence[str]) -> _Indices:
     """Indices of coordinates with these names."""
     if not bends or isinstance(bends, str):
         raise ParameterError("must be a list of names", field="bends", value=bends, allowed=", ".join(cycle.names))
@@ -194,17 +195,27 @@ def _closed(cycle: CycleMap, x: Array) -> tuple[Array, bool]:
     return settled, False
 
 
-def _derivative(cycle: CycleMap, x: Array, steps: tuple[float, ...] = _STEPS) -> tuple[Array, float]:
-    """Derivative at a state (n,) by differences, and their step, or 0 if every step changes contacts."""
-    for step in steps:
-        images, counts = cycle(np.concatenate([x[None], x + step * np.eye(x.size)]))
-        derivative = (images[1:] - images[0]).T / step
-        if (counts == counts[0]).all():
-            return derivative, step
-    return derivative, 0.0
+def _derivative(cycle: CycleMap, x: Array, step: float) -> tuple[Array, Array]:
+    """Derivative at a state (n,) by differences to one side, and those states of them whose contacts are others."""
+    beside = x + step * np.eye(x.size)
+    images, counts = cycle(np.concatenate([x[None], beside]))
+    return (images[1:] - images[0]).T / step, beside[(counts[1:] != counts[0]).any(axis=1)]
 
 
-def _leading(derivative: Array, at: NDArray[np.intp]) -> tuple[Array, Array]:
+def _switched(cycle: CycleMap, x: Array, basis: Array, step: float) -> Array:
+    """States a step to both sides of a state (n,), along a basis (n, r) and across any switch, whose contacts are other
+    ones, or where slopes to both sides differ by what hardly falls with the step."""
+    across = np.random.default_rng(0).choice([-1.0, 1.0], (_ACROSS, x.size))
+    along = np.concatenate([basis.T, across / math.sqrt(x.size)])
+    beside = x + step * np.concatenate([along, -along])
+    images, counts = cycle(np.concatenate([x[None], beside, x + _SHORTER * (beside - x)]))
+    moves = images[1:] - images[0]
+    apart, nearer = np.abs(moves.reshape(2, 2, len(along), -1).sum(axis=1)).max(axis=2)
+    kinks = (apart > _KINK * (step + np.abs(moves).max())) & (nearer > _SHORTER**1.5 * apart)  # a curve falls by 2
+    return beside[(counts[1 : len(beside) + 1] != counts[0]).any(axis=1) | np.tile(kinks, 2)]
+
+
+def _leading(derivative: Array, at: _Indices) -> tuple[Array, Array]:
     """Real basis of the leading modes, (n, r), and its dual. The largest bend of a mode is 1, or, if it has none, its
     largest entry."""
     # Left eigenvectors of their own: the inverse of the right ones is lost if any mode at all is defective.
@@ -212,33 +223,61 @@ def _leading(derivative: Array, at: NDArray[np.intp]) -> tuple[Array, Array]:
     order = falling(values)
     values, left, right = values[order], left[:, order], right[:, order]
     kept = np.arange(whole_pairs(values, _LEADING))
-    size = np.abs(right[:, kept])
-    size[at] /= _NOT_BENT
-    modes, second = right[:, kept] / right[size.argmax(axis=0), kept], values[kept].imag < 0.0
+    modes, second = right[:, kept] / _largest(right[:, kept], at), values[kept].imag < 0.0
     basis = np.where(second, modes.imag, modes.real)
     rows = np.where(second, left[:, kept].imag, left[:, kept].real).T
     return basis, np.linalg.solve(rows @ basis, rows)
 
 
-def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int) -> tuple[Array, Array]:
-    """Matrices that map bends (n, r) in each of some cycles, (cycles, r, r), and states before each, (cycles, n)."""
-    first, matrices, seen = bends, [], []
+def _largest(modes: NDArray[Any], at: _Indices) -> NDArray[Any]:
+    """Largest bend of each of some modes (n, r), or, if it has none, its largest entry."""
+    size = np.abs(modes)
+    size[at] /= _NOT_BENT
+    return modes[size.argmax(axis=0), np.arange(modes.shape[1])]
+
+
+def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int) -> tuple[Array, Array, Array]:
+    """Matrices that map bends (n, r) in each of some cycles, (cycles, r, r), states before each, (cycles, n), and the
+    same matrices by bends to one side and to the other, (cycles, 2, r, r)."""
+    first, matrices, seen, sides = bends, [], [], []
     for _ in range(cycles):
         seen.append(x)
         *images, x = cycle(np.concatenate([x + bends.T, x - bends.T, x[None]]))[0]
         ahead, behind = np.split(np.array(images), 2)
         after = 0.5 * (ahead - behind).T
         matrices.append(dual @ after)
+        sides.append([dual @ (ahead - x).T, dual @ (x - behind).T])
         bends = after @ np.linalg.pinv(matrices[-1])
         if np.abs(bends).max() > _LARGER * np.abs(first).max():  # a jump has turned them all to one side
             bends = first
-    return np.array(matrices), np.array(seen)
+    return np.array(matrices), np.array(seen), np.array(sides)
 
 
-def _modes(matrices: Array, angles: Array, block: int, rounding: float = _ROUNDING) -> tuple[CycleMode, ...]:
+def _exact(cycle: CycleMap, x: Array, basis: Array, dual: Array, at: _Indices, step: float) -> _Modes:
+    """Modes of the derivative, by bends of two tiny sizes; slopes to both sides that differ are part of the error."""
+    tiny = [_followed(cycle, x, size * basis, dual / size, 1) for size in (step, _SHORTER * step)]
+    rounding = _ROUNDING * (1.0 + np.abs(x).max() / (_SHORTER * step))
+    far, near = (np.diff(each[2], axis=1)[0] for each in tiny)
+    kink = (near - _SHORTER * far) / (1.0 - _SHORTER)  # without what falls with the size
+    return _modes(np.concatenate([each[0] for each in tiny]), basis[at], 1, rounding, kink)
+
+
+def _finite(cycle: CycleMap, x: Array, bends: Array, dual: Array, at: _Indices, cycles: int) -> tuple[_Modes, Array]:
+    """Modes of bends of a size, and states before each cycle. Contacts do not add up, and differ to both sides: a bend
+    along a single mode, to one side, grows by another factor. The error contains the changes to both sides."""
+    matrices, seen, _ = (each[_FORGOTTEN:] for each in _followed(cycle, x, bends, dual, _FORGOTTEN + cycles))
+    values, right, _ = eigensystem(matrices.mean(axis=0))
+    turn = np.where(values.imag < 0.0, right.imag, right.real)
+    turn *= np.abs(_largest(bends, at) / _largest(bends @ turn, at))
+    back = np.linalg.pinv(turn)
+    sides = _followed(cycle, x, bends @ turn, back @ dual, _FORGOTTEN + cycles)[2][_FORGOTTEN:].mean(axis=0)
+    return _modes(matrices, bends[at], _BLOCK, apart=turn @ sides @ back - matrices.mean(axis=0)), seen
+
+
+def _modes(matrices: Array, angles: Array, block: int, least: float = _ROUNDING, apart: Array | None = None) -> _Modes:
     """Modes of the mean of matrices (m, r, r), with half their intervals of 95 % by Student's t, from means over blocks
-    of some of them in turn, at least the ``rounding`` of a matrix relative to its norm; rows of ``angles`` (joints, r)
-    are yaw joints."""
+    of some of them in turn, at ``least`` relative to the norm of a matrix, and with the changes by matrices that lie
+    ``apart`` from the mean, (k, r, r); rows of ``angles`` (joints, r) are yaw joints."""
     values, right, left = eigensystem(matrices.mean(axis=0))
     # To first order, a matrix changes an eigenvalue by left^H (M - mean) right.
     each = np.einsum("ji,kjl,li->ik", left.conj(), matrices, right)
@@ -246,13 +285,14 @@ def _modes(matrices: Array, angles: Array, block: int, rounding: float = _ROUNDI
     count = blocks.shape[1]
     with np.errstate(over="ignore", invalid="ignore"):  # a nearly defective matrix
         errors = stdtrit(count - 1, 0.5 + 0.5 * LEVEL) * blocks.std(axis=1, ddof=1) / math.sqrt(count)
-        least = rounding * np.linalg.norm(matrices.mean(axis=0)) * np.linalg.norm(left, axis=0)
-    errors = np.nan_to_num(np.fmax(errors, least), nan=np.inf, posinf=np.inf)
+        if apart is not None:
+            errors += np.abs(np.einsum("ji,kjl,li->ki", left.conj(), apart, right)).sum(axis=0)
+        rounding = least * np.linalg.norm(matrices.mean(axis=0)) * np.linalg.norm(left, axis=0)
+    errors = np.nan_to_num(np.fmax(errors, rounding), nan=np.inf, posinf=np.inf)
     turns = angles @ right
     largest = turns[np.abs(turns).argmax(axis=0), np.arange(len(values))]
-    scaled = np.where(np.abs(largest) > _NOT_BENT, turns / np.where(largest == 0.0, 1.0, largest), 0.0)
-    kept = np.flatnonzero(values.imag >= 0.0)
-    return tuple(CycleMode(complex(values[i]), float(errors[i]), scaled[:, i]) for i in kept)
+    turns = np.where(np.abs(largest) > _NOT_BENT, turns / np.where(largest == 0.0, 1.0, largest), 0.0)
+    return tuple(CycleMode(complex(values[i]), float(errors[i]), turns[:, i]) for i in np.flatnonzero(values.imag >= 0))
 
 
 def _reach(cycle: CycleMap, x: Array, basis: Array, low: float) -> tuple[float, tuple[str, ...]]:

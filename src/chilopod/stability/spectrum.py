@@ -45,7 +45,7 @@ VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
 EPSILON = float(np.finfo(float).eps)
 
 
-def stable_within(values: ComplexArray, bound: float, bounds: Array | float | None = None) -> bool | None:
+def stable_within(values: ComplexArray, bound: Array | float, bounds: Array | float | None = None) -> bool | None:
     """Stability by multipliers with a bound on the error of all that are not small, or one each: True if all lie inside
     the unit circle by more than their bounds, False if one lies outside by more, else None."""
     modulus = np.abs(values)

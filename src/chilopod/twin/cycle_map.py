@@ -37,7 +37,7 @@ class CycleMap:
     velocities of the free body ahead, to the left (both horizontal, along its heading) and up, its angular velocity in
     its own frame, and rates of all other joints. MuJoCo's solver starts every cycle without a memory of the last one,
     so the map is a function of the state. ``names`` and ``units`` are those of the coordinates, ``period`` is a
-    cycle in s.
+    cycle in s, and ``control`` are the controls before every step, which are exact for a robot's :func:`walk_cycle`.
 
     Parameters
     ----------
@@ -52,6 +52,8 @@ class CycleMap:
     """
 
     def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: tuple[str, ...] = ()) -> None:
+        if not isinstance(model, mujoco.MjModel):
+            raise ParameterError("must be a mujoco.MjModel", field="model", value=type(model).__name__)
         self.model, self.control = copy.copy(model), np.array(as_array("control", control))
         kinds = self.model.jnt_type.tolist()
         self._free = free = kinds[:1] == [_FREE]
@@ -71,9 +73,9 @@ class CycleMap:
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.model.opt.tolerance, self.period = _TOLERANCE, len(self.control) * float(self.model.opt.timestep)
         self._joints = joints = [self.model.joint(i).name or f"joint {i}" for i in range(free, len(kinds))]
-        self._kept = np.array([i for i, name in enumerate(joints) if name not in travel], dtype=np.intp)
-        if len(self._kept) != len(joints) - len(travel):
+        if type(travel) not in (tuple, list) or len(set(joints).intersection(travel)) != len(travel):
             raise ParameterError("must name joints", field="travel", value=travel, allowed=", ".join(joints))
+        self._kept = np.array([i for i, name in enumerate(joints) if name not in travel], dtype=np.intp)
         measures = ["m" if kind == _PLAIN[1] else "rad" for kind in kinds[free:]]
         rates = [f"rate of {name}" for name in (*_SPEEDS[: 6 * free], *joints)]
         self.names = (*("height", "roll", "pitch")[: 3 * free], *(joints[i] for i in self._kept), *rates)
@@ -90,8 +92,11 @@ class CycleMap:
         body, ahead = (np.stack(each, axis=-1) for each in parts)
         return np.concatenate([body, positions[..., 7 + self._kept], ahead, rates[..., 2:]], axis=-1)
 
-    def full(self, x: Array) -> tuple[Array, Array]:
+    def full(self, x: ArrayLike) -> tuple[Array, Array]:
         """``qpos`` (..., nq) and ``qvel`` (..., nv) at the origin along x, from coordinates (runs, n) or (n,)."""
+        x = as_array("x", x)
+        if not x.size or x.shape[-1:] != (len(self.names),) or x.ndim > 2:
+            raise ParameterError("must be coordinates", field="x", value=x.shape, allowed=f"(runs, {len(self.names)})")
         positions = np.zeros((*x.shape[:-1], self.model.nq))
         angles, rates = np.split(x, [len(self.names) - self.model.nv], axis=-1)
         positions[..., 7 * self._free + self._kept] = angles[..., 3 * self._free :]
@@ -100,10 +105,10 @@ class CycleMap:
             positions[..., 3:7] = Rotation.from_euler("YX", x[..., [2, 1]]).as_quat(scalar_first=True)
         return positions, rates
 
-    def __call__(self, x: Array) -> tuple[Array, NDArray[np.int32]]:
+    def __call__(self, x: ArrayLike) -> tuple[Array, NDArray[np.int32]]:
         """States after a cycle, and the number of contacts and joint limits that act in each step, shape (runs, steps),
-        from states before it, shape (runs, n); AnalysisError if one falls."""
-        return self._run(*self.full(x))
+        from states before it, shape (runs, n) or (n,); AnalysisError if one falls."""
+        return self._run(*map(np.atleast_2d, self.full(x)))
 
     def _run(self, positions: Array, rates: Array) -> tuple[Array, NDArray[np.int32]]:
         batch = Batch(self.model, len(positions), cores())
@@ -125,7 +130,7 @@ class CycleMap:
         coordinates."""
         places = {"x": 0, "y": 1, "the heading": 3} if self._free else {}
         places |= {name: 7 * self._free + i for i, name in enumerate(self._joints) if i not in self._kept}
-        positions, rates = self.full(np.repeat(x[None], len(places) + 1, axis=0))
+        positions, rates = self.full(np.repeat(np.atleast_2d(x), len(places) + 1, axis=0))
         for row, (name, at) in enumerate(places.items(), 1):
             if name == "the heading":
                 turned = Rotation.from_rotvec([0.0, 0.0, _ELSEWHERE])
@@ -165,9 +170,9 @@ class CycleMap:
 
 
 def walk_cycle(robot: Robot, edit: Edit | None = None) -> tuple[CycleMap, Array]:
-    """Cycle map of the robot in three dimensions, changed by an edit as of :class:`chilopod.twin.Edited`, and the
-    coordinates of the robot as it stands; ParameterError if a gait cycle is no whole number of control intervals, or
-    steps are too coarse for the servos."""
+    """Cycle map of the robot in three dimensions with all its servo targets, changed by an edit as of
+    :class:`chilopod.twin.Edited`, and the coordinates of the robot as it stands; ParameterError if a gait cycle is no
+    whole number of control intervals, or steps are too coarse for the servos."""
     twin = twin_of(robot)
     count = robot.gait.period / twin.control_interval
     if abs(count - round(count)) > _WHOLE * count:

@@ -41,8 +41,8 @@ def mjcf(robot: Robot) -> str:
 
     MuJoCo builds from it the model of :func:`chilopod.twin.simulate`, every number to the bit. For the viewer it has a
     visible floor, a light, a camera that follows the robot, sensors of the joint angles and of the place of module 1,
-    and keyframes: ``start`` is the robot at time 0 with its servo targets, ``gait0`` and so on are the servo targets at
-    their times within a period. ParameterError if the twin cannot be built.
+    and keyframes: ``start`` is the robot at time 0 with its servo targets, ``gait0`` and so on are 100 of the servo
+    targets of a period at their times; :class:`chilopod.twin.CycleMap` has all. ParameterError if there is no twin.
     """
     twin = TwinModel(robot)
     spec = build(robot)
