@@ -107,3 +107,12 @@ def test_a_spent_budget_keeps_what_was_found():
     assert found.evaluations <= 300
     assert found.crossings
     assert np.sin([300.0 * c.value for c in found.crossings]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("budget", [76, 88, 112, 144, 156, 172])
+def test_a_crossing_that_the_budget_leaves_unfinished_is_no_jump(budget):
+    found = find_crossings(scalar(lambda p: 1.0 + 0.3 * np.sin(40.0 * p)), 0.0, 1.0, budget=budget)
+    assert found.status is SearchStatus.BUDGET
+    assert not any("jumps" in remark for remark in found.remarks)
+    for crossing in found.crossings:
+        assert crossing.value == pytest.approx(np.pi / 40.0 * round(crossing.value * 40.0 / np.pi), abs=1e-12)

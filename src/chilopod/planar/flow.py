@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 
 _integrate = integrator(rhs)
-_TOGETHER = 32  # rows that are carried without a look at the time; one of a chain of 40 modules takes a second
 
 
 @lru_cache(maxsize=256)
@@ -58,26 +57,16 @@ def advance(
     max(1, |x|). Returns False if a motion diverges; a SpentError says that the time of an analysis ended.
     """
     ok = np.ones(len(states), dtype=np.bool_)
-    number = numba.get_num_threads() if len(states) > _TOGETHER else _TOGETHER
+    number = numba.get_num_threads() if len(states) > 32 else 32  # a tangent of forty modules takes a second
     for first in range(0, len(states), number):
         deadline.check()
-        some = slice(first, first + number)
-        _advance(starts, widths, *robot, states[some], tolerance, ok[some])
+        _advance(starts, widths, robot, states[first:][:number], tolerance, ok[first:][:number])
     return bool(ok.all())
 
 
 @parallel_njit
-def _advance(
-    starts: Any,
-    widths: Any,
-    scalars: Any,
-    stiffness: Any,
-    damping: Any,
-    moments: Any,
-    states: Any,
-    tolerance: float,
-    ok: Any,
-) -> None:
+def _advance(starts: Any, widths: Any, robot: Any, states: Any, tolerance: float, ok: Any) -> None:
+    scalars, stiffness, damping, moments = robot
     for r in numba.prange(states.shape[0]):
         x = states[r].copy()
         work = np.empty((16, x.size), x.dtype)

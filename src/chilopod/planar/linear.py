@@ -192,10 +192,8 @@ def _copy_rows(source: Any, target: Any, at: int, count: int) -> None:
 
 
 @njit
-def _propagate(
-    widths: Any, upper: Any, decay: Any, frequency: float, clock: float, state: Any, stop: Any
-) -> tuple[float, int]:
-    """Carry one panel of columns through all intervals, in place; returns (error, orders).
+def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: float, state: Any, stop: Any) -> Any:
+    """Carry one panel of columns through all intervals, in place, unless ``stop`` is set; returns (error, orders).
 
     ``state`` has 2N+1 rows and then zeros, up to a multiple of ROWS. The error bounds that of the largest entry of the
     result. The effect of round-off depends on the motion, so the last column is a sample of round-off instead of a
@@ -280,11 +278,8 @@ def _propagate(
 
 
 @njit
-def propagate_all(
-    widths: Any, upper: Any, decay: Any, frequency: float, clock: float, matrix: Any, stop: Any
-) -> tuple[float, int]:
-    """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel, unless ``stop``,
-    shape (1,), becomes other than zero."""
+def propagate_all(widths: Any, upper: Any, decay: Any, frequency: float, clock: float, matrix: Any, stop: Any) -> Any:
+    """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel; see _propagate."""
     n = matrix.shape[0]
     error = 0.0
     orders = 0
@@ -322,8 +317,7 @@ def propagate(
     decay, 1/s, shape (intervals,), which need not be exact, nor need the highest frequency at which the springs ring,
     1/s.
 
-    Returns the bound on the error of the largest entry, and the number of Taylor orders computed; a SpentError says
-    that the time of an analysis ended.
+    Returns the bound on the error of the largest entry, and the number of Taylor orders computed.
     """
     n, intervals = len(matrix), widths.size
     if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):

@@ -157,16 +157,12 @@ def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error:
 def spatial_symmetries(system: SystemLike) -> tuple[Array, ...]:
     """Generators of the spatial symmetries; may be empty."""
     given = getattr(system, "spatial_symmetry", None)
-    if given is None:
-        return ()
-    return (given,) if given.ndim == 2 else tuple(given)
+    return () if given is None else (given,) if given.ndim == 2 else tuple(given)
 
 
 def returns_per_period(system: SystemLike) -> int:
     """Number of returns in one period: the order of the symmetry, 1 without one."""
-    if system.symmetry is None:
-        return 1
-    return int(getattr(system, "symmetry_order", None) or 2)
+    return 1 if system.symmetry is None else int(getattr(system, "symmetry_order", None) or 2)
 
 
 def _is_long(system: SystemLike, duration: float) -> bool:
@@ -356,7 +352,7 @@ class _Fewer(BaseException):
 
 
 class _Sharing:
-    """The systems of a family with the symmetries that all of them have so far: some may have more of their own."""
+    """The systems of a family with the symmetries that all so far have: that of one alone does not hold beside it."""
 
     _shared: tuple[int, tuple[Array, ...]] | None = None  # returns in a period, and generators in space
 
@@ -364,12 +360,10 @@ class _Sharing:
         self._family = family
 
     def __call__(self, *values: float) -> Any:
-        system = self._family(*values)
-        if not hasattr(system, "symmetry"):
-            return system  # which is refused
+        system = system_of(self._family, *values)
         returns, own = returns_per_period(system), spatial_symmetries(system)
         before, known = self._shared = self._shared or (returns, own)
-        kept = tuple(each for each in known if any(_same(each, other) for other in own))
+        kept = tuple(each for each in known if any(np.array_equal(each, other) for other in own))
         if returns != before > 1 or len(kept) < len(known):
             self._shared = before if returns == before else 1, kept
             raise _Fewer(self)
@@ -381,13 +375,8 @@ class _Sharing:
         return SimpleNamespace(**members)
 
 
-def _same(first: Array, second: Array) -> bool:
-    return first.shape == second.shape and np.allclose(first, second, 1e-9, 1e-12)
-
-
 def with_shared_symmetries(search: Search) -> Search:
-    """A search along a family, its first argument, with the symmetries that all its systems have: it starts anew where
-    one has fewer. A symmetry of a single system, as of legs that move together, does not hold beside it."""
+    """A search along a family, its first argument, that starts anew without a symmetry where a system lacks it."""
 
     @functools.wraps(search)
     def sharing(*args: Any, **kwargs: Any) -> Any:

@@ -27,6 +27,7 @@ _GREY = 32.0  # distance from the circle, in errors, up to which a multiplier ma
 _ROUNDS = 200  # rounds of balancing: each adds a root, joins two or counts nearer to one
 _GROWTH = 8.0  # ratio of successive distances from a root at which multipliers are counted
 _JUMP, _WIDER = 0.5, 100.0  # part of a multiplier's change that remains in a jump, and ratio of the intervals' widths
+_NARROW = 1e-6  # largest width, relative to the whole interval, at which that tells: a search may end before
 _SHADOW = 1.5  # distance of a crossing that explains a touch, in widths of the touch
 
 
@@ -285,7 +286,8 @@ class Accounts:
         wide = spectra.beside(place, _WIDER * width)
         small, large = (abs(spectra.margins(b)[rank] - spectra.margins(a)[rank]) for a, b in ((left, right), wide))
         errors = (spectra.margin_errors(side)[rank] for side in (left, right))  # computed only if they decide
-        return bool(small > _JUMP * large and small > _WIDER * sum(errors))
+        narrow = width <= _NARROW * (self._ends[1] - self._ends[0])
+        return bool(narrow and small > _JUMP * large and small > _WIDER * sum(errors))
 
     def _separated(self, inside: list[Root]) -> list[Root]:
         """Roots with a counted place between them; those without one are merged."""
