@@ -1,6 +1,7 @@
 """Crossings of the unit circle of families whose multipliers are known, or found by dense sampling."""
 
 import itertools
+import time
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 from chilopod.errors import ParameterError
+from chilopod.flows.deadline import Deadline, SpentError
+from chilopod.stability.spectrum import disturbed
 from chilopod.stability.unit_circle.crossings import SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import CircleEvent, Spectra, symmetric
 
@@ -281,6 +284,34 @@ def test_many_multipliers_are_counted():
     assert found.status is SearchStatus.COMPLETE
     assert len(found.crossings) > 1
     assert sum(crossing.change for crossing in found.crossings) == counts[1] - counts[0]
+
+
+def test_a_spent_limit_is_said_alone():
+    """Not as uncertain multipliers: too few matrices are known to tell which of them rest on the circle."""
+
+    def matrices(values):
+        if values.max() > 0.05:
+            raise SpentError("spent")
+        return diagonal(lambda p: 1e-9)(values)
+
+    found = find_crossings(matrices, 0.0, 1.0, affordable=lambda: 0)
+    assert found.status is SearchStatus.BUDGET
+    assert not found.remarks
+
+
+def test_errors_of_multipliers_end_with_the_time(monkeypatch):
+    """They take long for many states."""
+    asked = []
+
+    def slowly(*args):
+        asked.append(time.sleep(0.1))
+        return disturbed(*args)
+
+    monkeypatch.setattr("chilopod.stability.unit_circle.spectra.disturbed", slowly)
+    with Deadline(0.05):
+        found = find_crossings(diagonal(*[lambda p, k=k: 1e-6 * (p - k / 8.0) for k in range(8)]), 0.0, 1.0)
+    assert found.status is SearchStatus.BUDGET
+    assert len(asked) <= 5
 
 
 @pytest.mark.parametrize(

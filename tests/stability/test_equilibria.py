@@ -534,6 +534,25 @@ def test_hopf_points_are_found_where_growth_soon_exceeds_all_numbers():
     assert [abs(point.value) <= point.error_bound for point in found] == [True]
 
 
+def test_a_rotation_that_is_slow_beside_the_decay_costs_no_more():
+    """A radian of it is 1000 s, in which what decays at 0.4/s at one end of the interval would grow by e^400."""
+
+    def slow(mu):
+        def rhs(t, x):
+            grown = mu - x[0] ** 2 - x[1] ** 2
+            return [grown * x[0] - 1e-3 * x[1], 1e-3 * x[0] + grown * x[1]]
+
+        return from_rhs(rhs, 2, None, guess_period=6.0)
+
+    found = locate_hopf(slow, (-0.4, 0.4), [0.0, 0.0])
+    assert found.complete
+    assert found.evaluations < 200
+    assert not found.remarks
+    (point,) = found
+    assert abs(point.value) <= point.error_bound < 1e-15
+    assert abs(point.coefficient + 2000.0) <= point.coefficient_error < 1e-9
+
+
 def test_a_point_on_the_border_of_two_parts_of_an_interval_is_listed_once():
     """The first part of an interval from 1 ends at 3.7."""
     (point,) = found = locate_hopf(lambda p: oscillator(p - 3.7), (1.0, 9.0), [0.0, 0.0])

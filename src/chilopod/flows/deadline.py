@@ -51,8 +51,8 @@ class Deadline:
         return max(self._ends - _now(), 0.0)
 
     def prolong(self, seconds: float) -> None:
-        """Extend the limit to at least some time from now, s."""
-        self._ends = max(self._ends, _now() + seconds)
+        """Extend the limit by some time, s."""
+        self._ends += seconds
         self._stop[0] = 0.0
 
     def __enter__(self) -> Self:
@@ -111,10 +111,10 @@ def stop() -> Array:
     return np.zeros(1) if found is None else found._stop
 
 
-def check() -> None:
-    """Raise a SpentError if the limit is reached."""
+def check(more: float = 0.0) -> None:
+    """Raise a SpentError if the limit is reached, or was some time, s, ago."""
     found = _LIMIT.get()
-    if found is not None and found._stop[0] != 0.0:
+    if found is not None and found._stop[0] != 0.0 and _now() > found._ends + more:
         raise over()
 
 

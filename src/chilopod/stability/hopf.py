@@ -36,6 +36,7 @@ from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchSt
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
+_REACH = 10.0  # largest exponent of the slowest decay within the step of the map
 _POINTS = 2000  # budget of return maps beside a point: those of the map cost almost nothing
 _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
@@ -88,15 +89,15 @@ def locate_hopf(
     while at < high and not (pieces and (left < _LEAST or limit.late)):
         end = min(high, _WIDE * at) if at > 0.0 else high
         try:
-            found, last = _piece(family, (at, end), state, left, limit)
+            found, reached = _piece(family, (at, end), state, left, limit)
             while found.ending and found.status is SearchStatus.INCOMPLETE and end - at > _NARROWEST * (high - low):
                 left, end = left - found.evaluations, at + _SHORTER * (end - at)
-                found, last = _piece(family, (at, end), state, max(left, _LEAST), limit)
+                found, reached = _piece(family, (at, end), state, max(left, _LEAST), limit)
         except SpentError:
             if not pieces:
                 raise
             break
-        left -= found.evaluations
+        left, last = left - found.evaluations, reached
         pieces.append(found)
         if last.value < end:  # a fold, or the search cannot go on
             break
@@ -189,11 +190,12 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
-    """The step h of the map: a radian of the fastest oscillation or growth, or about the time of the decays."""
+    """The step h of the map: a radian of the fastest oscillation or growth, or about the time of the decays; so short
+    that growth stays a number where the slowest decay becomes one as fast."""
     values = start.eigenvalues
     fastest = float(np.maximum(np.abs(values.imag), values.real).max())
     if fastest > 0.0:
-        return 1.0 / fastest
+        return 1.0 / max(fastest, float(np.abs(values.real).min()) / _REACH)
     sizes = np.abs(values[values != 0.0])
     return float(np.exp(-np.log(sizes).mean())) if sizes.size else guess_period / (2.0 * np.pi)
 

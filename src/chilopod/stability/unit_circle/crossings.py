@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from chilopod.errors import ParameterError
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.stability.spectrum import EPSILON
@@ -94,7 +95,11 @@ def find_crossings(
     a, b, parameter, place = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget + len(known), affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
-    (status, found), crossings = finder.search(np.clip(place(np.array(known)), a, b)), []
+    crossings: list[Crossing] = []
+    try:
+        status, found = finder.search(np.clip(place(np.array(known)), a, b))
+    except SpentError:  # in the errors of multipliers, without which nothing is certain
+        return Crossings((), SearchStatus.BUDGET, (), len(spectra.known))
     for each in found:
         value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
         crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
@@ -191,7 +196,9 @@ class _Finder:
         if len(numbers) < _FEWEST_TELLING:
             if few and self.spectra.left > _PROBES:  # errors are estimates: more places may tell
                 return self._idle(np.linspace(self.a, self.b, _PROBES), event)
-            self.report.leave(LOST)
+            if self.spectra.left > 0:
+                self.report.leave(LOST)
+            self.report.spent |= self.spectra.left <= 0
             return 0
         return int(sorted(numbers)[int(_MOSTLY * len(numbers))])
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
+from chilopod.flows import deadline
 from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray
@@ -23,6 +24,9 @@ Matrices = Callable[[Array], tuple[Array, Array]]
 """``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
 entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, for a missing matrix,
 and may be called twice for a value."""
+
+MORE = 0.3
+"""Time, s, after the limit of a search, in which errors of known matrices are still computed."""
 
 _ROUNDING = 2.0 * EPSILON
 _SMALLEST = -1e300  # logarithm of zero
@@ -186,7 +190,11 @@ class Spectra:
         missing = sorted({value for value in values.tolist() if value not in self._disturbed})
         if missing:
             self.at(np.array(missing))
-            for value, matrix, error in self._ask(missing):
+            found = self._ask(missing)
+            if len(found) < sum(self.known[value] is not None for value in missing):
+                deadline.check()  # else without their errors multipliers would seem uncertain
+            for value, matrix, error in found:
+                deadline.check(MORE)
                 copies = disturbed(*self._with_error(matrix, error))
                 if np.isfinite(copies).all():
                     self._disturbed[value] = _eigenvalues(copies)
