@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import begin, find_orbit, follow2, from_rhs, locate, multipliers, switch
+from chilopod.stability import (
+    Kind,
+    begin,
+    find_orbit,
+    follow,
+    follow2,
+    from_rhs,
+    locate,
+    locate_hopf,
+    multipliers,
+    switch,
+)
 
 OMEGA = 1.7
 PERIOD = 2.0 * pi / OMEGA
@@ -35,7 +46,7 @@ def twisted(strength, turns=1.0, damping=DAMPING):
     return from_rhs(rhs, 4, None, args=(strength, damping), guess_period=turns * PERIOD)
 
 
-@pytest.mark.parametrize("turns", [1, 2, 3, 6, 8, 12])
+@pytest.mark.parametrize("turns", [1, 2, 3, 6, 8, 12, 29, 60])
 def test_once_round(turns):
     found = multipliers(twisted(0.06, 1.01 * turns), [1.0, 0.0, 0.0, 0.0])
     assert found.period == pytest.approx(PERIOD, rel=1e-12)
@@ -97,3 +108,61 @@ def test_orbits_with_a_symmetry_in_time(order, turns):
     found = find_orbit(system, [1.0, 0.1])
     assert found.period == pytest.approx(PERIOD, rel=1e-12)
     assert found.image.returns == order
+
+
+def turning(speed):
+    """A circle on which the angle's rate is speed less the cosine, and across it a pair that turns by 180 degrees a
+    round, with the multipliers -exp of speed - 1.5 and of -1 over a period of 2 pi / root(speed^2 - 1)."""
+
+    def rhs(t, state, speed):
+        x, y, u, v = state
+        r = np.sqrt(x * x + y * y)
+        c, s, pull, cube = x / r, y / r, 3.0 * (1.0 - r * r), u * u + v * v
+        half, mean, apart = 0.5 * (speed - c), 0.5 * speed - 1.25, 0.5 * speed - 0.25
+        return [
+            pull * x - 2.0 * half * y,
+            pull * y + 2.0 * half * x,
+            (mean + apart * c - cube) * u + (apart * s - half) * v,
+            (apart * s + half) * u + (mean - apart * c - cube) * v,
+        ]
+
+    return from_rhs(rhs, 4, None, args=(speed,), guess_period=400.0)
+
+
+def test_where_the_period_falls_fast():
+    """Just beside its start at infinity: within a step the second round ends where the first one was expected to."""
+    branch = follow(turning, [-1.0, 0.0, 0.0, 0.0], (1.01, 3.0), closely=False, points=5)
+    for point in branch.points:
+        assert point.period == pytest.approx(2.0 * pi / np.sqrt(point.value**2 - 1.0), rel=1e-9)
+
+
+def test_a_search_where_the_period_falls_fast():
+    (doubling,) = locate(turning, (1.01, 2.0), [-1.0, 0.0, 0.0, 0.0])
+    assert doubling.kind is Kind.PERIOD_DOUBLING
+    assert abs(doubling.value - 1.5) <= doubling.error_bound < 1e-9
+    assert doubling.period == pytest.approx(2.0 * pi / np.sqrt(1.25), rel=1e-9)
+
+
+def test_beyond_an_explosion_of_cycles():
+    """The canards of van der Pol's equation grow suddenly, and then their period falls."""
+
+    def family(a):
+        def rhs(t, x, a):
+            return [(x[1] - x[0] ** 3 / 3.0 + x[0]) / 0.1, a - x[0]]
+
+        return from_rhs(rhs, 2, None, args=(a,), guess_period=2.0)
+
+    (hopf,) = locate_hopf(family, (0.9, 1.1), [0.9, -0.6])
+    branch = follow(family, *switch(family, hopf), (0.9, 1.1), closely=False)
+    assert branch.points[-1].period == pytest.approx(find_orbit(family(0.9), [2.0, 0.0]).period, rel=1e-9)
+
+
+def test_an_orbit_of_two_rounds_ends_where_it_meets_that_of_one():
+    def family(value):
+        return twisted(0.3 - value, 2.0)
+
+    start = find_orbit(family(0.15), [1.0, 0.0, 0.3, 0.0])
+    assert start.period == pytest.approx(2.0 * PERIOD, rel=1e-12)
+    result = locate(family, (0.15, 0.25), start.state)
+    assert result.searched[1] < 0.2
+    assert "another orbit meets it" in result.remarks[0]

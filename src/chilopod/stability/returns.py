@@ -300,21 +300,18 @@ def jumps_at_ends(system: SystemLike, x: Array, duration: float, part: float = _
         derivative = checked_flow(system, state, low * duration, high * duration)[1]
         return float((np.abs(derivative - one) * size / size[:, None]).max())
 
-    if any(change(at(x, 0.0, each), each, each + part) == 0.0 for each in _PARTS):
-        return False  # a map has no parts, but over several periods is applied within them too
-    for low, high in (0.0, part), (1.0 - part, 1.0):
-        there, left = at(x, 0.0, low), np.inf
+    def jump(low: float, high: float) -> float:
+        there = at(x, 0.0, low)
         for _ in range(_CLOSER):
             middle = 0.5 * (low + high)
             between = at(there, low, middle)
-            before, left = change(there, low, middle), change(between, middle, high)
-            if before > left:
-                high, left = middle, before
-            else:
-                low, there = middle, between
-        if left > _LEAST_JUMP:
-            return True
-    return False
+            before, after = change(there, low, middle), change(between, middle, high)
+            low, high, there = (low, middle, there) if before > after else (middle, high, between)
+        return max(before, after)
+
+    if any(change(at(x, 0.0, each), each, each + part) == 0.0 for each in _PARTS):
+        return False  # a map has no parts, but over several periods is applied within them too
+    return max(jump(0.0, part), jump(1.0 - part, 1.0)) > _LEAST_JUMP
 
 
 def starts(system: SystemLike, x: Array, duration: float) -> Iterator[Array]:

@@ -55,7 +55,7 @@ class PeriodicSystem(ReadOnlyArrays):
     velocity
         Function ``velocity(x)`` -> dx/dt, shape (n,), for a system that does not depend on time.
     guess_period
-        Approximate period of such a system's orbits, or a multiple of it; an orbit gets its shortest period.
+        Approximate period of such a system's orbits, or a multiple of it below 100; an orbit gets its shortest period.
     flow_with_error, flow_states, flow_tangents, flow_volume, is_stiff, velocity_series
         See :mod:`chilopod.stability.interface`.
     concurrent

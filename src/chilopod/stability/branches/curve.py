@@ -33,6 +33,7 @@ from chilopod.stability.continuation.tolerances import RETRY, SETTLED, SHARPEST_
 from chilopod.stability.equilibria import has_centre
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import checked_flow, is_autonomous, offers
+from chilopod.stability.orbits.orbit import rounds_in
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
 from chilopod.stability.returns import (
     ReturnMap,
@@ -53,6 +54,7 @@ _SHRUNK = 10.0  # motion, relative to the largest so far, that counts as shrunk,
 _NOT_SMALL = 0.5  # modulus of a multiplier that is not small
 _PARTS = 64  # parts of a period at which states on an orbit are sampled
 _SHRINKS = "the orbit shrinks into an equilibrium: a Hopf point"
+_LONGER = 1.4  # duration of a return, relative to the predicted one, above which it may be several rounds
 _SAME_PERIOD = 1e-3  # relative difference of the periods of the same orbit
 
 
@@ -173,12 +175,23 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def step(self, anchor: Anchor, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Anchor, OnCurve]:
         """The orbit near a guess, by multiple shooting where a return magnifies errors of the guess, or rounding, above
         the precision. ``bounded``: with a bound on the error of the multipliers at its end."""
+        before = 0.0 if anchor.section is None else anchor.section.duration
+        # The duration of a return is extrapolated from those of the last two points.
+        longer = 1.0 + min(max(anchor.lengthening * float(np.linalg.norm(guess.moved)), -_SOONER), _LATER)
+        step, expected = self._step(anchor, longer * before, guess, plane, bounded), min(1.0, longer) * before
+        x, value, image, _ = step.found
+        # The end of an orbit of two rounds may be a special point, but no ordinary one.
+        suspect = bounded or image.duration > _LONGER * expected
+        if suspect and (rounds := rounds_in(self.system(value), x, image.duration, self.state_units, expected)) > 1:
+            again = self._step(anchor, image.duration / rounds, Guess(step.moved, guess.matrix), plane, bounded)
+            return replace(again, missed=step.missed)
+        return step
+
+    def _step(self, anchor: Anchor, time: float, guess: Guess, plane: Plane, bounded: bool) -> Step[Anchor, OnCurve]:
+        """A step, with the expected ``time`` of a return, if that belongs to the orbit."""
+        timed = anchor if anchor.section is None else replace(anchor, section=replace(anchor.section, duration=time))
         last, n, space = anchor.last, anchor.last.orbit.size, anchor.space
         self.steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
-        timed = anchor
-        if anchor.section is not None:  # the duration of a return, extrapolated from those of the last two points
-            longer = 1.0 + min(max(anchor.lengthening * float(np.linalg.norm(guess.moved)), -_SOONER), _LATER)
-            timed = replace(anchor, section=replace(anchor.section, duration=anchor.section.duration * longer))
         count = node_count(guess.matrix[:n, :n] + np.eye(n), np.ones(n)) if space is None else 0
         off, weakest, corrections = self.precision, 0.0, 0
         if count >= _MANY_NODES:

@@ -28,7 +28,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step, inverted
 from chilopod.stability.continuation.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 from chilopod.stability.interface import SystemLike, offers, returns_per_period, sizes, system_of
-from chilopod.stability.orbits.orbit import from_known, known_state
+from chilopod.stability.orbits.orbit import closings, from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.symmetry.groups import symmetric_states
 
@@ -178,6 +178,8 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         if section is not None:
             section = section_at(system, place.state, frame.size, section.duration)
         place, image = self._mapped(place, section, True)
+        if closings(system, place.state, image.duration, frame.size) > 1:  # a later passage of the section
+            raise AnalysisError("the motion closes before the period is over", field="step")
         own = self._framed(system, place, image, np.maximum(frame.size, np.abs(place.state)), frame)
         at = self._equations(place, image, own)
         matrix = self._derivative(at)

@@ -49,7 +49,8 @@ _MISSES = 1e-6  # error of a state, relative to its size, with which a return do
 _SINGULAR = 1e-13  # singular value of H - 1, relative to the largest, that counts as zero
 _KNOWN = 1e-4  # largest relative residual of a known orbit, which is then corrected
 _SETTLING = 100  # cost of settling in return maps, without derivatives
-_MOST_PARTS = 8  # largest ratio of the guessed period to the orbit's
+_MOST_PARTS = 100  # ratio of the period found first to the shortest, below which that is found
+_ROUNDS = 8  # number of rounds of an orbit in a return up to which it is tried as a whole, not its prime factors
 _CLOSES = 1e-8  # residual, relative to motion and sizes of the states, of an early return that is then corrected
 _COARSE = 1e-11  # error, relative to the sizes of the states, from which a second computation estimates it too
 _CHANCE = 1e-13  # difference, relative to the sizes of the states, of two computations that may agree by chance
@@ -117,9 +118,9 @@ def find_orbit(
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
-    For a system that does not depend on time the result has the shortest period, even if the guess is nearer to up to
-    eight times that: if the motion closes earlier, the orbit is corrected again over that time. (An orbit of twice the
-    period that branches off at a period doubling does not close earlier.)
+    For a system that does not depend on time the result has the shortest period, even if the guess is nearer to a
+    multiple of it, below 100: if the motion closes earlier, the orbit is corrected again over that time. (An orbit of
+    twice the period that branches off at a period doubling does not close earlier.)
 
     If Newton's method fails at the guess, it is tried from a state further along the motion, provided that every state
     may be time 0, and then after the motion has settled. A guess whose motion takes too many steps is refused.
@@ -201,7 +202,7 @@ def find_large_orbit(system: Capabilities, guess: ArrayLike | None = None) -> tu
         size = tangent_sizes(system, found.state, found.image.duration)
         return tangent_map(system, found.state, found.section), size
     with contextlib.suppress(AnalysisError):
-        while (parts := _parts(system, image.point, image.duration, size)) > 1:
+        while (parts := closings(system, image.point, image.duration, size, _MOST_PARTS)) > 1:
             section = section_at(system, image.point, size, image.duration / parts)
             image, size = closed_orbit(system, image.point, section)
     return image, size
@@ -212,7 +213,7 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
     if not is_autonomous(system):
         return orbit
     duration = orbit.image.duration
-    while (parts := _parts(system, orbit.state, duration, sizes(system, orbit.state, duration))) > 1:
+    while (parts := closings(system, orbit.state, duration, sizes(system, orbit.state, duration), _MOST_PARTS)) > 1:
         duration /= parts
         try:
             orbit = near_orbit(system, Nodes(orbit.state[None], duration), with_error, budget)
@@ -222,11 +223,23 @@ def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget
     return orbit
 
 
-def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
-    """Number of times that a return closes within its duration, with the sizes of the states for the shorter time."""
+def rounds_in(system: SystemLike, x: Array, duration: float, size: Array, expected: float) -> int:
+    """Number of rounds of an orbit in a return: several may be found where the period falls fast. An AnalysisError if
+    it is not much longer than ``expected``: orbits of twice the period may also end at such an orbit."""
+    rounds = closings(system, x, duration, size)
+    if rounds > 1 and duration <= math.sqrt(rounds) * expected:
+        raise AnalysisError("the motion closes before the period is over", field="period")
+    return rounds
+
+
+def closings(system: SystemLike, x: Array, duration: float, size: Array, most: int = _ROUNDS) -> int:
+    """Number of times, up to ``most``, that a return closes within its duration, or a factor of it, with the sizes of
+    the states for the shorter time."""
     if not is_autonomous(system):
         return 1
-    counts = np.arange(_MOST_PARTS, 1, -1)
+    # Without a symmetry every multiple is a return, so that of many rounds closes after a prime factor of them too.
+    few = _ROUNDS if system.symmetry is None else most
+    counts = np.array([m for m in range(most, 1, -1) if m <= few or all(m % d for d in range(2, m))])
     states, passed = [x], 0.0
     for time in duration / counts:
         states.append(carried(system, states[-1][None], 0.0, time - passed)[0])

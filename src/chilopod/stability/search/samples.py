@@ -24,7 +24,7 @@ from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
-from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, searched_orbit
+from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, rounds_in, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.returns import BESIDE, return_duration, return_map, return_maps, section_at, starts
 from chilopod.stability.unit_circle.crossings import first_values
@@ -199,6 +199,10 @@ class Samples:
                     self._normal = section.normal
                 section = replace(section, normal=self._normal)
             orbit = near_orbit(system, Nodes(near[None], duration), False, self.budget, section, units=self.size)
+            long = orbit.image.duration
+            if section is not None and (rounds := rounds_in(system, orbit.state, long, self.size, duration)) > 1:
+                once, section = Nodes(orbit.state[None], long / rounds), replace(section, duration=long / rounds)
+                orbit = near_orbit(system, once, False, self.budget, section, units=self.size)
         return Sample(value, orbit.state, orbit.image)
 
     def _between(self, value: float) -> Sample:
@@ -297,7 +301,7 @@ class Samples:
 
     def _followed(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
         """Samples from the last one to ``value``, by smaller steps after failures; fewer where these end."""
-        path, target = list(behind), value
+        path, target, closes = list(behind), value, False
         smallest = _SHORTEST * abs(value - path[-1].value)
         while path[-1].value != value:
             if attempts == 0 or (attempts is None and self.count + len(path) - len(behind) >= self.orbits):
@@ -311,11 +315,12 @@ class Samples:
                 other = other or self._turns_back(path[-2:], found)
             except SpentError:
                 break
-            except AnalysisError:
-                other = True
+            except AnalysisError as error:
+                other, closes = True, error.field == "period"
             if other:
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
+                    self.merges |= closes and attempts is None  # an orbit of two rounds meets that of one
                     break
                 continue
             path.append(found)
