@@ -19,6 +19,8 @@ from chilopod.frozen import Array
 
 _LIMIT: ContextVar[Deadline | None] = ContextVar("limit", default=None)
 _SAID: ContextVar[set[str] | None] = ContextVar("said", default=None)
+MORE = 0.3
+"""Time, s, after the limit of a search in which errors of known matrices are still computed."""
 _PACKAGE = __name__.partition(".")[0]
 
 

@@ -232,8 +232,7 @@ class RightHandSide:
 
 
 def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
-    """Flows by Taylor series, or by the implicit method where these take too many steps, or end at a 0 / 0 of a smooth
-    function, which an implicit step passes. Every call decides anew."""
+    """Flows by Taylor series, or by the implicit method where these take too many steps or meet 0 / 0, at each call."""
     latest: tuple[bytes, float, float] | None = None  # latest flow by Taylor series, to avoid a second computation
 
     def instead(first: TooManySteps, name: str, x: Array, t0: float, t1: float) -> Any:

@@ -36,7 +36,7 @@ from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchSt
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
-_REACH = 10.0  # largest exponent of the slowest decay within the step of the map
+_REACH = 10.0  # largest exponent of the slowest decay in a step, as it may become a growth elsewhere
 _POINTS = 2000  # budget of return maps beside a point: those of the map cost almost nothing
 _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
 _KNOWN = 1e-3  # largest error of a value for a coefficient, relative to the interval
@@ -190,8 +190,7 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
-    """The step h of the map: a radian of the fastest oscillation or growth, or about the time of the decays; so short
-    that growth stays a number where the slowest decay becomes one as fast."""
+    """The step h of the map: a radian of the fastest oscillation or growth, or about the time of the decays."""
     values = start.eigenvalues
     fastest = float(np.maximum(np.abs(values.imag), values.real).max())
     if fastest > 0.0:

@@ -38,7 +38,7 @@ _NOTHING = np.empty((0, 0))
 _OVERFLOWING = {EXP: "exp", SINH: "sinh", COSH: "cosh"}
 _LARGE = 300.0  # argument beyond which the series of these may overflow
 _ROOTS = {SQRT: "a root", POWER: "a power", LOG: "a logarithm"}
-_BESIDE, _PASSES, _ALIKE = 1e-9, 1e-3, 0.1  # shift past a 0 / 0, divisor there, and rates beside it, relative to them
+_BESIDE, _PASSES, _ALIKE = 1e-6, 1e-3, 0.1  # shift past a 0 / 0, divisor there, and rates beside it, relative to them
 _ZERO = 1e-9  # argument, relative to states and rates, at which the series of these may overflow
 
 
@@ -172,12 +172,11 @@ class TaylorFlow:
 
     def _divides_zero(self, t: float, x: Array, params: Array, beside: Array) -> bool:
         """True if a divisor passes zero at a state where the right-hand side is about constant on either side."""
-        program, slopes = self.tape.program, self.tape.slopes
-        divisors = program[2, : self.tape.layout[4]][program[0, : self.tape.layout[4]] == QUOTIENT]
-        beside = beside * np.cos(3.0 * np.arange(x.size) + 1.0)
-        around = x[:, None] + beside[:, None] * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+        program = self.tape.program[:, : self.tape.layout[4]]
+        divisors = program[2, program[0] == QUOTIENT]
+        around = x[:, None] + np.outer(beside * np.cos(3.0 * np.arange(x.size) + 1.0), [-1.0, -0.5, 0.0, 0.5, 1.0])
         below, zero, above = evaluate(self.tape, divisors, t, around, params)[:, 1:4].T
-        rates = evaluate(self.tape, slopes, t, around, params)[:, [0, 1, 3, 4]]
+        rates = evaluate(self.tape, self.tape.slopes, t, around, params)[:, [0, 1, 3, 4]]
         with np.errstate(invalid="ignore"):  # infinite divisors
             passes = (np.abs(zero) <= _PASSES * np.abs(above - below)).any()
             return bool(passes and (np.ptp(rates, axis=1) <= _ALIKE * np.abs(rates).max(axis=1)).all())

@@ -28,6 +28,7 @@ from chilopod.flows.tracing.series import expand, loaded
 _ROUNDING = 2.0**-53
 _FIRST = 0.37  # longest first step of the second computation, relative to the interval
 _BLOCK = 64
+_TINY = 1e-10  # step, relative to the interval, at which another method goes on, unless a pulse in time makes it short
 _AT_ONCE = 1e-13
 """Smallest difference of two instants, relative to the time: an event nearer to an interval's border is on it."""
 
@@ -256,7 +257,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
     factor, work = np.empty((n, columns)), np.empty(order + 1)
     t, last, unit = t0, t0 - (t1 - t0), (t1 - t0) / 8.0
     steps, crowded, in_block, noise, status = 0, 0, 0, 1, DONE
-    at_once = _AT_ONCE * max(abs(t0), abs(t1))
+    at_once, tiny = _AT_ONCE * max(abs(t0), abs(t1)), 0.0 if tape.clocks.size else _TINY * (t1 - t0)
     if directions is not None:
         start(tape, motion, t)
         status = settle(tape, motion, unit)
@@ -276,8 +277,8 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         reached = t1 if h >= remaining else min(t + h * unit, t1)
         if crossing >= 0:
             crowded = crowded + 1 if reached - last <= at_once else 0
-        elif reached == t:
-            status = STALLED
+        elif reached - t <= tiny * min(control.patience, 1) and reached < t1:
+            status = STALLED if reached == t else BUDGET
             break
         if crowded > 2 * switches + 8:
             status = CHATTERS

@@ -28,7 +28,6 @@ from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.returns import BESIDE, return_duration, return_map, return_maps, section_at, starts
 from chilopod.stability.unit_circle.crossings import first_values
-from chilopod.stability.unit_circle.spectra import MORE
 
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which the search may not resolve a fold."""
@@ -135,7 +134,7 @@ class Samples:
     def errors(self, samples: list[Sample]) -> Array:
         """Relative errors of the derivatives at samples of a followed orbit: that of the flow and its derivative, and
         that due to the orbit's error, the flow's times the inverse of H - 1."""
-        deadline.check(MORE)  # the decompositions take long for many states
+        deadline.check(deadline.MORE)  # the decompositions take long for many states
         of_flow, units = self.of_flow, self.size / self.size[:, None]
         result = np.full(len(samples), of_flow)
         scaled = np.array([each.image.jacobian for each in samples]) * units

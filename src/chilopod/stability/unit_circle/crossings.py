@@ -95,9 +95,8 @@ def find_crossings(
     a, b, parameter, place = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget + len(known), affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
-    crossings: list[Crossing] = []
     try:
-        status, found = finder.search(np.clip(place(np.array(known)), a, b))
+        (status, found), crossings = finder.search(np.clip(place(np.array(known)), a, b)), []
     except SpentError:  # in the errors of multipliers, without which nothing is certain
         return Crossings((), SearchStatus.BUDGET, (), len(spectra.known))
     for each in found:

@@ -25,9 +25,6 @@ Matrices = Callable[[Array], tuple[Array, Array]]
 entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, for a missing matrix,
 and may be called twice for a value."""
 
-MORE = 0.3
-"""Time, s, after the limit of a search, in which errors of known matrices are still computed."""
-
 _ROUNDING = 2.0 * EPSILON
 _SMALLEST = -1e300  # logarithm of zero
 _LARGEST = 1e150  # modulus to which larger multipliers are reduced
@@ -191,10 +188,10 @@ class Spectra:
         if missing:
             self.at(np.array(missing))
             found = self._ask(missing)
-            if len(found) < sum(self.known[value] is not None for value in missing):
-                deadline.check()  # else without their errors multipliers would seem uncertain
+            # Without their errors multipliers would seem uncertain.
+            deadline.check(0.0 if len(found) < len(missing) else deadline.MORE)
             for value, matrix, error in found:
-                deadline.check(MORE)
+                deadline.check(deadline.MORE)
                 copies = disturbed(*self._with_error(matrix, error))
                 if np.isfinite(copies).all():
                     self._disturbed[value] = _eigenvalues(copies)
