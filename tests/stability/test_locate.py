@@ -218,6 +218,39 @@ def test_two_orbits_that_pass_each_other_at_a_distance(gap, side):
     assert (len(found), found.status.name) == (0, "COMPLETE")
 
 
+@pytest.mark.parametrize("between", [(-0.6, 1.3), (-0.45, 1.25), (-0.5, 1.5), (-0.15, 1.1)])
+def test_an_orbit_is_followed_through_the_points_where_another_one_crosses_it(between):
+    """The fixed points 0 and m = p(1 - p) exchange stability at p = 0 and p = 1; a long step past one of these points
+    comes down on the other one, whose multiplier has not passed +1."""
+
+    def exchanging(p):
+        m = p * (1.0 - p)
+        return from_map(lambda x: ([(1.0 + m) * x[0] - x[0] ** 2], [[1.0 + m - 2.0 * x[0]]]), 1)
+
+    for start in (0.0, between[0] * (1.0 - between[0])):
+        found = locate(exchanging, between, orbit=[start], normal_form=False)
+        assert found.complete
+        np.testing.assert_allclose([point.value for point in found], [0.0, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("mean", [0.4, 0.5, 0.6, 0.7, 0.8])
+@pytest.mark.parametrize("bend", [-1.9, -0.6, 0.6, 1.9])
+def test_an_orbit_that_sways_is_not_left_for_one_that_crosses_it(mean, bend):
+    """The orbit is sin 4p, its multiplier mean + (1.05 - mean) sin 4p."""
+
+    def swaying(p):
+        sine = np.sin(4.0 * p)
+        nu = mean + (1.05 - mean) * sine
+        return from_map(
+            lambda x: ([sine + nu * (x[0] - sine) + bend * (x[0] - sine) ** 2], [[nu + 2.0 * bend * (x[0] - sine)]]), 1
+        )
+
+    found = locate(swaying, (-1.0, 1.0), orbit=[np.sin(-4.0)], normal_form=False)
+    first = np.arcsin((1.0 - mean) / (1.05 - mean))
+    assert found.complete
+    np.testing.assert_allclose([point.value for point in found], [0.25 * first, 0.25 * (np.pi - first)], atol=1e-7)
+
+
 @pytest.mark.parametrize("high", [1.8, 2.2, 2.6, 3.0, 5.0, 8.0])
 def test_a_pitchfork_of_a_symmetry_that_is_not_declared_is_found_or_left_open(high):
     """Beyond it a long step comes down on an orbit that leaves there, whose multiplier lies within the circle again."""

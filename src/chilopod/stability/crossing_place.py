@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import SpentError
-from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import SystemLike, spatial_symmetries
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.returns import ReturnMap
@@ -80,10 +80,21 @@ class Sample(ReadOnlyArrays):
     image: ReturnMap
 
     @functools.cached_property
+    def _off(self) -> ComplexArray:
+        """Differences of the return map's multipliers from +1, without the one along the motion."""
+        return return_multipliers(self.image) - 1.0
+
+    @functools.cached_property
     def _nearest(self) -> complex:
-        """Least difference of the return map's multipliers from +1, without the one along the motion."""
-        off = return_multipliers(self.image) - 1.0
-        return complex(off[np.abs(off).argmin()]) if off.size else complex(np.inf)
+        """Least of the differences."""
+        return complex(self._off[np.abs(self._off).argmin()]) if self._off.size else complex(np.inf)
+
+    @functools.cached_property
+    def side(self) -> float:
+        """Distance of the nearest multiplier from +1, relative to it if large, with a sign that changes where a real
+        one passes +1: continuous along a branch, and opposite on another one that crosses it near by."""
+        beyond = int(((self._off.imag == 0.0) & (self._off.real > 0.0)).sum())
+        return (-1.0) ** beyond * float((np.abs(self._off) / np.maximum(np.abs(self._off + 1.0), 1.0)).min(initial=1.0))
 
     @property
     def off_plus_one(self) -> float:

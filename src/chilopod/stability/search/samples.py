@@ -2,8 +2,8 @@
 
 A followed orbit is first sampled along a path to the upper end (``_whole_path``), each sample corrected (``_sampled``)
 from a prediction (``_predicted``); later ones lie between two of them (``_between``). Newton's method may find another
-orbit near by: a sample that jumps, turns back at a multiplier +1, or is not on the branch of the last one is not taken,
-and a shorter step is tried.
+orbit near by: a sample that jumps, turns back at a multiplier +1, or has one on another side than predicted, or is not
+on the branch of the last one is not taken, and a shorter step is tried.
 """
 
 from __future__ import annotations
@@ -51,6 +51,8 @@ _BEHIND = 6  # number of samples of a prediction
 _BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
 _TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
 _TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
+_MEETING = 1e-4  # distance of a first multiplier from +1 that does not tell its side
+_CLOSE, _BRIEF = 0.2, 0.01  # distance of a first multiplier from +1 that calls for a brief step, relative to the usual
 _NEAR_MERGED = 1e-2  # gap, relative to the interval, in which a failed correction confirms that two orbits meet
 _MERGED = 1e-5  # gap, relative to the interval, below which no sample between two orbits that meet is tried
 _FOLLOWED, _LEAST_ERROR = 10.0, 1e-15  # factor on the error of the first orbit for that of others, and least error
@@ -210,11 +212,13 @@ class Samples:
         try:
             found = self._sampled(value, guess := self._predicted(around, value), around[0])
             passes = found.passes(around[0]) and found.passes(around[1])
-            if (passes and not self._goes_through(around[0], found)) or not self._continues(around[0], guess, found):
+            other = not self._on_its_side(around, guess, found) or (passes and not self._goes_through(around[0], found))
+            if other or not self._continues(around[0], guess, found):
                 raise AnalysisError("is another orbit", field="orbit")
             return found
         except AnalysisError:
-            reached = self._followed(around[:1], value, _ATTEMPTS)
+            behind = sorted((each for each in around if each.value < value), key=lambda each: each.value)
+            reached = self._followed(behind, value, _ATTEMPTS)
             for sample in reached:
                 if sample.value == value:
                     return sample
@@ -247,7 +251,11 @@ class Samples:
     def _whole_path(self) -> list[Sample]:
         """Samples of the followed orbit from the lower end, those of the first values of a search among them."""
         path = [self._by_value[self.low]]
-        for value in first_values(self.low, self.high)[1:].tolist():
+        places = first_values(self.low, self.high)[1:].tolist()
+        if _MEETING < path[0].off_plus_one < _CLOSE:
+            # The direction of the orbit tells it from another one that crosses it.
+            places = [self.low + _BRIEF * (places[0] - self.low), *places]
+        for value in places:
             reached = self._followed(path, value)
             for sample in reached:
                 self._keep(sample)
@@ -306,12 +314,16 @@ class Samples:
             if attempts == 0 or (attempts is None and self.count + len(path) - len(behind) >= self.orbits):
                 break
             attempts = None if attempts is None else attempts - 1
-            last, guess = path[-1], self._predicted(path[: -_BEHIND - 1 : -1], target)
+            last, recent = path[-1], path[: -_BEHIND - 1 : -1]
+            guess = self._predicted(recent, target)
             try:
                 found = self._sampled(target, guess, last)
                 # A large jump shows that Newton's method has found another orbit.
-                other = self.jumped(found.orbit, guess) or not self._on_same_branch(last, guess, found)
-                other = other or self._turns_back(path[-2:], found)
+                other = self.jumped(found.orbit, guess)
+                # Where this orbit ends at another one the path may go on there in the end: it is cut later.
+                if attempts is not None or target - last.value >= 2.0 * smallest:
+                    other = other or not self._on_its_side(recent, guess, found)
+                other = other or not self._on_same_branch(last, guess, found) or self._turns_back(path[-2:], found)
             except SpentError:
                 break
             except AnalysisError as error:
@@ -341,6 +353,17 @@ class Samples:
         passes = np.sign(ahead) != np.sign(rates[1])
         return bool(passes or (abs(ahead) < abs(rates[1]) < abs(rates[2])))
 
+    def _on_its_side(self, samples: list[Sample], guess: Array, found: Sample) -> bool:
+        """True if the multiplier nearest +1 is on the side predicted by samples, the first two next to the one found.
+        On a branch that crosses theirs, as at a transcritical point, it is as far on the other side."""
+        if (len(samples) == 1 and abs(samples[0].side) <= _MEETING) or abs(found.side) <= _SAME:
+            return True  # where branches meet they are not told apart
+        if (np.abs(found.orbit - guess) <= _SAME * self.size).all():
+            return True
+        places, sides = np.array([[each.value, each.side] for each in samples]).T
+        ahead = [float(through(places[:count], sides[:count], found.value)) for count in (2, 3)]
+        return max(abs(side - found.side) for side in ahead) <= abs(found.side)
+
     def _on_same_branch(self, last: Sample, guess: Array, found: Sample) -> bool:
         """True if an orbit is on the branch of the last one."""
         # Where a multiplier passes +1 another orbit may be arbitrarily near.
@@ -361,6 +384,7 @@ class Samples:
         except AnalysisError:
             return False
         connected = bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
+        connected = connected and self._on_its_side([last, found], last.orbit + 0.5 * change, middle)
         if connected and middle.value not in self._by_value:
             self._keep(middle)  # no orbit is left out of the counts
         return connected
