@@ -263,7 +263,7 @@ def test_numbers_of_any_type_become_floats_that_nobody_can_change(robot):
     assert hash(heavier) == hash(robot.with_value("body.mass", Decimal(3)))
     assert type(robot.with_value("body.modules", np.array(5)).body.modules) is int
     for value in (np.array([3.0]), [3.0, 4.0], "7", None, 3 + 0j):
-        with pytest.raises(ParameterError, match=r"body\.mass.*must be one number"):
+        with pytest.raises(ParameterError, match=r"body\.mass.*must be a number"):
             robot.with_value("body.mass", value)
     with pytest.raises(ParameterError, match=r"joint_angles.*one for each joint"):
         robot.axis_radius([0.1] * 4)

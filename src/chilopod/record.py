@@ -12,6 +12,7 @@ import numpy as np
 from chilopod import memory
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
+from chilopod.units.quantity import as_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,18 +100,6 @@ class Recording:
         # Place, heading and their rates; joints and theirs; leg yaw; forces along the floor.
         numbers = 6 + 2 * (modules - 1) + 2 + (4 * modules if self.forces else 0)
         return 8.0 * numbers * (until * self.rate + 1.0)
-
-
-def as_number(name: str, value: object) -> float:
-    """One plain number."""
-    if type(value) is float:
-        return value
-    try:
-        if np.ndim(value) != 0 or np.asarray(value).dtype.kind not in "fiuO":  # type: ignore[arg-type]
-            raise TypeError
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise ParameterError("must be a number", field=name, value=value) from None
 
 
 def in_range(name: str, value: object, most: float, unit: str = "") -> float:

@@ -504,6 +504,24 @@ def test_a_motion_passes_a_quotient_of_zeros(place):
     assert abs(found.values[0] - exact.values[0]) <= found.error_bound + exact.error_bound <= 1e-12
 
 
+@pytest.mark.parametrize("near", [1e-6, 1e-8])
+def test_a_close_encounter_is_no_quotient_of_zeros(near):
+    """Kepler's orbit comes back, however short the steps at its pericentre are: Taylor series stay."""
+
+    def rhs(t, x):
+        cubed = (x[0] ** 2 + x[1] ** 2) ** 1.5
+        return [x[2], x[3], -x[0] / cubed, -x[1] / cubed]
+
+    start = np.array([2.0 - near, 0.0, 0.0, np.sqrt(near / (2.0 - near))])
+    found, taylor = (
+        from_rhs(rhs, 4, None, guess_period=2 * pi, method=method).flow(start, 0.0, 2 * pi)
+        for method in ("automatic", "taylor")
+    )
+    np.testing.assert_array_equal(found[0], taylor[0])
+    np.testing.assert_array_equal(found[1], taylor[1])
+    np.testing.assert_allclose(found[0], start, atol=1e-6)
+
+
 def test_a_quotient_of_zeros_is_named_where_nothing_passes_it():
     """Beside an event, which the implicit method does not know; not so a pole."""
     event = Event(lambda t, x: x[0] - 5.0)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.record import LARGEST, LONGEST, Recording
-from chilopod.record import as_number as as_number  # for all engines
 from chilopod.robot import Robot
+from chilopod.units.quantity import as_number as as_number  # for all engines
 
 BEGINNING = 1e-9
 """Tolerance of a time at the beginning of a gait cycle, relative to the cycle: rounding of whole multiples of the

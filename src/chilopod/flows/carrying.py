@@ -17,7 +17,7 @@ _STEPS_IN_FAST_PART = 16
 REPEATED = 10.0
 """Factor on the difference of two computations with different steps for a bound on the error of either."""
 
-DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, JUMPS, TIME_OVER = range(9)
+DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, JUMPS, TIME_OVER, SHORT = range(10)
 """Ending of an integration."""
 
 _REASONS = {
@@ -47,7 +47,7 @@ ZERO_BY_ZERO = "the right-hand side divides 0 by 0, which rounding spoils,"
 
 def failure(status: int, t: float, cause: str = "") -> ChilopodError:
     """The error for an integration that stopped early at a time, with its cause in the right-hand side, if known."""
-    if status not in _REASONS:
+    if status == TIME_OVER:
         return deadline.over()
     reason, advice = (f"{cause} at t = {{t:g}}", None) if cause else _REASONS[status]
     kind = TooManySteps if status == BUDGET or cause == ZERO_BY_ZERO else AnalysisError

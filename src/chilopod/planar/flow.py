@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 
 _integrate = integrator(rhs)
+_AT_ONCE = 32  # most tangents without a look at the time: one of forty modules takes a second
 
 
 @lru_cache(maxsize=256)
@@ -57,7 +58,7 @@ def advance(
     max(1, |x|). Returns False if a motion diverges; a SpentError says that the time of an analysis ended.
     """
     ok = np.ones(len(states), dtype=np.bool_)
-    number = numba.get_num_threads() if len(states) > 32 else 32  # a tangent of forty modules takes a second
+    number = numba.get_num_threads() if len(states) > _AT_ONCE else _AT_ONCE
     for first in range(0, len(states), number):
         deadline.check()
         _advance(starts, widths, robot, states[first:][:number], tolerance, ok[first:][:number])

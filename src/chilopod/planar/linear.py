@@ -191,6 +191,67 @@ def _copy_rows(source: Any, target: Any, at: int, count: int) -> None:
         copy_into(target[at + i], source[i])
 
 
+@njit(inline="always")
+def _fill(block: Any, upper: Any, t: float, h: float, shift: float) -> None:
+    """h A0 + shift, h^2 A1, h^3 A2 side by side at a time in an interval; A2 acts on the velocities alone."""
+    rows, velocities, n = block.shape[0], upper.shape[0], upper.shape[2]
+    for i in range(velocities):
+        for j in range(n):
+            a1, a2 = upper[i, 1, j], upper[i, 2, j]
+            block[i, j] = h * (upper[i, 0, j] + t * (a1 + t * a2))
+            block[i, rows + j] = h * h * (a1 + 2.0 * t * a2)
+            if j < velocities:
+                block[i, 2 * rows + j] = h * h * h * a2
+        block[i, i] += shift
+    for i in range(velocities, n):
+        joint = i - velocities
+        block[i, joint + 2] = -h
+        block[i, joint + 3] = h
+        block[i, i] = shift
+
+
+@njit(inline="always")
+def _round(block: Any, state: Any, reach: Any, shift: float, rounded: float, bits: int) -> int:
+    """Add the rounding error of a step's matrix, with arbitrary signs, to the last column; return the next bits."""
+    n = reach.size
+    for i in range(n):
+        reach[i] = 0.0
+        for q in range(PANEL - 1):
+            reach[i] = max(reach[i], abs(state[i, q]))
+    for i in range(n):
+        size = reach[i]
+        for j in range(n):
+            entry = abs(block[i, j] - (shift if i == j else 0.0))
+            size += (rounded * entry + (shift if i == j else 0.0)) * reach[j]
+        bits = (bits * 1103515245 + 12345) & 0x7FFFFFFF
+        state[i, PANEL - 1] += _ROUND_OFF * (size if bits & 0x10000 else -size)
+    return bits
+
+
+@njit(inline="always")
+def _add_series(block: Any, terms: Any, state: Any) -> tuple[float, int]:
+    """Add the series of a step to the state, in place; its largest term, and the number of orders."""
+    rows = state.shape[0]
+    at = (_KEPT - 3) * rows
+    _copy_rows(state, terms, at, rows)
+    terms[at + rows :] = 0.0
+    peak, orders = 0.0, 0
+    for k in range(1, _MOST_ORDERS + 1):
+        if at == 0:
+            at = (_KEPT - 3) * rows
+            _copy_rows(terms, terms, at, 3 * rows)
+        series_term(block, terms, at, 1.0 / k, state)
+        at -= rows
+        orders += 1
+        # The recurrence uses three orders, so three small terms in a row end it.
+        if k % _CHECKED == 0:
+            size = _largest(terms[at : at + 3 * rows])
+            peak = max(peak, size)
+            if size <= TRUNCATION * _largest(state):
+                break
+    return peak, orders
+
+
 @njit
 def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: float, state: Any, stop: Any) -> Any:
     """Carry one panel of columns through all intervals, in place, unless ``stop`` is set; returns (error, orders).
@@ -199,19 +260,14 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
     result. The effect of round-off depends on the motion, so the last column is a sample of round-off instead of a
     solution: every step adds the rounding error of its matrix, with arbitrary signs, and propagates it.
     """
-    intervals, velocities = upper.shape[0], upper.shape[1]
-    n = upper.shape[3]
-    rows = state.shape[0]
-    # h A0 + shift, h^2 A1, h^3 A2 side by side; A2 acts on the velocities alone.
+    velocities, n, rows = upper.shape[1], upper.shape[3], state.shape[0]
     block = np.zeros((rows, 2 * rows + velocities))
     # Terms of the series, the newest on top, so that orders k, k-1, k-2 lie one below the other and one product serves
     # all three.
     terms = np.empty((_KEPT * rows, PANEL))
     reach = np.empty(n)
-    bits = 1
-    largest = 0.0
-    orders = 0
-    for s in range(intervals):
+    bits, largest, orders = 1, 0.0, 0
+    for s in range(upper.shape[0]):
         centred = np.hypot(0.5 * decay[s], frequency)
         rate = max(centred / _LONGEST, (centred - 0.5 * decay[s]) / _CANCELLED)
         parts = max(1, int(np.ceil(rate * widths[s])))
@@ -221,50 +277,12 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
         for part in range(parts):
             if stop[0] != 0.0:  # no more time: the caller says so
                 return np.nan, orders
-            t = part * h
-            for i in range(velocities):
-                for j in range(n):
-                    a1, a2 = upper[s, i, 1, j], upper[s, i, 2, j]
-                    block[i, j] = h * (upper[s, i, 0, j] + t * (a1 + t * a2))
-                    block[i, rows + j] = h * h * (a1 + 2.0 * t * a2)
-                    if j < velocities:
-                        block[i, 2 * rows + j] = h * h * h * a2
-                block[i, i] += shift
-            for i in range(velocities, n):
-                joint = i - velocities
-                block[i, joint + 2] = -h
-                block[i, joint + 3] = h
-                block[i, i] = shift
-            for i in range(n):
-                reach[i] = 0.0
-                for q in range(PANEL - 1):
-                    reach[i] = max(reach[i], abs(state[i, q]))
+            _fill(block, upper[s], part * h, h, shift)
             # The product with a step's length carries its rounding error; at a switch, that of the clock.
             rounded = 1.0 if part > 0 else 1.0 + clock / (_CARRIED * h)
-            for i in range(n):
-                size = reach[i]
-                for j in range(n):
-                    entry = abs(block[i, j] - (shift if i == j else 0.0))
-                    size += (rounded * entry + (shift if i == j else 0.0)) * reach[j]
-                bits = (bits * 1103515245 + 12345) & 0x7FFFFFFF
-                state[i, PANEL - 1] += _ROUND_OFF * (size if bits & 0x10000 else -size)
-            at = (_KEPT - 3) * rows
-            _copy_rows(state, terms, at, rows)
-            terms[at + rows :] = 0.0
-            peak = 0.0
-            for k in range(1, _MOST_ORDERS + 1):
-                if at == 0:
-                    at = (_KEPT - 3) * rows
-                    _copy_rows(terms, terms, at, 3 * rows)
-                series_term(block, terms, at, 1.0 / k, state)
-                at -= rows
-                orders += 1
-                # The recurrence uses three orders, so three small terms in a row end it.
-                if k % _CHECKED == 0:
-                    size = _largest(terms[at : at + 3 * rows])
-                    peak = max(peak, size)
-                    if size <= TRUNCATION * _largest(state):
-                        break
+            bits = _round(block, state, reach, shift, rounded, bits)
+            peak, count = _add_series(block, terms, state)
+            orders += count
             back = np.exp(-shift)
             for i in range(n):
                 for q in range(PANEL):

@@ -19,16 +19,16 @@ _SMALLEST: Final = 1e-12
 _LARGEST: Final = 1e9
 
 
-def _number(value: Any) -> float:
-    """A number of any type, or an array of no dimension, as a float: arrays could be changed later."""
+def as_number(name: str, value: object) -> float:
+    """One plain number of any type as a float; it is none of an array that could be changed later."""
     if type(value) is float:
         return value
     try:
-        if isinstance(value, str | bytes) or np.ndim(value):
+        if np.ndim(value) != 0 or np.asarray(value).dtype.kind not in "fiuO":  # type: ignore[arg-type]
             raise TypeError
-        return float(value)
+        return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError("must be one number, in SI units", value=value) from None
+        raise ParameterError("must be a number", field=name, value=value) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Quantity:
     def check(self, value: float, given: object = None) -> float:
         """Return `value` (SI units) as a float, an int for whole numbers, if it is in range; otherwise the error
         shows `given`, the user's text, if there is one."""
-        value = _number(value)
+        value = as_number("", value)
         if self.at_least <= value <= self.at_most and not (self.integer and value != math.floor(value)):
             return int(value) if self.integer else value
         shown = value if given is None else given
@@ -123,7 +123,7 @@ class Flag(Quantity):
 
     def check(self, value: float, given: object = None) -> bool:
         """Return whether `value` is 1; a ParameterError if it is neither that nor 0."""
-        if _number(value) not in (0, 1):
+        if not isinstance(value, bool | np.bool_) and as_number("", value) not in (0, 1):
             raise ParameterError("must be true or false", value=value if given is None else given)
         return bool(value)
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
-from chilopod.flows.carrying import NOT_FINITE, REPEATED, RESOLUTION, STALLED, ZERO_BY_ZERO, failure, pieces
+from chilopod.flows.carrying import NOT_FINITE, REPEATED, RESOLUTION, SHORT, STALLED, ZERO_BY_ZERO, failure, pieces
 from chilopod.flows.tracing.tape import COSH, EXP, LOG, POWER, QUOTIENT, SINH, SQRT, Tape
 from chilopod.flows.tracing.trace import evaluate
 from chilopod.frozen import Array
@@ -39,6 +39,7 @@ _OVERFLOWING = {EXP: "exp", SINH: "sinh", COSH: "cosh"}
 _LARGE = 300.0  # argument beyond which the series of these may overflow
 _ROOTS = {SQRT: "a root", POWER: "a power", LOG: "a logarithm"}
 _BESIDE, _PASSES, _ALIKE = 1e-6, 1e-3, 0.1  # shift past a 0 / 0, divisor there, and rates beside it, relative to them
+_SHORTEST = 1e-10  # step, relative to the interval, at which a 0 / 0 is looked for
 _ZERO = 1e-9  # argument, relative to states and rates, at which the series of these may overflow
 
 
@@ -140,16 +141,22 @@ class TaylorFlow:
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         report, steps = np.zeros(2), 0
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
-        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
+        # A pulse in time makes steps short, too.
+        shortest = _SHORTEST if self.patience and not self.tape.clocks.size else 0.0
+        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shortest, shake, stepwise, stop)
         outcome = kernels.Outcome(derivative, bound, report)
         clock = self._clock(params.tobytes())
         carry = kernels.advance_each if several else kernels.advance
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
-            status = carry(self.tape, self._directions, clock, params, x, span, control, outcome)
-            if status:
-                stuck = status in (NOT_FINITE, STALLED)
+            begin = [(each, each.copy()) for each in (x, derivative, bound)]
+            while status := carry(self.tape, self._directions, clock, params, x, span, control, outcome):
+                stuck = status in (NOT_FINITE, STALLED, SHORT)
                 cause = self._cause(report[1], x.reshape(-1, n), params, span) if stuck else ""
-                raise failure(status, report[1], cause)
+                if status != SHORT or cause == ZERO_BY_ZERO:
+                    raise failure(status, report[1], cause)
+                control = control._replace(shortest=0.0)  # a motion that is merely fast, as a close encounter
+                for each, first in begin:
+                    each[...] = first
             steps += int(report[0])
         return steps
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.flows.carrying import BUDGET, CHATTERS, DONE, GRAZES, NOT_FINITE, STALLED, TIME_OVER
+from chilopod.flows.carrying import BUDGET, CHATTERS, DONE, GRAZES, NOT_FINITE, SHORT, STALLED, TIME_OVER
 from chilopod.flows.taylor.step_length import agrees, first_exit, step_size
 from chilopod.flows.taylor.switching import Motion, await_events, cross, is_timed, settle, start
 from chilopod.flows.tracing import tape as ops
@@ -28,7 +28,6 @@ from chilopod.flows.tracing.series import expand, loaded
 _ROUNDING = 2.0**-53
 _FIRST = 0.37  # longest first step of the second computation, relative to the interval
 _BLOCK = 64
-_TINY = 1e-10  # step, relative to the interval, at which another method goes on, unless a pulse in time makes it short
 _AT_ONCE = 1e-13
 """Smallest difference of two instants, relative to the time: an event nearer to an interval's border is on it."""
 
@@ -42,6 +41,7 @@ class Control(NamedTuple):
     # number of steps after which, and at every doubling, the budget must suffice for the rest of the interval at the
     # mean length of a step so far; 0 for no such test
     patience: int
+    shortest: float  # step, relative to the interval, at which the caller decides; 0 for none
     shake: float  # relative disturbance of every state after every step, and of the time before it: enlarged round-off
     # True if every step computes its own derivative, which multiplies the derivative so far; else a step carries the
     # columns of the derivative, which may be any directions
@@ -257,7 +257,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
     factor, work = np.empty((n, columns)), np.empty(order + 1)
     t, last, unit = t0, t0 - (t1 - t0), (t1 - t0) / 8.0
     steps, crowded, in_block, noise, status = 0, 0, 0, 1, DONE
-    at_once, tiny = _AT_ONCE * max(abs(t0), abs(t1)), 0.0 if tape.clocks.size else _TINY * (t1 - t0)
+    at_once = _AT_ONCE * max(abs(t0), abs(t1))
     if directions is not None:
         start(tape, motion, t)
         status = settle(tape, motion, unit)
@@ -277,8 +277,8 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         reached = t1 if h >= remaining else min(t + h * unit, t1)
         if crossing >= 0:
             crowded = crowded + 1 if reached - last <= at_once else 0
-        elif reached - t <= tiny * min(control.patience, 1) and reached < t1:
-            status = STALLED if reached == t else BUDGET
+        elif reached - t <= control.shortest * (t1 - t0) and reached < t1:
+            status = STALLED if reached == t else SHORT
             break
         if crowded > 2 * switches + 8:
             status = CHATTERS
