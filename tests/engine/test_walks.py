@@ -344,11 +344,11 @@ def test_numbers_that_would_overflow_are_named(engine, robot):
 @BOTH
 def test_controllers_that_are_none_are_named(engine, robot):
     class Asked:
-        def __init__(self, phase=0.5, answer=None, error=None):
-            self.phase, self.answer, self.error = phase, answer, error
+        def __init__(self, phase=0.5, answer=None, error=None, window=0.1):
+            self.phase, self.answer, self.error, self.window = phase, answer, error, window
 
         def events(self, gait):
-            return [Event("now", self.phase, 0.1)]
+            return [Event("now", self.phase, self.window)]
 
         def act(self, event, seen):
             if self.error:
@@ -359,6 +359,8 @@ def test_controllers_that_are_none_are_named(engine, robot):
         (Asked(phase=1.0), "Asked.events"),
         (Asked(phase="half"), "Asked.events"),
         (Asked(phase=None), "Asked.events"),
+        (Asked(window=-1.0), "window.*0 s or more"),
+        (Asked(window=np.nan), "window.*0 s or more"),
         (Asked(answer=3), "Asked.command"),
         (Asked(answer=Command(leg_yaw=[np.nan, 0.0])), "Asked.command.leg_yaw"),
         (Asked(error=ZeroDivisionError("by\nnothing")), "ZeroDivisionError: by nothing"),

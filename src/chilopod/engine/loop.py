@@ -84,20 +84,18 @@ def _numbered(controller: Controller, gait: Gait, since: float, until: float) ->
     """Instants of :func:`event_times` with the number of each event, without the cycles that were over at ``since``
     (s), so that short advances need not count from the beginning."""
     events = _asked(controller, "events", lambda: list(islice(controller.events(gait), _MOST_EVENTS + 1)))
+    where = _of(controller, "events")
     if len(events) > _MOST_EVENTS:
-        raise ParameterError(
-            "must be fewer", field=_of(controller, "events"), allowed=f"at most {_MOST_EVENTS} in a gait cycle"
-        )
+        raise ParameterError("must be fewer", field=where, allowed=f"at most {_MOST_EVENTS} in a gait cycle")
     for event in events:
         if not isinstance(event, Event):
-            raise ParameterError("must be a chilopod.engine.Event", field=_of(controller, "events"), value=event)
-        if not 0.0 <= as_number(_of(controller, "events"), event.phase) < 1.0:
-            raise ParameterError(
-                "must be a phase of the gait cycle",
-                field=_of(controller, "events"),
-                value=event.phase,
-                allowed="0 to less than 1",
-            )
+            raise ParameterError("must be a chilopod.engine.Event", field=where, value=event)
+        if not 0.0 <= as_number(where, event.phase) < 1.0:
+            said = "must be a phase of the gait cycle"
+            raise ParameterError(said, field=where, value=event.phase, allowed="0 to less than 1")
+        if not 0.0 <= as_number(where, event.window) < math.inf:
+            said = "must have a finite window"
+            raise ParameterError(said, field=where, value=event.window, allowed="0 s or more")
     events.sort(key=lambda event: event.phase)
     first = _whole(since, gait.period)
     for cycle in range(first, math.ceil(until / gait.period) if events else first):
