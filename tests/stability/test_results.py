@@ -221,6 +221,8 @@ def test_a_table_as_text_has_the_numbers_to_the_last_bit(result, tmp_path):
         with pytest.raises(OutputError):
             result().to_csv(wrong)
     assert not wrong.parent.exists()
+    with pytest.raises(ParameterError, match="must be a path"):
+        result().to_csv(5)
 
 
 def test_special_points_are_marked_in_tables():

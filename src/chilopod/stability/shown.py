@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chilopod.errors import OutputError
+from chilopod.errors import OutputError, ParameterError
 from chilopod.labels import Labelled
 from chilopod.notebook import Shown as Shown
 from chilopod.notebook import aligned, picture
@@ -84,6 +84,8 @@ class Result(Shown):
                 table |= {f"{name}[{i}]": values for i, values in enumerate(each.values.T.tolist())}
         csv.writer(text, lineterminator="\n").writerows([list(table), *zip(*table.values(), strict=True)])
         if path is not None:
+            if not isinstance(path, str | Path):
+                raise ParameterError("must be a path", field="path", value=path, allowed="text or a pathlib.Path")
             if not Path(path).absolute().parent.is_dir():
                 raise OutputError("has no folder", source=str(path), allowed="a file in an existing folder")
             write_atomic(path, text.getvalue())

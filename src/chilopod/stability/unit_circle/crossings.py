@@ -53,7 +53,7 @@ class SearchStatus(Labelled):
     """End of a search; each member's ``sentence`` says it in words."""
 
     COMPLETE = "complete", "the counts at both ends and between all points add up"
-    CONSERVATIVE = "conservative", "multipliers lie on the circle throughout; where they meet and leave it is listed"
+    CONSERVATIVE = "conservative", "multipliers come in pairs with product 1; where pairs leave the circle is listed"
     INCOMPLETE = "incomplete", "not everything is accounted for; the remarks say what and where"
     BUDGET = "budget", "the budget was spent; what was found until then is listed"
 
