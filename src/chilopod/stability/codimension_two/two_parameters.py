@@ -268,18 +268,17 @@ class _Unfolding:
         # For a point on the edge of the box the other side is used.
         curve.box = box + 2.0 * _FARTHEST * curve.widths[:, None] * [-1.0, 1.0]
         self.spot = spot = curve.begin(Place(point.orbit, point.values, 0.0), point.period)
-        detector = Detector(curve, kind, True)
-        here = Critical(target, spot)
-        beside = [Critical(target, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
-        low, high = forms = [detector.form(each) for each in beside]
+        here = Critical(curve, spot)
+        beside = [Critical(curve, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
+        low, high = (each.form for each in beside)
         if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
             raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
-        fifth = detector.fifth(here, detector.form(here), *forms)
+        fifth = here.fifth(*beside)
         if fifth is None:
             raise AnalysisError("no coefficient of fifth order was found", field="point")
         if abs(fifth.coefficient) <= fifth.error:
             raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
-        self.at, self.fifth = detector.sampled(here)[1], fifth
+        self.at, self.fifth = here.orbit, fifth
         returns = spot.image.returns
         self._times = returns if target > 0 or returns % 2 == 0 else 2 * returns  # in the map of the coefficients
         self._slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)  # by the length of ``spot.tangent``
@@ -329,7 +328,7 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         if off <= _NEAR and missed <= _NEAR * way and inside.all():
             outward = np.concatenate([place.state - origin.state, place.values - origin.values])
             value, bound, state = float(values[0]), float(across(found)[0]), found.place.state
-            mode, period = Critical(1, found).mode, found.image.period
+            mode, period = Critical(folds, found).mode, found.image.period
             fold = BifurcationPoint(Kind.FOLD, value, bound, state, mode, 1.0 + 0j, 0.0, period=period)
             return Start2(fold, float(values[1]), outward, periods)
     raise AnalysisError("no curve of folds was found where one is predicted to leave", field="point") from cause
