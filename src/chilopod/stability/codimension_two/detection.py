@@ -1,5 +1,11 @@
 """Detection of points of codimension two along a curve, as zeros of test functions.
 
+A test function measures one condition beside that of the curve: that the coefficient of the normal form vanishes, that
+the critical multipliers are in resonance, or that other multipliers are on the unit circle. :class:`Critical` separates
+the critical multipliers at a place from the others. The :class:`Detector` measures all test functions at every point of
+the curve, a :class:`Station`. Where one changes its sign over a step, it finds the zero on corrected parts of the step,
+discards a pole or one without a useful error bound, and names the point from the multipliers beside it.
+
 Test functions after Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.1 and 10.3, and Kuznetsov and
 Meijer, SIAM J. Sci. Comput. 26, 2005.
 """
@@ -47,7 +53,7 @@ _COSINES = {
     CodimensionTwo.RESONANCE_1_3: -0.5,
     CodimensionTwo.RESONANCE_1_4: 0.0,
 }
-_DOUBLE = {1: CodimensionTwo.RESONANCE_1_1, -1: CodimensionTwo.RESONANCE_1_2}
+"""Cosine of the angle of the critical multipliers at a resonance."""
 
 Signal = CodimensionTwo | CircleEvent
 """A test function: of the critical multipliers by the kind of its zeros, of the other ones by their event there."""
@@ -103,15 +109,15 @@ class Critical:
     @functools.cached_property
     def orbit(self) -> CriticalOrbit:
         """The orbit, as normal forms take it."""
-        image = self.at.image
+        place, image = self.at.place, self.at.image
         image = image if np.isfinite(image.error).all() else replace(image, error=0.0)
-        return CriticalOrbit(self.at.place.state, image, self.multiplier, self.mode, self.left)
+        return CriticalOrbit(place.state, image, self.multiplier, self.mode, self.left)
 
     @functools.cached_property
     def form(self) -> NormalForm:
         """The normal form."""
         at, orbit_error = self.at, 0.0
-        if isinstance(at, Spot):
+        if isinstance(at, Spot):  # whose errors are known
             state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
             orbit_error = float(np.abs(self.left) @ state)
         return normal_form(self._returned, self.orbit, scale=at.frame.size, orbit_error=orbit_error)
@@ -140,7 +146,7 @@ class Detector:
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
         self._curve, self._kind, self._coefficients = curve, kind, coefficients
         self._degenerate = DEGENERATE.get(kind) if coefficients else None
-        resonances = (_DOUBLE[curve.target],) if curve.target else _COSINES
+        resonances = [each for each, cosine in _COSINES.items() if curve.target in (0, cosine)]
         self._signals: list[Signal] = [*filter(None, [self._degenerate]), *resonances, *CircleEvent]
 
     def station(self, spot: Spot) -> Station:
@@ -160,8 +166,7 @@ class Detector:
             # A function that vanishes along the whole curve changes its sign as well.
             if changes and (abs(one) > _RESOLVED * one_error or abs(other) > _RESOLVED * other_error):
                 found.append(self._located(signal, parts))
-        known = sorted((each for each in found if each is not None), key=lambda each: each[0])
-        return [(spot, point) for _, spot, point in known]
+        return [each[1:] for each in sorted(filter(None, found), key=lambda each: each[0])]
 
     def _measured(self, signal: Signal, here: Critical) -> tuple[float, float]:
         """A test function and its error, which needs an image with error bounds, and errors of the coordinates."""
@@ -170,9 +175,9 @@ class Detector:
             # A fold's coefficient is positive for one sign of its mode, and has a pole where the multiplier is double.
             value, error = self._decisive(here)
             return value * here.overlap, error * abs(here.overlap)
-        if isinstance(signal, CodimensionTwo) and self._curve.target:
-            return here.overlap, 2.0 * at.reach * float(np.linalg.norm(at.error))
         if isinstance(signal, CodimensionTwo):
+            if self._curve.target:
+                return here.overlap, 2.0 * at.reach * float(np.linalg.norm(at.error))
             return at.place.cosine - _COSINES[signal], float(at.shift[-1]) if isinstance(at, Spot) else 0.0
         nu, errors = here.spectrum.values[here.others], here.spectrum.error[here.others]
         if signal is CircleEvent.PAIR:

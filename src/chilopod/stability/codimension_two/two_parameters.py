@@ -279,8 +279,6 @@ class _Unfolding:
         if abs(fifth.coefficient) <= fifth.error:
             raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
         self.at, self.fifth = here.orbit, fifth
-        returns = spot.image.returns
-        self._times = returns if target > 0 or returns % 2 == 0 else 2 * returns  # in the map of the coefficients
         self._slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)  # by the length of ``spot.tangent``
         self._response = _across(spot, target)
 
@@ -288,7 +286,7 @@ class _Unfolding:
         """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
         spot, fifth = self.spot, self.fifth
         away = -2.0 * fifth.coefficient * a * a / self._slope
-        across = fifth.coefficient * a**4 / self._times
+        across = fifth.coefficient * a**4 / self.at.times
         if not (abs(away) <= _FARTHEST and np.abs(across * self._response).max() <= _FARTHEST):
             return None
         base = self._equations.along(spot, away)

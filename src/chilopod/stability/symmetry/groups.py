@@ -106,7 +106,7 @@ def centraliser(group: Group, gamma: Array) -> Group:
     own = _scaled(group.elements, group.scales)
     left, right = matrix @ own, own @ matrix
     size = np.abs(matrix).max()
-    if size == 0.0 or np.linalg.matrix_rank(matrix) < group.dimension:
+    if np.linalg.matrix_rank(matrix) < group.dimension:
         raise ParameterError("is not invertible", field="symmetry")
     for image in matrix @ _scaled(group.generators, group.scales):  # which is P gamma for some element P
         if not np.abs(right - image).max(axis=(1, 2)).min() <= _SAME * size:
@@ -211,21 +211,14 @@ class Images:
         self._weights: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES)) / dimension
         self._cells: dict[int, list[Array]] = {}
 
-    def known(self, image: Array) -> bool:
-        """True if an image is in the set."""
-        cell = self._cell(image)
-        near = (each for beside in (cell, cell - 1, cell + 1) for each in self._cells.get(beside, ()))
-        return any(np.abs(each - image).max() < _SAME for each in near)
-
     def new(self, image: Array) -> bool:
         """True if an image was not in the set, to which it is added."""
-        if self.known(image):
+        cell = math.floor(float(np.vdot(self._weights, image)) / _CELL)
+        near = (each for beside in (cell, cell - 1, cell + 1) for each in self._cells.get(beside, ()))
+        if any(np.abs(each - image).max() < _SAME for each in near):
             return False
-        self._cells.setdefault(self._cell(image), []).append(image)
+        self._cells.setdefault(cell, []).append(image)
         return True
-
-    def _cell(self, image: Array) -> int:
-        return math.floor(float(np.vdot(self._weights, image)) / _CELL)
 
 
 def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Array] | None:
@@ -234,7 +227,7 @@ def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Arr
     images, elements = Images(n), [np.eye(n)]
     images.new(images.probes)
     for generator in generators:
-        if images.known(_scaled(generator, scales) @ images.probes):
+        if not images.new(_scaled(generator, scales) @ images.probes):
             continue
         needed = np.concatenate([needed, generator[None]])  # and the order at least doubles
         images, elements = Images(n), [np.eye(n)]

@@ -279,7 +279,7 @@ def _fixed_lines(rho: Array, critical: CircleEvent) -> tuple[list[Array], bool]:
     def take(projector: Array) -> None:
         """Note a space, unless it or a conjugate one is known."""
         size = round(float(np.trace(projector)))
-        if size == 0 or seen.known(projector @ seen.probes):
+        if size == 0 or not seen.new(projector @ seen.probes):
             return
         for image in rho @ projector @ np.swapaxes(rho, 1, 2) @ seen.probes:
             seen.new(image)
