@@ -91,7 +91,7 @@ def follow2(
     outward, periods = None, 1
     if isinstance(start, Start2):
         outward, periods, second = start.outward, start.periods, start.second
-        family2, start = over_periods(family2, periods), start.point
+        family2, start = _over_periods(family2, periods), start.point
     if not isinstance(start, BifurcationPoint):
         allowed = "a BifurcationPoint from `locate`, or a start from `switch2`"
         raise ParameterError("must be a located point", field="start", value=in_one_line(start), allowed=allowed)
@@ -100,7 +100,7 @@ def follow2(
     values = np.array([start.value, finite_array(second, (), "second")], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
         raise ParameterError("must hold the start", field="between", value=between, allowed=f"around {values}")
-    target, known = _what(family2, start, second)
+    target, known = _target(family2, start, second)
     curve = CriticalCurve(family2, target, known, box, Budget(budget, seconds))
     nu = complex(start.multiplier)
     with curve.budget:
@@ -127,13 +127,13 @@ def follow2(
     return Curve2(start.kind, found, endings, (before.reason, after.reason), periods)
 
 
-def over_periods(family2: Family2, periods: int) -> Family2:
+def _over_periods(family2: Family2, periods: int) -> Family2:
     """Systems for orbits over several periods, or without their symmetry in time."""
     return lambda p, q: whole_period(family2(p, q), periods)
 
 
-def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
-    """The critical multiplier, 0 for a pair, and True if the orbit is known."""
+def _target(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
+    """The target of the curve, a critical multiplier +1 or -1, or 0 for a pair; and True if the orbit is known."""
     system = system_of(family2, start.value, second)
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
@@ -249,9 +249,8 @@ def switch2(
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     check_arguments(family2=family2, budget=budget)
     allowed = Budget(budget, seconds)
-    periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
-    folds = CriticalCurve(over_periods(family2, periods), 1, False, box, allowed)
-    signs = (1.0,) if kind is Kind.PERIOD_DOUBLING else (1.0, -1.0)
+    periods, signs = (2, (1.0,)) if kind is Kind.PERIOD_DOUBLING else (1, (1.0, -1.0))
+    folds = CriticalCurve(_over_periods(family2, periods), 1, False, box, allowed)
     with allowed:
         there = _Unfolding(family2, point, kind, box, allowed)
         return tuple(_start(there, folds, sign, periods) for sign in signs)
@@ -280,7 +279,7 @@ class _Unfolding:
             raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
         self.at, self.fifth = here.orbit, fifth
         self._slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)  # by the length of ``spot.tangent``
-        self._response = _across(spot, target)
+        self._response = _response(spot, target)
 
     def fold(self, a: float) -> Place | None:
         """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
@@ -295,7 +294,7 @@ class _Unfolding:
         return Place(place.state + bent, place.values, 0.0)
 
 
-def _across(spot: Spot, target: int) -> Array:
+def _response(spot: Spot, target: int) -> Array:
     """Change of orbit and parameters with the multiplier's modulus; g changes by -(w . v) times the multiplier's."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.left[:, 0] @ spot.right[:, 0])

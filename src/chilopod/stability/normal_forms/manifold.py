@@ -62,6 +62,12 @@ class CriticalOrbit(ReadOnlyArrays):
         """True for a real multiplier."""
         return self.multiplier.imag == 0.0
 
+    @property
+    def times(self) -> int:
+        """Number of returns in the map of the coefficients: a full period, or two for a multiplier -1 after one."""
+        k = self.image.returns
+        return 2 * k if self.multiplier == -1.0 and k % 2 else k
+
     def turns(self) -> ComplexArray:
         """Sampled directions of z: +-1 for a real one, else a circle."""
         count = 2 if self.real else _ANGLES
@@ -74,12 +80,6 @@ class CriticalOrbit(ReadOnlyArrays):
             twice = 1.0 if self.real or i == j else 2.0
             total += twice * ((z**i * z.conj() ** j)[..., None] * coefficient).real
         return total
-
-    @property
-    def times(self) -> int:
-        """Number of returns in the map of the coefficients: a full period, or two for a multiplier -1 after one."""
-        k = self.image.returns
-        return 2 * k if self.multiplier == -1.0 and k % 2 else k
 
 
 @dataclass(frozen=True)
@@ -121,9 +121,8 @@ class Manifold:
             nu = at.multiplier.real
             self._resonant = {(k, 0): nu**k == nu for k in range(2, order)}
         else:
-            self._resonant = {(2, 0): False, (1, 1): False}
-            if order == 5:  # z^4 does not reach z^3 conj(z)^2
-                self._resonant |= {(3, 0): False, (2, 1): True, (3, 1): False, (2, 2): False}
+            monomials = [(total - j, j) for total in range(2, order) for j in range(total // 2 + 1)]
+            self._resonant = {(i, j): i == j + 1 for i, j in monomials if i < 4}  # z^4 does not reach z^3 conj(z)^2
         nothing = np.zeros(at.state.size, dtype=np.complex128)
         self.curve: dict[Powers, ComplexArray] = {(1, 0): at.right.astype(np.complex128)}
         self.curve |= dict.fromkeys(self._resonant, nothing)
