@@ -215,22 +215,21 @@ class Detector:
             value, error = 0.0, max(test(root - beside)[1], test(root + beside)[1])
         if not unsure and abs(value) > _POLE * max(abs(test(0.0)[0]), abs(test(length)[0])):
             return None
-        along = _along(test, parts, root, beside, abs(value) + error + unsure)
+        wrong = _SAFETY * (abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
-        bound = off + along + 4.0 * EPSILON * np.abs(spot.values)
+        bound = off + _along(test, parts, root, beside, wrong) + 4.0 * EPSILON * np.abs(spot.values)
         if not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
             return None
+        there = Critical(curve, parts.at(root + beside).found)
+        kind = self._named(signal, spot, here, there)
         low, high = test(root - beside)[0], test(root + beside)[0]
         # A pole grows towards the place, also where it hides the value there; an end may be nearer than these.
         ends = [abs(test(end)[0]) for end in (0.0, length) if abs(end - root) > beside]
-        there = Critical(curve, parts.at(root + beside).found)
-        kind = self._named(signal, spot, here, there)
         if kind is None or max(abs(low), abs(high)) > _JUMP * max(ends):
             return None
         point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
         if signal is self._degenerate:
-            slope = abs(high - low) / 2.0
-            point = self._with_next_term(point, here, there, _SAFETY * (abs(value) + error + unsure) / slope)
+            point = self._with_next_term(point, here, there, wrong / (abs(high - low) / 2.0))
         return root, spot, point
 
     def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
@@ -311,13 +310,13 @@ def across(spot: Spot) -> Array:
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))
 
 
-def _along(test: Test, parts: _Parts, root: float, h: float, error: float) -> Array:
-    """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
+def _along(test: Test, parts: _Parts, root: float, h: float, wrong: float) -> Array:
+    """Changes of both parameters, shape (2,), along the curve over the error ``wrong`` of a test function."""
     with contextlib.suppress(AnalysisError):
         slope = abs(test(root + h)[0] - test(root - h)[0]) / (2.0 * h)
         low, middle, high = (parts.at(root + s).found.place.values for s in (-h, 0.0, h))
         if slope > 0.0:
-            off = _SAFETY * error / slope
+            off = wrong / slope
             first, second = np.abs(high - low) / (2.0 * h), np.abs(high - 2.0 * middle + low) / (h * h)
             return np.asarray(first * off + 0.5 * second * off * off)
     return np.full(2, np.inf)

@@ -1,9 +1,12 @@
 """Finite groups of matrices: the spatial symmetries P f(t, x) = f(t, P x) of a system.
 
+:func:`finite_group` finds scales of the coordinates in which all powers of the generators have entries of order one,
+then all products, and last coordinates in which every element is orthogonal: the mean of P^T P over the group is a
+metric in which it is (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer
+1988, proposition XII.1.3).
+
 An orbit that is invariant under a group, P x(t) = x(t), has a return map whose derivative commutes with every P of it;
-:mod:`.isotypic` splits it into blocks. The matrices need not be orthogonal: the mean of P^T P over the
-group is a metric in which they are (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II,
-Springer 1988, proposition XII.1.3).
+:func:`isotropy` and :func:`centraliser` find such a subgroup, and :mod:`.isotypic` splits the derivative into blocks.
 """
 
 from __future__ import annotations
