@@ -144,14 +144,14 @@ class Detector:
     """Test functions along a curve of bifurcations, with that of the normal form if ``coefficients``."""
 
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
-        self._curve, self._kind, self._coefficients = curve, kind, coefficients
+        self.curve, self._kind, self._coefficients = curve, kind, coefficients
         self._degenerate = DEGENERATE.get(kind) if coefficients else None
         resonances = [each for each, cosine in _COSINES.items() if curve.target in (0, cosine)]
         self._signals: list[Signal] = [*filter(None, [self._degenerate]), *resonances, *CircleEvent]
 
     def station(self, spot: Spot) -> Station:
         """The point at a spot, and the test functions."""
-        here = Critical(self._curve, spot)
+        here = Critical(self.curve, spot)
         signals = {signal: self._measured(signal, here) for signal in self._signals}
         bound = across(spot) + 4.0 * EPSILON * np.abs(spot.values)
         coefficient = self._decisive(here) if self._coefficients else (np.nan, np.nan)
@@ -159,7 +159,7 @@ class Detector:
 
     def events(self, step: Step[Spot, Evaluated], before: Signals, after: Signals) -> list[tuple[Spot, SpecialPoint2]]:
         """Points of codimension two within a step, in order."""
-        parts, found = Parts(self._curve, step), []
+        parts, found = Parts(self.curve, step), []
         for signal in self._signals:
             (one, one_error), (other, other_error) = before[signal], after[signal]
             changes = one * other < 0.0 or (other == 0.0 and one != 0.0)
@@ -176,7 +176,7 @@ class Detector:
             value, error = self._decisive(here)
             return value * here.overlap, error * abs(here.overlap)
         if isinstance(signal, CodimensionTwo):
-            if self._curve.target:
+            if self.curve.target:
                 return here.overlap, 2.0 * at.reach * float(np.linalg.norm(at.error))
             return at.place.cosine - _COSINES[signal], float(at.shift[-1]) if isinstance(at, Spot) else 0.0
         nu, errors = here.spectrum.values[here.others], here.spectrum.error[here.others]
@@ -198,7 +198,7 @@ class Detector:
 
     def _located(self, signal: Signal, parts: _Parts) -> tuple[float, Spot, SpecialPoint2] | None:
         """Point where a test function vanishes within a step, with its distance along the step."""
-        curve, start, length = self._curve, parts.step.start, parts.step.size
+        curve, start, length = self.curve, parts.step.start, parts.step.size
 
         @functools.cache
         def test(place: float) -> tuple[float, float]:
@@ -257,7 +257,7 @@ class Detector:
                 return None
             return together(self._kind, Kind.NEIMARK_SACKER)
         sign = TARGETS[signal]
-        if sign == self._curve.target and abs(here.overlap) < _OVERLAP:
+        if sign == self.curve.target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier
         # At the point itself the modes of two equal multipliers are any combinations of both.
         nearest = int(np.abs(there.spectrum.values[there.others] - sign).argmin())
@@ -266,7 +266,7 @@ class Detector:
             return together(self._kind, Kind.PITCHFORK)
         if sign < 0:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
-        meets = self._curve.known or np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING
+        meets = self.curve.known or np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING
         return together(self._kind, Kind.BRANCH_POINT if meets else Kind.FOLD)
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -116,13 +116,11 @@ def follow2(
             ahead = float(first.frame.between(first.place, beside) @ first.tangent)
         else:
             ahead = float(first.tangent[first.frame.parameters][1]) * (-1.0 if rising is False else 1.0)
-        after, before = (_Half(curve, detector, origin, progress) for _ in range(2))
-        steps = min(step, longest), longest
-        after.trace(first.towards(math.copysign(1.0, ahead)), steps, points)
-        if after.ending is Ending.CLOSED:
-            before.ending = Ending.CLOSED
-        elif outward is None and rising is None:
-            before.trace(first.towards(math.copysign(1.0, -ahead)), steps, points)
+        steps, sign = (min(step, longest), longest), math.copysign(1.0, ahead)
+        after = _followed(detector, origin._replace(spot=first.towards(sign)), steps, points, progress)
+        before = _Half([], Ending.CLOSED if after.ending is Ending.CLOSED else Ending.START)
+        if after.ending is not Ending.CLOSED and outward is None and rising is None:
+            before = _followed(detector, origin._replace(spot=first.towards(-sign)), steps, points, progress)
     found, endings = (*reversed(before.points), origin.point, *after.points), (before.ending, after.ending)
     return Curve2(start.kind, found, endings, (before.reason, after.reason), periods)
 
@@ -156,50 +154,51 @@ _Looked = tuple[Station | None, list[SpecialPoint2]]
 """The station at the end of a step, if any, and the events within the step."""
 
 
-@dataclass
-class _Half:
-    """Results of the tracer in one direction, without the start."""
+class _Half(NamedTuple):
+    """A curve in one direction, without its start."""
 
-    curve: CriticalCurve
-    detector: Detector
-    last: Station
-    progress: Progress2
-    points: list[Point2] = field(default_factory=list)
-    ending: Ending = Ending.START
+    points: list[Point2]
+    ending: Ending
     reason: str = ""
 
-    def trace(self, spot: Spot, steps: tuple[float, float], points: int | None) -> None:
-        """Follow the curve from its first point, towards its tangent."""
-        self.curve.first = spot
-        self.last = self.last._replace(spot=spot)
-        self.ending, self.reason, _ = trace(self.curve, spot, steps, points, self.look, self.keep)
-        if self.ending is Ending.LOST:
-            end, evaluated = self.last.spot, self.curve.evaluated
 
-            def derivative(distance: float) -> Array:
-                return evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
+def _followed(
+    detector: Detector, origin: Station, steps: tuple[float, float], points: int | None, progress: Progress2
+) -> _Half:
+    """The curve from its first point, towards the tangent there."""
+    curve, last = detector.curve, origin
+    curve.first = origin.spot
+    kept: list[Point2] = []
 
-            about = self.curve.system(end.values), end.place.state, end.image.duration
-            self.reason = event_beside(*about, derivative) or self.reason
-
-    def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
+    def look(step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
-        station, special = self.detector.station(step.end), []
-        for spot, point in self.detector.events(step, self.last.signals, station.signals):
+        station, special = detector.station(step.end), []
+        for spot, point in detector.events(step, last.signals, station.signals):
             special.append(point)
-            if self.curve.target == 0 and point.kind in _MEETINGS:
-                return (self.detector.station(spot), special), Ending.RESONANCE
+            if curve.target == 0 and point.kind in _MEETINGS:
+                return (detector.station(spot), special), Ending.RESONANCE
         return (None if ending is Ending.CLOSED else station, special), ending
 
-    def keep(self, found: _Looked, count: int) -> None:
-        """Keep a step with its events."""
+    def keep(found: _Looked, count: int) -> None:
+        nonlocal last
         station, special = found
-        self.points += special
+        kept.extend(special)
         if station is not None:
-            self.points.append(station.point)
-            self.last = station
+            kept.append(station.point)
+            last = station
             with UserCode("progress"):
-                self.progress(count, station.point)
+                progress(count, station.point)
+
+    ending, reason, _ = trace(curve, origin.spot, steps, points, look, keep)
+    if ending is Ending.LOST:
+        end = last.spot
+
+        def derivative(distance: float) -> Array:
+            return curve.evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
+
+        about = curve.system(end.values), end.place.state, end.image.duration
+        reason = event_beside(*about, derivative) or reason
+    return _Half(kept, ending, reason)
 
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
