@@ -22,7 +22,7 @@ from chilopod.flows.arguments import UserCode, check_arguments, checked_box, fin
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
-from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
+from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
@@ -206,7 +206,6 @@ _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
 _HALVINGS = 12  # halvings of the amplitude
 _NEAR = 0.25  # largest error of a predicted fold, relative to the amplitude and its distance from the point
 
-_CURVES = {DEGENERATE[kind]: kind for kind in (Kind.PERIOD_DOUBLING, Kind.PITCHFORK)}
 _OTHERS = {
     CodimensionTwo.CUSP: "is a cusp: the curve of folds itself goes through it",
     CodimensionTwo.CHENCINER: "is a Chenciner point: folds of tori leave it, which cannot be followed",
@@ -242,25 +241,26 @@ def switch2(
     if not isinstance(point, SpecialPoint2):
         said, allowed = "must be a point of codimension two", "one of the `special` points of a curve from `follow2`"
         raise ParameterError(said, field="point", value=point, allowed=allowed)
-    kind = _CURVES.get(point.kind)
-    if kind is None:
+    flips = point.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
+    if not flips and point.kind is not CodimensionTwo.DEGENERATE_PITCHFORK:
         why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, from which no curve can be followed")
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     check_arguments(family2=family2, budget=budget)
     allowed = Budget(budget, seconds)
-    periods, signs = (2, (1.0,)) if kind is Kind.PERIOD_DOUBLING else (1, (1.0, -1.0))
+    periods, signs = (2, (1.0,)) if flips else (1, (1.0, -1.0))
     folds = CriticalCurve(_over_periods(family2, periods), 1, False, box, allowed)
     with allowed:
-        there = _Unfolding(family2, point, kind, box, allowed)
+        there = _Unfolding(family2, point, box, allowed)
         return tuple(_start(there, folds, sign, periods) for sign in signs)
 
 
 class _Unfolding:
     """Unfolding of a degenerate point on a curve: terms of fifth order, and changes of coefficient and multiplier."""
 
-    def __init__(self, family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, budget: Budget) -> None:
+    def __init__(self, family2: Family2, point: SpecialPoint2, box: Array, budget: Budget) -> None:
         system = system_of(family2, *point.values.tolist())
-        targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
+        flips = point.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
+        targets = (-1,) if flips else (1,) if system.symmetry is None else (1, -1)
         target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
         self._equations = curve = CriticalCurve(family2, target, offers(system, "orbit"), box, budget)
         # For a point on the edge of the box the other side is used.
@@ -284,11 +284,11 @@ class _Unfolding:
         """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
         spot, fifth = self.spot, self.fifth
         away = -2.0 * fifth.coefficient * a * a / self._slope
-        across = fifth.coefficient * a**4 / self.at.times
-        if not (abs(away) <= _FARTHEST and np.abs(across * self._response).max() <= _FARTHEST):
+        aside = fifth.coefficient * a**4 / self.at.times * self._response
+        if not (abs(away) <= _FARTHEST and np.abs(aside).max() <= _FARTHEST):
             return None
         base = self._equations.along(spot, away)
-        place = spot.frame.moved(base.place, across * self._response)
+        place = spot.frame.moved(base.place, aside)
         bent = self.at.displacements(fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
 

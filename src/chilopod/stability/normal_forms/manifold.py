@@ -93,7 +93,7 @@ class Sampled:
     falling: bool  # True if the series still fall at their end, unlike noise
     size: Array  # largest distance of every state from x, on the curve or its image, shape (n,)
     radius: float  # largest |z|
-    outermost: ComplexArray  # harmonics of the projection at the largest of the radii, shape (angles,)
+    outermost: complex  # first harmonic of the projection at the largest of the radii
 
     def taylor(self, powers: Powers) -> tuple[ComplexArray, Array]:
         """Coefficient of a monomial in H(W(z)), and its error: shape (n + 1,)."""
@@ -160,7 +160,7 @@ class Manifold:
         shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII.size - 2))) if seen[-1] > 0.0 else 1.0
         falling = any(one.falling[-1] for one in found)
         noise = np.maximum(floor, seen)
-        return Sampled(found, noise, float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1])
+        return Sampled(found, noise, float(blur[-1]), shrink, falling, size, radius, harmonics[0, 1, -1])
 
     def bend(self, found: Sampled) -> bool:
         """Improve the manifold from samples on it; return True if it changed measurably."""
@@ -201,7 +201,7 @@ class Manifold:
         if image is None:
             return value, np.inf
         harmonics = np.fft.fft(image @ at.left.conj())[:, 1] / directions.size
-        moved = np.abs(harmonics - found.outermost[1]) / (np.array(factors) * largest ** sum(powers))
+        moved = np.abs(harmonics - found.outermost) / (np.array(factors) * largest ** sum(powers))
         return value, error + _SURE * float(moved.max())
 
     def _bend_by(self, powers: Powers, excess: NDArray[np.inexact]) -> ComplexArray:

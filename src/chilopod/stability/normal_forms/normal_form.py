@@ -303,14 +303,15 @@ def quintic(mapped: StateMap, at: CriticalOrbit, amplitude: float) -> Quintic | 
         while worse < _WORSE and tries < _TRIES:
             manifold.curve = dict(curve)
             with np.errstate(all="ignore"):
-                found = _measured(manifold, radius * factor**tries)
+                found = _fifth_at(manifold, radius * factor**tries)
             tries, worse = tries + 1, worse + 1
             if found is not None and (best is None or found.error < best.error):
                 best, curve, worse = found, found.curve, 0
     return best
 
 
-def _measured(manifold: Manifold, radius: float) -> Quintic | None:
+def _fifth_at(manifold: Manifold, radius: float) -> Quintic | None:
+    """The coefficient of fifth order from samples up to a radius; None if the map is undefined there."""
     found, bends = manifold.sample(radius), 0
     while found is not None and bends < _QUINTIC_BENDS and manifold.bend(found):
         found, bends = manifold.sample(radius), bends + 1

@@ -81,9 +81,9 @@ def finite_group(generators: ArrayLike) -> Group:
         allowed = f"1 to {_MOST_GENERATORS} real and finite ones of shape (n, n)"
         raise ParameterError("must be square matrices", field="generators", value=generators, allowed=allowed)
     most = max(1, min(_LARGEST_ORDER, _MOST_ENTRIES // n**2))
-    returns = [_powers(matrix, most) for matrix in given]
-    scales = _coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
-    for matrix, (_, residual) in zip(given, returns, strict=True):
+    envelopes, residuals = zip(*(_powers(matrix, most) for matrix in given), strict=True)
+    scales = _coordinate_scales(np.asarray(np.max(envelopes, axis=0)))
+    for matrix, residual in zip(given, residuals, strict=True):
         if np.abs(_scaled(residual, scales)).max() > _SAME:
             raise _infinite(matrix, most)
     found = _closure(given, scales, most)
