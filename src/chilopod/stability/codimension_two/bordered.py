@@ -1,6 +1,6 @@
 """The equations of a curve of critical periodic orbits in two parameters.
 
-Unknowns are the state x, the two parameters and, for a critical pair of multipliers, its cosine kappa = cos theta: a
+Unknowns are the state x, both parameters and, for a critical pair of multipliers, its cosine kappa = cos theta: a
 :class:`Place`. The equations are H(x) = x for the return map H and, for a multiplier nu = +1 or -1, g = 0 with g from
 
     [[H' - nu, b], [c^T, 0]] (v, g) = (0, 1),
@@ -10,12 +10,11 @@ of Dynamical Equilibria*, SIAM 2000, ch. 4). For a pair, H'^2 - 2 kappa H' + 1 i
 of shape (2, 2) (ch. 5; Kuznetsov, *Elements of Applied Bifurcation Theory*, section 10.3). On the critical plane
 H'^2 - 2 kappa H' + 1 = (trace - 2 kappa) H' + (1 - det), so G has only two independent entries, and these two factors
 are the equations: regular also where the pair meets at +1 or -1. If the systems know their orbit, x is not an unknown;
-if the orbit has a spatial symmetry, x varies among the states with that symmetry. H - 1 is then regular also on a curve
-of pitchforks.
+if the orbit has a spatial symmetry, x varies among the states with it, and H - 1 is regular also at a pitchfork.
 
-A :class:`Frame` has the units of the unknowns and the borders b and c. They come from the point before, so that g is
-smooth within a step. A :class:`CriticalCurve` evaluates the equations in a frame (:class:`Evaluated`), and makes points
-of the curve, each with a frame of its own and a tangent (:class:`Spot`), from which the tracer takes its steps.
+A :class:`Frame` has the units of the unknowns and the borders b and c, which change little from point to point. A
+:class:`CriticalCurve` evaluates the equations in a frame (:class:`Evaluated`), and makes points of the curve, each with
+a frame of its own and a tangent (:class:`Spot`), from which the tracer takes its steps.
 """
 
 from __future__ import annotations

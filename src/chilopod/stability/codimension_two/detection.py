@@ -249,13 +249,12 @@ class Detector:
             return signal
         nu = here.spectrum.values[here.others]
         if signal is CircleEvent.PAIR:
-            complex_ones = np.abs(np.abs(nu) - 1.0)[np.abs(nu.imag) > _COMPLEX]
+            off_circle = np.abs(np.abs(nu) - 1.0)[np.abs(nu.imag) > _COMPLEX].min(initial=np.inf)
             # Two real multipliers with product 1 are not critical.
             reals = nu[np.abs(nu.imag) <= _COMPLEX].real
             products = np.abs(reals[:, None] * reals - 1.0)[np.triu_indices(reals.size, 1)]
-            if not complex_ones.size or (products.size and products.min() < complex_ones.min()):
-                return None
-            return together(self._kind, Kind.NEIMARK_SACKER)
+            critical = off_circle <= products.min(initial=np.inf)
+            return together(self._kind, Kind.NEIMARK_SACKER) if critical else None
         sign = TARGETS[signal]
         if sign == self.curve.target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier

@@ -6,12 +6,6 @@ series in the angle and Chebyshev series in r give the Taylor coefficients of H(
 determines the bend of W (the homological equations of Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7,
 and of Kuznetsov and Meijer 2005, here with measured numbers). Units of the states do not matter, as every entry of a
 state is compared with itself only.
-
-An even or odd function of the radius r is sampled at Chebyshev points of (0, s], which gives its values at those of
-[-s, s]. Its Chebyshev coefficients t_k fall geometrically down to the noise of the samples, so the series itself
-shows the size of that noise, the truncation error, and the quality of s (Trefethen,
-*Approximation Theory and Approximation Practice*, chapters 3, 4 and 8). A Taylor coefficient is a sum over the t_k up
-to the degree with the least sum of noise and truncation.
 """
 
 from __future__ import annotations
@@ -259,7 +253,13 @@ _TAIL = 2  # number of last coefficients of every parity that count as noise
 
 @dataclass(frozen=True, eq=False)
 class Series(ReadOnlyArrays):
-    """Chebyshev coefficients over [-1, 1] of functions that are even or odd."""
+    """Chebyshev coefficients t_k over [-1, 1] of functions that are even or odd.
+
+    Samples at the positive Chebyshev points give all others. The t_k fall geometrically down to the noise of the
+    samples, so the series itself shows the size of that noise, the truncation error, and the quality of the interval
+    (Trefethen, *Approximation Theory and Approximation Practice*, chapters 3, 4 and 8). A Taylor coefficient is a sum
+    over the t_k up to the degree with the least sum of noise and truncation.
+    """
 
     coefficients: ComplexArray  # coefficients of T_parity, T_(parity + 2), ..., shape (radii, entries)
     parity: int  # 0 for even functions, 1 for odd ones
