@@ -46,7 +46,6 @@ _RESOLVED = 3.0  # factor on its error that a test function must reach within a 
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
 
-
 _COSINES = {
     CodimensionTwo.RESONANCE_1_1: 1.0,
     CodimensionTwo.RESONANCE_1_2: -1.0,
