@@ -1,7 +1,7 @@
 """The equations of a curve of critical periodic orbits in two parameters.
 
-Unknowns are the state x, the two parameters and, for a critical pair of multipliers, its cosine kappa = cos theta.
-The equations are H(x) = x for the return map H and, for a multiplier nu = +1 or -1, g = 0 with g from
+Unknowns are the state x, both parameters and, for a critical pair of multipliers, its cosine kappa = cos theta: a
+:class:`Place`. The equations are H(x) = x for the return map H and, for a multiplier nu = +1 or -1, g = 0 with g from
 
     [[H' - nu, b], [c^T, 0]] (v, g) = (0, 1),
 
@@ -9,10 +9,12 @@ which vanishes with det(H' - nu) but is as smooth as H' and well scaled (Govaert
 of Dynamical Equilibria*, SIAM 2000, ch. 4). For a pair, H'^2 - 2 kappa H' + 1 is bordered twice and G = 0 is a matrix
 of shape (2, 2) (ch. 5; Kuznetsov, *Elements of Applied Bifurcation Theory*, section 10.3). On the critical plane
 H'^2 - 2 kappa H' + 1 = (trace - 2 kappa) H' + (1 - det), so G has only two independent entries, and these two factors
-are the equations: regular also where the pair meets at +1 or -1.
+are the equations: regular also where the pair meets at +1 or -1. If the systems know their orbit, x is not an unknown;
+if the orbit has a spatial symmetry, x varies among the states with it, and H - 1 is regular also at a pitchfork.
 
-If the systems know their orbit, x is not an unknown; if the orbit has a spatial symmetry, x varies among the states
-with that symmetry. H - 1 is then regular also on a curve of pitchforks.
+A :class:`Frame` has the units of the unknowns and the borders b and c, which change little from point to point. A
+:class:`CriticalCurve` evaluates the equations in a frame (:class:`Evaluated`), and makes points of the curve, each with
+a frame of its own and a tangent (:class:`Spot`), from which the tracer takes its steps.
 """
 
 from __future__ import annotations
@@ -282,15 +284,15 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             units = size[:, None] / before.size[:, None]
             row, column, _ = _bordered(critical, before.column / units, before.row * units)
         column, row = _orthonormal(column), _orthonormal(row)
+        mixture: Array = np.eye(1)
+        if k == 2:
+            right, left, _ = _bordered(critical, column, row)
+            shapes = np.stack([-(left.T @ jacobian @ right).ravel(), -(left.T @ right).ravel()], axis=1)
+            mixture = np.asarray(np.linalg.pinv(shapes), dtype=np.float64)
         # g then stays smooth where another multiplier becomes critical; w and v are regular at a double one.
-        if k == 1 and abs(overlap := float((column.T @ row).item())) > _APART:
+        elif abs(overlap := float((column.T @ row).item())) > _APART:
             column, row = row * np.sign(overlap), column * np.sign(overlap)
-        frame = Frame(size, self.widths, basis, column, row, np.eye(k, k * k), section)
-        if k == 1:
-            return frame
-        right, left, _ = _bordered(critical, column, row)
-        shapes = np.stack([-(left.T @ jacobian @ right).ravel(), -(left.T @ right).ravel()], axis=1)
-        return replace(frame, mixture=np.asarray(np.linalg.pinv(shapes), dtype=np.float64))
+        return Frame(size, self.widths, basis, column, row, mixture, section)
 
     def _critical(self, jacobian: Array, cosine: float) -> Array:
         one = np.eye(len(jacobian))
@@ -326,16 +328,15 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _uncertainty(self, at: Evaluated) -> Array:
         frame, error = at.frame, at.error
-        wrong = error
+        wrong, power = error, 1
         if not self.target:
             own = np.abs(at.jacobian)
-            wrong = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error
+            wrong, power = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error, 2
         rounding = 4.0 * np.finfo(float).eps
         # The error of the derivative determines that of the returned state.
         returned = error.sum(axis=1) + rounding * np.abs(at.place.state) / frame.size
         critical = np.abs(frame.mixture) @ (np.abs(at.left.T) @ wrong @ np.abs(at.right)).ravel()
         norms = np.linalg.norm(at.left) * np.linalg.norm(at.right) * np.linalg.norm(frame.mixture, 2)
-        power = 1 if self.target else 2
         critical = critical + rounding * float(norms * np.linalg.norm(at.jacobian) ** power)
         return np.abs(at.residual) + np.concatenate([np.abs(frame.basis.T) @ returned, critical])
 

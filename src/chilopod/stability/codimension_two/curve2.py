@@ -129,17 +129,15 @@ class Curve2(Result):
 
     def _lines(self) -> list[str]:
         (p, q), (p_end, q_end) = self.values[0], self.values[-1]
-        special = [
-            (each.kind.label, *(bounded(*pair) for pair in zip(each.values, each.error_bound, strict=True)))
-            for each in self.special
-        ]
+        special = [(each.kind.label, *map(bounded, each.values, each.error_bound)) for each in self.special]
         pairs = zip(self.endings, self.reasons, strict=True)
         ends = [f"{end.sentence} ({why})" if why else end.sentence for end, why in pairs]
         return [
             f"Curve2: {self.kind.label}, {len(self.points)} points",
             f"from ({p:.9g}, {q:.9g}): {ends[0]}",
             f"to ({p_end:.9g}, {q_end:.9g}): {ends[1]}",
-            *(["points of codimension two:", *rows(special)] if special else ["points of codimension two: none"]),
+            "points of codimension two:" if special else "points of codimension two: none",
+            *rows(special),
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:

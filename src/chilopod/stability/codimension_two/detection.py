@@ -1,5 +1,11 @@
 """Detection of points of codimension two along a curve, as zeros of test functions.
 
+A test function measures one condition beside that of the curve: that the coefficient of the normal form vanishes, that
+the critical multipliers are in resonance, or that other multipliers are on the unit circle. :class:`Critical` separates
+the critical multipliers at a place from the others. The :class:`Detector` measures all test functions at every point of
+the curve, a :class:`Station`. Where one changes its sign over a step, it finds the zero on corrected parts of the step,
+discards a pole or one without a useful error bound, and names the point from the multipliers beside it.
+
 Test functions after Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.1 and 10.3, and Kuznetsov and
 Meijer, SIAM J. Sci. Comput. 26, 2005.
 """
@@ -7,7 +13,6 @@ Meijer, SIAM J. Sci. Comput. 26, 2005.
 from __future__ import annotations
 
 import contextlib
-import enum
 import functools
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,7 +27,8 @@ from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated
 from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Parts
-from chilopod.stability.normal_forms.manifold import CriticalOrbit, ReturnedStates
+from chilopod.stability.interface import SystemLike
+from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, Quintic, normal_form, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.returns import returned_states
@@ -40,49 +46,43 @@ _RESOLVED = 3.0  # factor on its error that a test function must reach within a 
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
 
-
-class Own(enum.Enum):
-    """Coefficient of the normal form, and w . v of the critical eigenvectors, zero for a double multiplier."""
-
-    COEFFICIENT = enum.auto()
-    DOUBLE = enum.auto()
-
-
-Signal = Own | CircleEvent | CodimensionTwo
-"""Test functions: those above; of other multipliers, +1, -1 or a pair on the circle; of a pair, one resonance each."""
-
-Signals = dict[Signal, tuple[float, float]]
-"""Test functions and their errors."""
-
 _COSINES = {
     CodimensionTwo.RESONANCE_1_1: 1.0,
     CodimensionTwo.RESONANCE_1_2: -1.0,
     CodimensionTwo.RESONANCE_1_3: -0.5,
     CodimensionTwo.RESONANCE_1_4: 0.0,
 }
+"""Cosine of the angle of the critical multipliers at a resonance."""
 
+Signal = CodimensionTwo | CircleEvent
+"""A test function: of the critical multipliers by the kind of its zeros, of the other ones by their event there."""
 
-_Parts = Parts[Spot, Evaluated, Evaluated]
+Signals = dict[Signal, tuple[float, float]]
+"""Test functions and their errors."""
+
 Test = Callable[[float], tuple[float, float]]
 """A test function and its error at a distance along a step; NaN where undefined."""
 
+_Parts = Parts[Spot, Evaluated, Evaluated]
+
 
 class Critical:
-    """A place of a curve, with the critical multipliers separated from the others.
+    """A place of a curve, with the critical multipliers separated from the others, and its normal form.
 
     ``spectrum`` has all multipliers, ``others`` the indices of those that are not critical, shape (others,).
     ``multiplier`` is +1, -1, or on the unit circle with positive imaginary part, ``mode`` its unit right eigenvector
     and ``left`` the left one with left^H mode = 1, shape (n,), ``overlap`` that of the two, each a unit vector in the
-    frame: 0 for a double multiplier, NaN for a pair.
+    frame: 0 for a double multiplier; 1 for a pair.
     """
 
-    def __init__(self, target: int, at: Evaluated) -> None:
-        self.at, self.spectrum, self.overlap = at, spectrum(at.image), np.nan
+    def __init__(self, curve: CriticalCurve, at: Evaluated) -> None:
+        self._curve, self.at, self.spectrum, self.overlap = curve, at, spectrum(at.image), 1.0
         values = self.spectrum.values
-        if target:
-            own = [self.spectrum.nearest(target)]
+        if curve.target:
+            own = [self.spectrum.nearest(curve.target)]
             v, w, size = at.right[:, 0], at.left[:, 0], at.frame.size
-            self.multiplier, self.overlap = complex(target), float(w @ v / (np.linalg.norm(w) * np.linalg.norm(v)))
+            self.multiplier = complex(curve.target)
+            self.overlap = float(w @ v / (np.linalg.norm(w) * np.linalg.norm(v)))
             mode, left = (size * v).astype(np.complex128), (w / size).astype(np.complex128)
             mode /= np.linalg.norm(mode)
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -100,6 +100,36 @@ class Critical:
         self.others = np.delete(np.arange(values.size), own)
         self.mode, self.left = mode, left
 
+    @functools.cached_property
+    def system(self) -> SystemLike:
+        """The system at this place."""
+        return self._curve.system(self.at.place.values)
+
+    @functools.cached_property
+    def orbit(self) -> CriticalOrbit:
+        """The orbit, as normal forms take it."""
+        place, image = self.at.place, self.at.image
+        image = image if np.isfinite(image.error).all() else replace(image, error=0.0)
+        return CriticalOrbit(place.state, image, self.multiplier, self.mode, self.left)
+
+    @functools.cached_property
+    def form(self) -> NormalForm:
+        """The normal form."""
+        at, orbit_error = self.at, 0.0
+        if isinstance(at, Spot):  # whose errors are known
+            state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
+            orbit_error = float(np.abs(self.left) @ state)
+        return normal_form(self._returned, self.orbit, scale=at.frame.size, orbit_error=orbit_error)
+
+    def fifth(self, *beside: Critical) -> Quintic | None:
+        """The terms of fifth order, sampled up to about the amplitude of the normal form here, or else beside."""
+        amplitudes = (each.form.amplitude for each in (self, *beside))
+        amplitude = next(filter(np.isfinite, amplitudes), None)
+        return None if amplitude is None else quintic(self._returned, self.orbit, amplitude)
+
+    def _returned(self, states: Array) -> Array:
+        return returned_states(self.system, states, self.at.frame.section)
+
 
 class Station(NamedTuple):
     """A spot on a curve, its point, and the test functions there."""
@@ -113,74 +143,41 @@ class Detector:
     """Test functions along a curve of bifurcations, with that of the normal form if ``coefficients``."""
 
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
-        self._curve, self._kind, self._coefficients = curve, kind, coefficients
-        form = (Own.COEFFICIENT,) if coefficients else ()
-        self._signals: tuple[Signal, ...] = (*form, *((Own.DOUBLE,) if curve.target else _COSINES), *CircleEvent)
+        self.curve, self._kind, self._coefficients = curve, kind, coefficients
+        self._degenerate = DEGENERATE.get(kind) if coefficients else None
+        resonances = [each for each, cosine in _COSINES.items() if curve.target in (0, cosine)]
+        self._signals: list[Signal] = [*filter(None, [self._degenerate]), *resonances, *CircleEvent]
 
     def station(self, spot: Spot) -> Station:
         """The point at a spot, and the test functions."""
-        here = Critical(self._curve.target, spot)
-        form = self.form(here) if self._coefficients and abs(spot.place.cosine) < 1.0 else None
-        signals = {signal: self._measured(signal, here, form) for signal in self._signals}
+        here = Critical(self.curve, spot)
+        signals = {signal: self._measured(signal, here) for signal in self._signals}
         bound = across(spot) + 4.0 * EPSILON * np.abs(spot.values)
-        return Station(spot, _point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
+        coefficient = self._decisive(here) if self._coefficients else (np.nan, np.nan)
+        return Station(spot, _point(here, bound, coefficient), signals)
 
     def events(self, step: Step[Spot, Evaluated], before: Signals, after: Signals) -> list[tuple[Spot, SpecialPoint2]]:
         """Points of codimension two within a step, in order."""
-        parts, found = Parts(self._curve, step), []
+        parts, found = Parts(self.curve, step), []
         for signal in self._signals:
-            one, other = before[signal][0], after[signal][0]
-            if not (one * other < 0.0 or (other == 0.0 and one != 0.0)):
-                continue
+            (one, one_error), (other, other_error) = before[signal], after[signal]
+            changes = one * other < 0.0 or (other == 0.0 and one != 0.0)
             # A function that vanishes along the whole curve changes its sign as well.
-            if any(abs(value) > _RESOLVED * error for value, error in (before[signal], after[signal])):
+            if changes and (abs(one) > _RESOLVED * one_error or abs(other) > _RESOLVED * other_error):
                 found.append(self._located(signal, parts))
-        known = sorted((each for each in found if each is not None), key=lambda each: each[0])
-        return [(spot, point) for _, spot, point in known]
+        return [each[1:] for each in sorted(filter(None, found), key=lambda each: each[0])]
 
-    def form(self, here: Critical) -> NormalForm:
-        """The normal form at a place."""
-        at, orbit_error = here.at, 0.0
-        if isinstance(at, Spot):
-            state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
-            orbit_error = float(np.abs(here.left) @ state)
-        return normal_form(*self.sampled(here), scale=at.frame.size, orbit_error=orbit_error)
-
-    def sampled(self, here: Critical) -> tuple[ReturnedStates, CriticalOrbit]:
-        """Return map and critical orbit of a normal form."""
-        place, image, section = here.at.place, here.at.image, here.at.frame.section
-        system = self._curve.system(place.values)
-        image = image if np.isfinite(image.error).all() else replace(image, error=0.0)
-        orbit = CriticalOrbit(place.state, image, here.multiplier, here.mode, here.left)
-        return lambda states: returned_states(system, states, section), orbit
-
-    def fifth(self, here: Critical, *forms: NormalForm) -> Quintic | None:
-        """The terms of fifth order at a place, given those of third order there or beside it."""
-        amplitude = next((form.amplitude for form in forms if np.isfinite(form.amplitude)), np.nan)
-        return None if np.isnan(amplitude) else quintic(*self.sampled(here), amplitude)
-
-    def _decides(self, form: NormalForm) -> tuple[float, float]:
-        """The decisive coefficient on a curve of this kind, and its error; NaN if undefined."""
-        if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
-            return np.nan, np.nan
-        if self._kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
-            return form.quadratic, form.quadratic_error
-        return form.cubic, form.cubic_error
-
-    def _measured(self, signal: Signal, here: Critical, form: NormalForm | None = None) -> tuple[float, float]:
+    def _measured(self, signal: Signal, here: Critical) -> tuple[float, float]:
         """A test function and its error, which needs an image with error bounds, and errors of the coordinates."""
+        at = here.at
+        if signal is self._degenerate:
+            # A fold's coefficient is positive for one sign of its mode, and has a pole where the multiplier is double.
+            value, error = self._decisive(here)
+            return value * here.overlap, error * abs(here.overlap)
         if isinstance(signal, CodimensionTwo):
-            error = float(here.at.shift[-1]) if isinstance(here.at, Spot) else 0.0
-            return here.at.place.cosine - _COSINES[signal], error
-        if signal is Own.DOUBLE:
-            return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.at.error))
-        if signal is Own.COEFFICIENT:
-            if not self._curve.target and abs(here.at.place.cosine) >= 1.0:
-                return np.nan, np.nan  # past the end of the curve: two real multipliers with product 1
-            value, error = self._decides(self.form(here) if form is None else form)
-            # A fold's is positive for one sign of its mode, and has a pole where the multiplier is double.
-            factor = here.overlap if self._curve.target else 1.0
-            return value * factor, error * abs(factor)
+            if self.curve.target:
+                return here.overlap, 2.0 * at.reach * float(np.linalg.norm(at.error))
+            return at.place.cosine - _COSINES[signal], float(at.shift[-1]) if isinstance(at, Spot) else 0.0
         nu, errors = here.spectrum.values[here.others], here.spectrum.error[here.others]
         if signal is CircleEvent.PAIR:
             first, second = np.triu_indices(nu.size, 1)
@@ -188,49 +185,58 @@ class Detector:
             return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], off)
         return _product(nu - TARGETS[signal], 1.0 + np.abs(nu), errors)
 
+    def _decisive(self, here: Critical) -> tuple[float, float]:
+        """The decisive coefficient on a curve of this kind, and its error; NaN if undefined."""
+        # Past the end of a pair's curve are two real multipliers with product 1.
+        past = abs(here.at.place.cosine) >= 1.0
+        if past or here.form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
+            return np.nan, np.nan
+        if self._kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
+            return here.form.quadratic, here.form.quadratic_error
+        return here.form.cubic, here.form.cubic_error
+
     def _located(self, signal: Signal, parts: _Parts) -> tuple[float, Spot, SpecialPoint2] | None:
         """Point where a test function vanishes within a step, with its distance along the step."""
-        curve, start, length = self._curve, parts.step.start, parts.step.size
+        curve, start, length = self.curve, parts.step.start, parts.step.size
 
         @functools.cache
         def test(place: float) -> tuple[float, float]:
-            return self._measured(signal, Critical(curve.target, parts.at(place).found))
+            return self._measured(signal, Critical(curve, parts.at(place).found))
 
         zero = _zero(test, length)
         if zero is None:
             return None
         root, beside, unsure = zero
         spot = curve.spot(parts.at(root).found.place, start.frame, start.tangent)
-        here = Critical(curve.target, spot)
+        here = Critical(curve, spot)
         value, error = self._measured(signal, here)
         if np.isnan(value):
             value, error = 0.0, max(test(root - beside)[1], test(root + beside)[1])
         if not unsure and abs(value) > _POLE * max(abs(test(0.0)[0]), abs(test(length)[0])):
             return None
-        along = _along(test, parts, root, beside, abs(value) + error + unsure)
+        wrong = _SAFETY * (abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
-        bound = off + along + 4.0 * EPSILON * np.abs(spot.values)
+        bound = off + _along(test, parts, root, beside, wrong) + 4.0 * EPSILON * np.abs(spot.values)
         if not (bound < np.ptp(curve.box, axis=1)).all():  # a bound of the size of the box
             return None
+        there = Critical(curve, parts.at(root + beside).found)
+        kind = self._named(signal, spot, here, there)
         low, high = test(root - beside)[0], test(root + beside)[0]
         # A pole grows towards the place, also where it hides the value there; an end may be nearer than these.
         ends = [abs(test(end)[0]) for end in (0.0, length) if abs(end - root) > beside]
-        there = Critical(curve.target, parts.at(root + beside).found)
-        kind = self._named(signal, spot, here, there)
         if kind is None or max(abs(low), abs(high)) > _JUMP * max(ends):
             return None
         point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
-        if signal is Own.COEFFICIENT:
-            slope = abs(high - low) / 2.0
-            point = self._with_next_term(point, here, there, _SAFETY * (abs(value) + error + unsure) / slope)
+        if signal is self._degenerate:
+            point = self._with_next_term(point, here, there, wrong / (abs(high - low) / 2.0))
         return root, spot, point
 
     def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
         """A point with its next coefficient, whose error includes its change over the error of the place."""
-        forms = [self.form(each) for each in (here, beside)]
-        terms = [(form.cubic, form.cubic_error) for form in forms]
-        if self._kind not in WITHOUT_CRITICALITY:
-            fifths = [self.fifth(each, form, *forms) for each, form in zip((here, beside), forms, strict=True)]
+        if self._kind in WITHOUT_CRITICALITY:
+            terms = [(each.form.cubic, each.form.cubic_error) for each in (here, beside)]
+        else:
+            fifths = here.fifth(beside), beside.fifth(here)
             terms = [(np.nan, np.nan) if each is None else (each.coefficient, each.error) for each in fifths]
         (value, error), (other, unsure) = terms
         error += share * (abs(other - value) + error + unsure)
@@ -238,33 +244,27 @@ class Detector:
 
     def _named(self, signal: Signal, spot: Spot, here: Critical, there: Critical) -> CodimensionTwo | None:
         """Kind of the point at a zero of a test function, by a place beside it; None for a zero without meaning."""
-        target = self._curve.target
         if isinstance(signal, CodimensionTwo):
             return signal
-        if signal is Own.COEFFICIENT:
-            return DEGENERATE.get(self._kind)
-        if signal is Own.DOUBLE:
-            return CodimensionTwo.RESONANCE_1_1 if target > 0 else CodimensionTwo.RESONANCE_1_2
         nu = here.spectrum.values[here.others]
         if signal is CircleEvent.PAIR:
-            complex_ones = np.abs(np.abs(nu) - 1.0)[np.abs(nu.imag) > _COMPLEX]
+            off_circle = np.abs(np.abs(nu) - 1.0)[np.abs(nu.imag) > _COMPLEX].min(initial=np.inf)
             # Two real multipliers with product 1 are not critical.
             reals = nu[np.abs(nu.imag) <= _COMPLEX].real
             products = np.abs(reals[:, None] * reals - 1.0)[np.triu_indices(reals.size, 1)]
-            if not complex_ones.size or (products.size and products.min() < complex_ones.min()):
-                return None
-            return together(self._kind, Kind.NEIMARK_SACKER)
+            critical = off_circle <= products.min(initial=np.inf)
+            return together(self._kind, Kind.NEIMARK_SACKER) if critical else None
         sign = TARGETS[signal]
-        if sign == target and abs(here.overlap) < _OVERLAP:
+        if sign == self.curve.target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier
         # At the point itself the modes of two equal multipliers are any combinations of both.
         nearest = int(np.abs(there.spectrum.values[there.others] - sign).argmin())
         mode = there.spectrum.right[:, there.others[nearest]]
-        if reverses(self._curve.system(here.at.place.values), mode, here.at.frame.size):
+        if reverses(here.system, mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
         if sign < 0:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
-        meets = self._curve.known or np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING
+        meets = self.curve.known or np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING
         return together(self._kind, Kind.BRANCH_POINT if meets else Kind.FOLD)
 
 
@@ -308,13 +308,13 @@ def across(spot: Spot) -> Array:
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))
 
 
-def _along(test: Test, parts: _Parts, root: float, h: float, error: float) -> Array:
-    """Changes of both parameters, shape (2,), over the part of the curve that a test function leaves open."""
+def _along(test: Test, parts: _Parts, root: float, h: float, wrong: float) -> Array:
+    """Changes of both parameters, shape (2,), along the curve over the error ``wrong`` of a test function."""
     with contextlib.suppress(AnalysisError):
         slope = abs(test(root + h)[0] - test(root - h)[0]) / (2.0 * h)
         low, middle, high = (parts.at(root + s).found.place.values for s in (-h, 0.0, h))
         if slope > 0.0:
-            off = _SAFETY * error / slope
+            off = wrong / slope
             first, second = np.abs(high - low) / (2.0 * h), np.abs(high - 2.0 * middle + low) / (h * h)
             return np.asarray(first * off + 0.5 * second * off * off)
     return np.full(2, np.inf)

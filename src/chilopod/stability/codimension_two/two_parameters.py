@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from chilopod.flows.arguments import UserCode, check_arguments, checked_box, fin
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
-from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
+from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
@@ -91,7 +91,7 @@ def follow2(
     outward, periods = None, 1
     if isinstance(start, Start2):
         outward, periods, second = start.outward, start.periods, start.second
-        family2, start = over_periods(family2, periods), start.point
+        family2, start = _over_periods(family2, periods), start.point
     if not isinstance(start, BifurcationPoint):
         allowed = "a BifurcationPoint from `locate`, or a start from `switch2`"
         raise ParameterError("must be a located point", field="start", value=in_one_line(start), allowed=allowed)
@@ -100,7 +100,7 @@ def follow2(
     values = np.array([start.value, finite_array(second, (), "second")], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
         raise ParameterError("must hold the start", field="between", value=between, allowed=f"around {values}")
-    target, known = _what(family2, start, second)
+    target, known = _target(family2, start, second)
     curve = CriticalCurve(family2, target, known, box, Budget(budget, seconds))
     nu = complex(start.multiplier)
     with curve.budget:
@@ -116,24 +116,22 @@ def follow2(
             ahead = float(first.frame.between(first.place, beside) @ first.tangent)
         else:
             ahead = float(first.tangent[first.frame.parameters][1]) * (-1.0 if rising is False else 1.0)
-        after, before = (_Half(curve, detector, origin, progress) for _ in range(2))
-        steps = min(step, longest), longest
-        after.trace(first.towards(math.copysign(1.0, ahead)), steps, points)
-        if after.ending is Ending.CLOSED:
-            before.ending = Ending.CLOSED
-        elif outward is None and rising is None:
-            before.trace(first.towards(math.copysign(1.0, -ahead)), steps, points)
+        steps, sign = (min(step, longest), longest), math.copysign(1.0, ahead)
+        after = _followed(detector, origin._replace(spot=first.towards(sign)), steps, points, progress)
+        before = _Half([], Ending.CLOSED if after.ending is Ending.CLOSED else Ending.START)
+        if after.ending is not Ending.CLOSED and outward is None and rising is None:
+            before = _followed(detector, origin._replace(spot=first.towards(-sign)), steps, points, progress)
     found, endings = (*reversed(before.points), origin.point, *after.points), (before.ending, after.ending)
     return Curve2(start.kind, found, endings, (before.reason, after.reason), periods)
 
 
-def over_periods(family2: Family2, periods: int) -> Family2:
+def _over_periods(family2: Family2, periods: int) -> Family2:
     """Systems for orbits over several periods, or without their symmetry in time."""
     return lambda p, q: whole_period(family2(p, q), periods)
 
 
-def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
-    """The critical multiplier, 0 for a pair, and True if the orbit is known."""
+def _target(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
+    """The target of the curve, a critical multiplier +1 or -1, or 0 for a pair; and True if the orbit is known."""
     system = system_of(family2, start.value, second)
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
@@ -156,50 +154,51 @@ _Looked = tuple[Station | None, list[SpecialPoint2]]
 """The station at the end of a step, if any, and the events within the step."""
 
 
-@dataclass
-class _Half:
-    """Results of the tracer in one direction, without the start."""
+class _Half(NamedTuple):
+    """A curve in one direction, without its start."""
 
-    curve: CriticalCurve
-    detector: Detector
-    last: Station
-    progress: Progress2
-    points: list[Point2] = field(default_factory=list)
-    ending: Ending = Ending.START
+    points: list[Point2]
+    ending: Ending
     reason: str = ""
 
-    def trace(self, spot: Spot, steps: tuple[float, float], points: int | None) -> None:
-        """Follow the curve from its first point, towards its tangent."""
-        self.curve.first = spot
-        self.last = self.last._replace(spot=spot)
-        self.ending, self.reason, _ = trace(self.curve, spot, steps, points, self.look, self.keep)
-        if self.ending is Ending.LOST:
-            end, evaluated = self.last.spot, self.curve.evaluated
 
-            def derivative(distance: float) -> Array:
-                return evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
+def _followed(
+    detector: Detector, origin: Station, steps: tuple[float, float], points: int | None, progress: Progress2
+) -> _Half:
+    """The curve from its first point, towards the tangent there."""
+    curve, last = detector.curve, origin
+    curve.first = origin.spot
+    kept: list[Point2] = []
 
-            about = self.curve.system(end.values), end.place.state, end.image.duration
-            self.reason = event_beside(*about, derivative) or self.reason
-
-    def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
+    def look(step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
-        station, special = self.detector.station(step.end), []
-        for spot, point in self.detector.events(step, self.last.signals, station.signals):
+        station, special = detector.station(step.end), []
+        for spot, point in detector.events(step, last.signals, station.signals):
             special.append(point)
-            if self.curve.target == 0 and point.kind in _MEETINGS:
-                return (self.detector.station(spot), special), Ending.RESONANCE
+            if curve.target == 0 and point.kind in _MEETINGS:
+                return (detector.station(spot), special), Ending.RESONANCE
         return (None if ending is Ending.CLOSED else station, special), ending
 
-    def keep(self, found: _Looked, count: int) -> None:
-        """Keep a step with its events."""
+    def keep(found: _Looked, count: int) -> None:
+        nonlocal last
         station, special = found
-        self.points += special
+        kept.extend(special)
         if station is not None:
-            self.points.append(station.point)
-            self.last = station
+            kept.append(station.point)
+            last = station
             with UserCode("progress"):
-                self.progress(count, station.point)
+                progress(count, station.point)
+
+    ending, reason, _ = trace(curve, origin.spot, steps, points, look, keep)
+    if ending is Ending.LOST:
+        end = last.spot
+
+        def derivative(distance: float) -> Array:
+            return curve.evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
+
+        about = curve.system(end.values), end.place.state, end.image.duration
+        reason = event_beside(*about, derivative) or reason
+    return _Half(kept, ending, reason)
 
 
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
@@ -207,7 +206,6 @@ _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
 _HALVINGS = 12  # halvings of the amplitude
 _NEAR = 0.25  # largest error of a predicted fold, relative to the amplitude and its distance from the point
 
-_CURVES = {DEGENERATE[kind]: kind for kind in (Kind.PERIOD_DOUBLING, Kind.PITCHFORK)}
 _OTHERS = {
     CodimensionTwo.CUSP: "is a cusp: the curve of folds itself goes through it",
     CodimensionTwo.CHENCINER: "is a Chenciner point: folds of tori leave it, which cannot be followed",
@@ -243,62 +241,59 @@ def switch2(
     if not isinstance(point, SpecialPoint2):
         said, allowed = "must be a point of codimension two", "one of the `special` points of a curve from `follow2`"
         raise ParameterError(said, field="point", value=point, allowed=allowed)
-    kind = _CURVES.get(point.kind)
-    if kind is None:
+    flips = point.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
+    if not flips and point.kind is not CodimensionTwo.DEGENERATE_PITCHFORK:
         why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, from which no curve can be followed")
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     check_arguments(family2=family2, budget=budget)
     allowed = Budget(budget, seconds)
-    periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
-    folds = CriticalCurve(over_periods(family2, periods), 1, False, box, allowed)
-    signs = (1.0,) if kind is Kind.PERIOD_DOUBLING else (1.0, -1.0)
+    periods, signs = (2, (1.0,)) if flips else (1, (1.0, -1.0))
+    folds = CriticalCurve(_over_periods(family2, periods), 1, False, box, allowed)
     with allowed:
-        there = _Unfolding(family2, point, kind, box, allowed)
+        there = _Unfolding(family2, point, box, allowed)
         return tuple(_start(there, folds, sign, periods) for sign in signs)
 
 
 class _Unfolding:
     """Unfolding of a degenerate point on a curve: terms of fifth order, and changes of coefficient and multiplier."""
 
-    def __init__(self, family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, budget: Budget) -> None:
+    def __init__(self, family2: Family2, point: SpecialPoint2, box: Array, budget: Budget) -> None:
         system = system_of(family2, *point.values.tolist())
-        targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
+        flips = point.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
+        targets = (-1,) if flips else (1,) if system.symmetry is None else (1, -1)
         target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
         self._equations = curve = CriticalCurve(family2, target, offers(system, "orbit"), box, budget)
         # For a point on the edge of the box the other side is used.
         curve.box = box + 2.0 * _FARTHEST * curve.widths[:, None] * [-1.0, 1.0]
         self.spot = spot = curve.begin(Place(point.orbit, point.values, 0.0), point.period)
-        detector = Detector(curve, kind, True)
-        here = Critical(target, spot)
-        beside = [Critical(target, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
-        low, high = forms = [detector.form(each) for each in beside]
+        here = Critical(curve, spot)
+        beside = [Critical(curve, curve.along(spot, size)) for size in (-_BESIDE, _BESIDE)]
+        low, high = (each.form for each in beside)
         if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
             raise AnalysisError("the cubic coefficient does not change measurably along the curve", field="point")
-        fifth = detector.fifth(here, detector.form(here), *forms)
+        fifth = here.fifth(*beside)
         if fifth is None:
             raise AnalysisError("no coefficient of fifth order was found", field="point")
         if abs(fifth.coefficient) <= fifth.error:
             raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
-        self.at, self.fifth = detector.sampled(here)[1], fifth
-        returns = spot.image.returns
-        self._times = returns if target > 0 or returns % 2 == 0 else 2 * returns  # in the map of the coefficients
+        self.at, self.fifth = here.orbit, fifth
         self._slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)  # by the length of ``spot.tangent``
-        self._response = _across(spot, target)
+        self._response = _response(spot, target)
 
     def fold(self, a: float) -> Place | None:
         """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
         spot, fifth = self.spot, self.fifth
         away = -2.0 * fifth.coefficient * a * a / self._slope
-        across = fifth.coefficient * a**4 / self._times
-        if not (abs(away) <= _FARTHEST and np.abs(across * self._response).max() <= _FARTHEST):
+        aside = fifth.coefficient * a**4 / self.at.times * self._response
+        if not (abs(away) <= _FARTHEST and np.abs(aside).max() <= _FARTHEST):
             return None
         base = self._equations.along(spot, away)
-        place = spot.frame.moved(base.place, across * self._response)
+        place = spot.frame.moved(base.place, aside)
         bent = self.at.displacements(fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
 
 
-def _across(spot: Spot, target: int) -> Array:
+def _response(spot: Spot, target: int) -> Array:
     """Change of orbit and parameters with the multiplier's modulus; g changes by -(w . v) times the multiplier's."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.left[:, 0] @ spot.right[:, 0])
@@ -329,7 +324,7 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         if off <= _NEAR and missed <= _NEAR * way and inside.all():
             outward = np.concatenate([place.state - origin.state, place.values - origin.values])
             value, bound, state = float(values[0]), float(across(found)[0]), found.place.state
-            mode, period = Critical(1, found).mode, found.image.period
+            mode, period = Critical(folds, found).mode, found.image.period
             fold = BifurcationPoint(Kind.FOLD, value, bound, state, mode, 1.0 + 0j, 0.0, period=period)
             return Start2(fold, float(values[1]), outward, periods)
     raise AnalysisError("no curve of folds was found where one is predicted to leave", field="point") from cause

@@ -1,9 +1,12 @@
-"""Normal-form coefficients at a bifurcation, from evaluations of the return map.
+"""Normal-form coefficients at a bifurcation, from evaluations of the return map alone.
 
-Near the critical orbit the return map H is sampled along the critical mode, bent by its quadratic part outside the
-critical space; this gives the terms of second and third order on the critical space, and of fifth where the cubic one
-vanishes (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 5.4, 8.7, 9.2 and 9.3). Only H is needed. Its
-series determine the amplitude at which it is sampled, so any units give the same digits.
+The return map is sampled along the critical mode, bent along the centre manifold (:mod:`.manifold`). At the amplitude
+with the least error of the cubic coefficient, :func:`normal_form` takes the terms of second and third order of one
+return, and converts them to those of the map over a full period. :func:`quintic` does the same for the term of fifth
+order, which decides where the cubic one vanishes. The series of the samples show their own accuracy and so lead to the
+amplitude: any units give the same digits.
+
+Terms after Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 5.4, 8.7, 9.2 and 9.3.
 """
 
 from __future__ import annotations
@@ -14,32 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.labels import Labelled
-from chilopod.stability.normal_forms.manifold import (
-    CriticalOrbit,
-    Manifold,
-    ManifoldCurve,
-    ReturnedStates,
-    Sampled,
-    Term,
-)
+from chilopod.stability.normal_forms.manifold import CriticalOrbit, Manifold, ManifoldCurve, Sampled, StateMap, Term
 from chilopod.stability.spectrum import spectrum
 
-_TRIALS = 40  # largest number of sampled amplitudes
-_SHARE = 0.03  # wanted departure of the map from its linear part, relative to the amplitude
-_FAR = 5.0  # largest departure that a step upward for accuracy may reach, relative to the wanted one
-_TOO_FAR = 0.3  # largest useful departure
-_UP, _FIRST_DOWN = 30.0, 0.1  # longest step of the amplitude upward; step where the map cannot be evaluated
-_FAR_DOWN, _LEAST_DOWN = 1e-3, 0.3  # longest and shortest step downward where the map is far from linear
-_LOST = 1e-6  # relative departure from linearity that is too small to start from
-_BLURRED = 1e-3  # largest error at the orbit itself, relative to the amplitude
-_LONG_UP, _UPS = 1e3, 5  # step of the amplitude while a map seems linear, and number of such steps
-_CLOSE = 4.0  # ratio of amplitudes that ends the search
-_RESOLVED = 0.7  # proposed factor of the amplitude above which a series has converged to the noise
-_DOWNS = 6  # largest number of steps down for convergence: the series of a map that is not smooth never converges
-_BENDS = 3  # largest number of bends of the curve at one amplitude
-_ENOUGH = 3e-8  # relative error that ends the search
-_FULL = 8  # highest visible order above which a larger amplitude would lose accuracy
-_BETTER = 0.3  # factor on the error that justifies a further step
+_START = 0.1  # first amplitude of the search, relative to the scale of the states
 
 
 class NormalFormStatus(Labelled):
@@ -50,130 +31,6 @@ class NormalFormStatus(Labelled):
     OUT_OF_REACH = "out of reach", "at no amplitude does the return map follow a power series"
     STRONG_RESONANCE = ("strong resonance", "the pair is at a root of unity of order 1 to 4, where more terms decide")
     SEVERAL_CRITICAL = "several critical", "another multiplier is on the unit circle as well"
-
-
-Fit = tuple[NormalFormStatus, Sampled, Term]
-"""Status, FOUND or LINEAR, the map at the best amplitude, and the resonant cubic term of one return."""
-
-
-def fitted(mapped: ReturnedStates, at: CriticalOrbit, radius: float) -> Fit | None:
-    """The terms at the amplitude and bend of the most accurate cubic coefficient; None if none is suitable.
-
-    The search lowers the amplitude where the map is far from its linear part, raises it where the noise hides the
-    nonlinear terms, bends the curve along the centre manifold, and continues while the error of the coefficient falls.
-    """
-    third = (3, 0) if at.real else (2, 1)
-    manifold = Manifold(mapped, at, 3)
-    # Hill climbing in the amplitude, up or down (`direction`, 0 before an error is known); `best` has the least error
-    # of the coefficient, infinite while the map seems linear.
-    low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
-    best = None
-    best_error = np.inf
-    bends = ups = downs = reversals = 0
-    direction = 0.0
-    for _ in range(_TRIALS):
-        sample = manifold.sample(radius)
-        departure, order, visible = (np.inf, 2, True) if sample is None else _departure(sample, at)
-        if sample is not None and sample.blur > _BLURRED * radius:  # the orbit's error hides the terms
-            low, factor = radius, _UP
-        elif sample is None or departure > _TOO_FAR:
-            high, factor = radius, _FIRST_DOWN if sample is None else _toward(departure, order)
-        elif visible and best_error == np.inf and downs < _DOWNS and sample.falling and sample.shrink < _RESOLVED:
-            high, factor, downs = radius, max(sample.shrink, _FIRST_DOWN), downs + 1  # the series has not converged
-        elif bends < _BENDS and manifold.bend(sample):
-            bends += 1
-            continue  # once more, along the better curve
-        elif not visible:  # the map is linear to its error
-            best, low, ups = (sample, dict(manifold.curve)), radius, ups + 1
-            factor = _linear_up(mapped, at, manifold.curve, radius, high) if ups <= _UPS else np.inf
-        else:
-            value, error = sample.term(third)
-            better = error < _BETTER * best_error
-            if error < best_error:
-                best, best_error = (sample, dict(manifold.curve)), error
-            full = _highest(sample) > _FULL
-            if error <= _ENOUGH * abs(value) or (full and sample.shrink > _RESOLVED):
-                break
-            if direction == 0.0:
-                direction = -1.0 if full else 1.0
-            elif not better:
-                direction, reversals = -direction, reversals + 1
-                radius = best[0].radius if best else radius
-            if reversals > 1:
-                break
-            # The noise in the coefficient falls with the third power of the amplitude.
-            wanted = min(float(np.cbrt(error / max(_ENOUGH * abs(value), 1e-300))), _toward(departure / _FAR, order))
-            factor = max(_toward(departure, order) ** 0.5, wanted, 2.0) if direction > 0.0 else 0.5
-        bends = 0
-        nearer = _within(radius * factor, low, high)
-        if nearer is None:
-            break
-        radius = nearer
-    if best is None or (best_error == np.inf and np.isfinite(high)):
-        return None
-    sample, manifold.curve = best
-    status = NormalFormStatus.LINEAR if best_error == np.inf else NormalFormStatus.FOUND
-    return status, sample, manifold.coefficient(sample, third)
-
-
-def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: ManifoldCurve, radius: float, high: float) -> float:
-    """Least factor on the amplitude at which nonlinear terms may become visible."""
-    factor = 1.0
-    reach = np.abs(at.image.jacobian)
-    for _ in range(_UPS):
-        factor *= _LONG_UP
-        if factor * radius >= high:
-            break
-        shift = at.displacements(curve, factor * radius * at.turns())
-        image = at.images(mapped, shift)
-        if image is None:
-            break
-        size = np.abs(at.state) + np.abs(shift) @ reach.T
-        if (np.abs(image - shift @ at.image.jacobian.T) > _LOST * size).any():
-            break
-    else:
-        return np.inf
-    return factor
-
-
-def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
-    """Departure from linearity relative to the amplitude, order of its main term, True if it exceeds the noise."""
-    sizes = np.abs([one.coefficients[1:, -1] for one in found.harmonics])
-    h, k = np.unravel_index(int(sizes.argmax()), sizes.shape)
-    share, order = float(sizes[h, k]), found.harmonics[h].parity + 2 * int(k) + 2
-    seen = share > 4.0 * float(found.noise[-1])
-    # A saturating map is linear again far out, with another slope.
-    slope = abs(found.harmonics[1].coefficients[0, -1] - at.multiplier * found.radius)
-    if slope > _TOO_FAR * found.radius:
-        share, seen = max(share, float(slope)), True
-    return share / found.radius, order, seen
-
-
-def _highest(found: Sampled) -> int:
-    """The highest order above the noise in the projected map."""
-    return max(
-        one.parity + 2 * int(np.flatnonzero(np.abs(one.coefficients[:, -1]) > found.noise[-1]).max(initial=0))
-        for one in found.harmonics
-    )
-
-
-def _toward(share: float, order: int) -> float:
-    """The factor of the amplitude at which a term of some order has the wanted size."""
-    if share == 0.0:
-        return _UP
-    factor = float((_SHARE / share) ** (1.0 / (order - 1)))
-    return min(max(factor, _FAR_DOWN), _LEAST_DOWN) if share > _TOO_FAR else min(factor, _UP)
-
-
-def _within(radius: float, low: float, high: float) -> float | None:
-    """An amplitude between two, preferably a given one; None if they are close together."""
-    if low < radius < high:
-        return radius
-    between = float(np.sqrt(low) * np.sqrt(high))
-    return between if 0.0 < between < np.inf and high > _CLOSE * low else None
-
-
-_START = 0.1  # first amplitude of the search, relative to the scale of the states
 
 
 @dataclass(frozen=True)
@@ -216,7 +73,7 @@ class NormalForm:
 
 
 def normal_form(
-    mapped: ReturnedStates,
+    mapped: StateMap,
     at: CriticalOrbit,
     *,
     scale: ArrayLike = 1.0,  # sizes of the states, shape (n,), where the search for an amplitude starts
@@ -232,23 +89,44 @@ def normal_form(
     for k in () if at.real else (1, 2, 3, 4):
         if abs(upper - np.exp(2j * np.pi / k)) <= spec.error[own[0]]:
             return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=k)
+    manifold = Manifold(mapped, at, 3)
     # An overflow far out is a valid result.
     with np.errstate(all="ignore"):
-        fit = fitted(mapped, at, _START * float(np.nanmin(np.abs(scale) / np.abs(at.right))))
+        fit = _fitted(manifold, _START * float(np.nanmin(np.abs(scale) / np.abs(at.right))))
     if fit is None:
         return NormalForm(NormalFormStatus.OUT_OF_REACH)
     if at.real:
-        return _of_full_period(fit, mapped, at, orbit_error)
+        return _of_full_period(fit, manifold, orbit_error)
     status, sampled, (cubic, error) = fit
     cubic, error = at.image.returns * np.conj(at.multiplier) * cubic, at.image.returns * error
     return NormalForm(status, 0.0, 0.0, float(cubic.real), error, float(cubic.imag), error, sampled.radius)
 
 
-def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic: float) -> float:
+def _of_full_period(fit: Fit, manifold: Manifold, orbit_error: float | None) -> NormalForm:
+    """Coefficients of the map with multiplier +1 from those of one return at a real multiplier."""
+    status, sampled, (third, cubic_error) = fit
+    cubic, (quadratic, quadratic_error) = third.real, sampled.term((2, 0))
+    off = _loose_by(manifold, abs(quadratic), abs(cubic) + cubic_error) if orbit_error is None else orbit_error
+    if off > 0.0:
+        quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
+        fourth, fourth_error = sampled.term((4, 0))
+        cubic_error += 4.0 * (abs(fourth) + fourth_error) * off
+    k = manifold.at.times
+    if manifold.at.multiplier.real < 0.0:
+        # a -> -a + c a^3 twice: a -> a - 2 c a^3.
+        return NormalForm(status, 0.0, 0.0, -k * cubic, k * cubic_error, amplitude=sampled.radius)
+    cubic = k * cubic + k * (k - 1) * quadratic.real**2
+    cubic_error = k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error
+    amplitude = sampled.radius
+    return NormalForm(status, k * quadratic.real, k * quadratic_error, cubic, cubic_error, amplitude=amplitude)
+
+
+def _loose_by(manifold: Manifold, quadratic: float, cubic: float) -> float:
     """Error d along the mode of an orbit with this residual, where H - 1 is singular: beside the symmetric orbit of a
     pitchfork the residual is at least cubic d^3, with an apparent quadratic term 3 cubic d; beside a transcritical
     point it is quadratic d^2."""
-    image = None if at.multiplier.real < 0.0 else at.images(mapped, np.zeros((1, at.state.size)))
+    at = manifold.at
+    image = None if at.multiplier.real < 0.0 else manifold.images(np.zeros((1, at.state.size)))
     if image is None:
         return 0.0
     rounding = 2.0 * float(np.finfo(float).eps)
@@ -260,26 +138,139 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, quadratic: float, cubic
     return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
 
 
-def _of_full_period(fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, orbit_error: float | None) -> NormalForm:
-    """Coefficients of the map with multiplier +1 from those of one return at a real multiplier."""
-    status, sampled, (third, cubic_error) = fit
-    cubic, (quadratic, quadratic_error) = third.real, sampled.term((2, 0))
-    fourth, fourth_error = sampled.term((4, 0))
-    off = orbit_error
-    if off is None:
-        off = _loose_by(mapped, at, abs(quadratic), abs(cubic) + cubic_error)
-    if off > 0.0:
-        quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
-        cubic_error += 4.0 * (abs(fourth) + fourth_error) * off
-    k = at.image.returns
-    if at.multiplier.real < 0.0:
-        # a -> -a + c a^3 twice: a -> a - 2 c a^3.
-        times = k if k % 2 == 0 else 2 * k
-        return NormalForm(status, 0.0, 0.0, -times * cubic, times * cubic_error, amplitude=sampled.radius)
-    cubic = k * cubic + k * (k - 1) * quadratic.real**2
-    cubic_error = k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error
-    quadratic_value, quadratic_error = k * quadratic.real, k * quadratic_error
-    return NormalForm(status, quadratic_value, quadratic_error, cubic, cubic_error, amplitude=sampled.radius)
+_TRIALS = 40  # largest number of sampled amplitudes
+_SHARE = 0.03  # wanted departure of the map from its linear part, relative to the amplitude
+_FAR = 5.0  # largest departure that a step upward for accuracy may reach, relative to the wanted one
+_TOO_FAR = 0.3  # largest useful departure
+_UP, _FIRST_DOWN = 30.0, 0.1  # longest step of the amplitude upward; step where the map cannot be evaluated
+_FAR_DOWN, _LEAST_DOWN = 1e-3, 0.3  # longest and shortest step downward where the map is far from linear
+_LOST = 1e-6  # relative departure from linearity that is too small to start from
+_BLURRED = 1e-3  # largest error at the orbit itself, relative to the amplitude
+_LONG_UP, _UPS = 1e3, 5  # step of the amplitude while a map seems linear, and number of such steps
+_CLOSE = 4.0  # ratio of amplitudes that ends the search
+_RESOLVED = 0.7  # proposed factor of the amplitude above which a series has converged to the noise
+_DOWNS = 6  # largest number of steps down for convergence: the series of a map that is not smooth never converges
+_BENDS = 3  # largest number of bends of the curve at one amplitude
+_ENOUGH = 3e-8  # relative error that ends the search
+_FULL = 8  # highest visible order above which a larger amplitude would lose accuracy
+_BETTER = 0.3  # factor on the error that justifies a further step
+
+Fit = tuple[NormalFormStatus, Sampled, Term]
+"""Status, FOUND or LINEAR, the map at the best amplitude, and the resonant cubic term of one return."""
+
+
+def _fitted(manifold: Manifold, radius: float) -> Fit | None:
+    """The terms at the amplitude and bend of the most accurate cubic coefficient; None if none is suitable.
+
+    The search lowers the amplitude where the map is far from its linear part, raises it where the noise hides the
+    nonlinear terms, bends the curve along the centre manifold, and continues while the error of the coefficient falls.
+    """
+    third = (3, 0) if manifold.at.real else (2, 1)
+    # Hill climbing in the amplitude, up or down (`direction`, 0 before an error is known); `best` has the least error
+    # of the coefficient, infinite while the map seems linear.
+    low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
+    best, best_error = None, np.inf
+    bends = ups = downs = reversals = 0
+    direction = 0.0
+    for _ in range(_TRIALS):
+        sample = manifold.sample(radius)
+        departure, order, visible = (np.inf, 2, True) if sample is None else _departure(sample, manifold.at.multiplier)
+        if sample is not None and sample.blur > _BLURRED * radius:  # the orbit's error hides the terms
+            low, factor = radius, _UP
+        elif sample is None or departure > _TOO_FAR:
+            high, factor = radius, _FIRST_DOWN if sample is None else _toward(departure, order)
+        elif visible and best_error == np.inf and downs < _DOWNS and sample.falling and sample.shrink < _RESOLVED:
+            high, factor, downs = radius, max(sample.shrink, _FIRST_DOWN), downs + 1  # the series has not converged
+        elif bends < _BENDS and manifold.bend(sample):
+            bends += 1
+            continue  # once more, along the better curve
+        elif not visible:  # the map is linear to its error
+            best, low, ups = (sample, dict(manifold.curve)), radius, ups + 1
+            factor = _linear_up(manifold, radius, high) if ups <= _UPS else np.inf
+        else:
+            value, error = sample.term(third)
+            better = error < _BETTER * best_error
+            if error < best_error:
+                best, best_error = (sample, dict(manifold.curve)), error
+            full = _highest(sample) > _FULL
+            if error <= _ENOUGH * abs(value) or (full and sample.shrink > _RESOLVED):
+                break
+            if direction == 0.0:
+                direction = -1.0 if full else 1.0
+            elif not better:
+                direction, reversals = -direction, reversals + 1
+                radius = best[0].radius if best else radius
+            if reversals > 1:
+                break
+            # The noise in the coefficient falls with the third power of the amplitude.
+            wanted = min(float(np.cbrt(error / max(_ENOUGH * abs(value), 1e-300))), _toward(departure / _FAR, order))
+            factor = max(_toward(departure, order) ** 0.5, wanted, 2.0) if direction > 0.0 else 0.5
+        bends = 0
+        nearer = _within(radius * factor, low, high)
+        if nearer is None:
+            break
+        radius = nearer
+    if best is None or (best_error == np.inf and np.isfinite(high)):
+        return None
+    sample, manifold.curve = best
+    status = NormalFormStatus.LINEAR if best_error == np.inf else NormalFormStatus.FOUND
+    return status, sample, manifold.coefficient(sample, third)
+
+
+def _linear_up(manifold: Manifold, radius: float, high: float) -> float:
+    """Least factor on the amplitude at which nonlinear terms may become visible; infinite if none is found."""
+    at, factor = manifold.at, 1.0
+    for _ in range(_UPS):
+        factor *= _LONG_UP
+        if factor * radius >= high:
+            break
+        shift = at.displacements(manifold.curve, factor * radius * at.turns())
+        image = manifold.images(shift)
+        if image is None:
+            break
+        size = np.abs(at.state) + np.abs(shift) @ np.abs(at.image.jacobian).T
+        if (np.abs(image - shift @ at.image.jacobian.T) > _LOST * size).any():
+            break
+    else:
+        return np.inf
+    return factor
+
+
+def _departure(found: Sampled, multiplier: complex) -> tuple[float, int, bool]:
+    """Departure from linearity relative to the amplitude, order of its main term, True if it exceeds the noise."""
+    sizes = np.abs([one.coefficients[1:, -1] for one in found.harmonics])
+    h, k = np.unravel_index(int(sizes.argmax()), sizes.shape)
+    share, order = float(sizes[h, k]), found.harmonics[h].parity + 2 * int(k) + 2
+    seen = share > 4.0 * float(found.noise[-1])
+    # A saturating map is linear again far out, with another slope.
+    slope = abs(found.harmonics[1].coefficients[0, -1] - multiplier * found.radius)
+    if slope > _TOO_FAR * found.radius:
+        share, seen = max(share, float(slope)), True
+    return share / found.radius, order, seen
+
+
+def _highest(found: Sampled) -> int:
+    """The highest order above the noise in the projected map."""
+    return max(
+        one.parity + 2 * int(np.flatnonzero(np.abs(one.coefficients[:, -1]) > found.noise[-1]).max(initial=0))
+        for one in found.harmonics
+    )
+
+
+def _toward(share: float, order: int) -> float:
+    """The factor of the amplitude at which a term of some order has the wanted size."""
+    if share == 0.0:
+        return _UP
+    factor = float((_SHARE / share) ** (1.0 / (order - 1)))
+    return min(max(factor, _FAR_DOWN), _LEAST_DOWN) if share > _TOO_FAR else min(factor, _UP)
+
+
+def _within(radius: float, low: float, high: float) -> float | None:
+    """An amplitude between two, preferably a given one; None if they are close together."""
+    if low < radius < high:
+        return radius
+    between = float(np.sqrt(low) * np.sqrt(high))
+    return between if 0.0 < between < np.inf and high > _CLOSE * low else None
 
 
 _QUINTIC_BENDS = 4  # one for every order of the manifold, and one more
@@ -300,7 +291,7 @@ class Quintic:
     amplitude: float  # largest amplitude at which the return map was sampled
 
 
-def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float) -> Quintic | None:
+def quintic(mapped: StateMap, at: CriticalOrbit, amplitude: float) -> Quintic | None:
     """The coefficient of fifth order at a critical orbit, from the amplitude with the smallest error; the search starts
     at that of the normal form of third order. None if the map is undefined at all amplitudes. A multiplier +1 belongs
     to a pitchfork, whose symmetry excludes terms of even order."""
@@ -312,31 +303,30 @@ def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float) -> Quin
         while worse < _WORSE and tries < _TRIES:
             manifold.curve = dict(curve)
             with np.errstate(all="ignore"):
-                found = _measured(manifold, at, radius * factor**tries)
+                found = _fifth_at(manifold, radius * factor**tries)
             tries, worse = tries + 1, worse + 1
             if found is not None and (best is None or found.error < best.error):
                 best, curve, worse = found, found.curve, 0
     return best
 
 
-def _measured(manifold: Manifold, at: CriticalOrbit, radius: float) -> Quintic | None:
-    found = manifold.sample(radius)
-    for _ in range(_QUINTIC_BENDS):
-        if found is None or not manifold.bend(found):
-            break
-        found = manifold.sample(radius)
+def _fifth_at(manifold: Manifold, radius: float) -> Quintic | None:
+    """The coefficient of fifth order from samples up to a radius; None if the map is undefined there."""
+    found, bends = manifold.sample(radius), 0
+    while found is not None and bends < _QUINTIC_BENDS and manifold.bend(found):
+        found, bends = manifold.sample(radius), bends + 1
     if found is None:
         return None
-    powers = ((3, 0), (5, 0)) if at.real else ((2, 1), (3, 2))
+    powers = ((3, 0), (5, 0)) if manifold.at.real else ((2, 1), (3, 2))
     third, fifth = (manifold.coefficient(found, each) for each in powers)
-    coefficient, error = _fifth_of_full_period(at, third, fifth)
+    coefficient, error = _fifth_of_full_period(manifold.at, third, fifth)
     return Quintic(coefficient, error, manifold.curve, found.radius) if np.isfinite(error) else None
 
 
 def _fifth_of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[float, float]:
     """Coefficient of fifth order over a full period, or over two, from the terms of one return."""
     (c, c_error), (e, e_error) = third, fifth
-    cubic, cubic_error, value, error, times = c.real, c_error, e.real, e_error, at.image.returns
+    cubic, cubic_error, value, error, times = c.real, c_error, e.real, e_error, at.times
     if not at.real:
         # z -> nu z (1 + c |z|^2 + e |z|^4): |1 + u| = 1 + Re u + (Im u)^2 / 2 + ...
         c, e = c * at.multiplier.conjugate(), e * at.multiplier.conjugate()
@@ -347,7 +337,7 @@ def _fifth_of_full_period(at: CriticalOrbit, third: Term, fifth: Term) -> tuple[
         value = 3.0 * cubic * cubic - 2.0 * value
         error = 2.0 * error + 3.0 * (2.0 * abs(cubic) + cubic_error) * cubic_error
         cubic, cubic_error = -2.0 * cubic, 2.0 * cubic_error
-        times = times // 2 if times % 2 == 0 else times
+        times //= 2
     # a -> a + c a^3 + e a^5, iterated.
     pairs = 1.5 * times * (times - 1)
     error = times * error + pairs * (2.0 * abs(cubic) + cubic_error) * cubic_error

@@ -1,9 +1,12 @@
 """Finite groups of matrices: the spatial symmetries P f(t, x) = f(t, P x) of a system.
 
+:func:`finite_group` finds scales of the coordinates in which all powers of the generators have entries of order one,
+then all products, and last coordinates in which every element is orthogonal: the mean of P^T P over the group is a
+metric in which it is (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer
+1988, proposition XII.1.3).
+
 An orbit that is invariant under a group, P x(t) = x(t), has a return map whose derivative commutes with every P of it;
-:mod:`.isotypic` splits it into blocks. The matrices need not be orthogonal: the mean of P^T P over the
-group is a metric in which they are (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II,
-Springer 1988, proposition XII.1.3).
+:func:`isotropy` and :func:`centraliser` find such a subgroup, and :mod:`.isotypic` splits the derivative into blocks.
 """
 
 from __future__ import annotations
@@ -78,9 +81,9 @@ def finite_group(generators: ArrayLike) -> Group:
         allowed = f"1 to {_MOST_GENERATORS} real and finite ones of shape (n, n)"
         raise ParameterError("must be square matrices", field="generators", value=generators, allowed=allowed)
     most = max(1, min(_LARGEST_ORDER, _MOST_ENTRIES // n**2))
-    returns = [_powers(matrix, most) for matrix in given]
-    scales = _coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
-    for matrix, (_, residual) in zip(given, returns, strict=True):
+    envelopes, residuals = zip(*(_powers(matrix, most) for matrix in given), strict=True)
+    scales = _coordinate_scales(np.asarray(np.max(envelopes, axis=0)))
+    for matrix, residual in zip(given, residuals, strict=True):
         if np.abs(_scaled(residual, scales)).max() > _SAME:
             raise _infinite(matrix, most)
     found = _closure(given, scales, most)
@@ -106,7 +109,7 @@ def centraliser(group: Group, gamma: Array) -> Group:
     own = _scaled(group.elements, group.scales)
     left, right = matrix @ own, own @ matrix
     size = np.abs(matrix).max()
-    if size == 0.0 or np.linalg.matrix_rank(matrix) < group.dimension:
+    if np.linalg.matrix_rank(matrix) < group.dimension:
         raise ParameterError("is not invertible", field="symmetry")
     for image in matrix @ _scaled(group.generators, group.scales):  # which is P gamma for some element P
         if not np.abs(right - image).max(axis=(1, 2)).min() <= _SAME * size:
@@ -211,21 +214,14 @@ class Images:
         self._weights: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES)) / dimension
         self._cells: dict[int, list[Array]] = {}
 
-    def known(self, image: Array) -> bool:
-        """True if an image is in the set."""
-        cell = self._cell(image)
-        near = (each for beside in (cell, cell - 1, cell + 1) for each in self._cells.get(beside, ()))
-        return any(np.abs(each - image).max() < _SAME for each in near)
-
     def new(self, image: Array) -> bool:
         """True if an image was not in the set, to which it is added."""
-        if self.known(image):
+        cell = math.floor(float(np.vdot(self._weights, image)) / _CELL)
+        near = (each for beside in (cell, cell - 1, cell + 1) for each in self._cells.get(beside, ()))
+        if any(np.abs(each - image).max() < _SAME for each in near):
             return False
-        self._cells.setdefault(self._cell(image), []).append(image)
+        self._cells.setdefault(cell, []).append(image)
         return True
-
-    def _cell(self, image: Array) -> int:
-        return math.floor(float(np.vdot(self._weights, image)) / _CELL)
 
 
 def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Array] | None:
@@ -234,7 +230,7 @@ def _closure(generators: Array, scales: Array, largest: int) -> tuple[Array, Arr
     images, elements = Images(n), [np.eye(n)]
     images.new(images.probes)
     for generator in generators:
-        if images.known(_scaled(generator, scales) @ images.probes):
+        if not images.new(_scaled(generator, scales) @ images.probes):
             continue
         needed = np.concatenate([needed, generator[None]])  # and the order at least doubles
         images, elements = Images(n), [np.eye(n)]

@@ -1,20 +1,20 @@
-"""Symmetry-adapted bases: matrices that commute with a finite group get one block for each irreducible representation;
-and bifurcations with a critical multiplier in a block.
+"""Symmetry-adapted bases of finite groups, and bifurcations with a critical multiplier in one of their blocks.
 
-No tables of characters are needed: the eigenspaces of a generic symmetric matrix that commutes with the group are
-irreducible (a mean over the group of a random one is generic). Characters give their equivalence and type (Serre,
-Linear Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections from one give all
-its copies (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer
-1988, sections XII.2 and XII.3).
+Matrices that commute with a group get one :class:`Block` for each irreducible representation. To find them,
+:func:`isotypic` needs no tables of characters: the eigenspaces of a generic symmetric matrix that commutes with the
+group are irreducible (a mean over the group of a random one is generic). Characters give their equivalence and type
+(Serre, Linear Representations of Finite Groups, Springer 1977, sections 2.7 and 13.2), and projections from one give
+all its copies (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II, Springer 1988,
+sections XII.2 and XII.3).
 
 The block determines the multipliers that are critical together, the terms of the normal form and, at +1 and -1, the
 lines of new orbits: those fixed by an axial isotropy subgroup (equivariant branching lemma, theorem XIII.3.3 there; for
-period doublings of maps Chossat & Golubitsky, SIAM J. Math. Anal. 19 (1988) 1259).
+period doublings of maps Chossat & Golubitsky, SIAM J. Math. Anal. 19 (1988) 1259). :func:`symmetric_crossing` finds
+them as intersections of the spaces that single elements fix.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,7 +125,7 @@ def _blocks(group: Group, random: np.random.Generator) -> list[Block] | None:
     return blocks if whole.shape == (n, n) and np.abs(whole.T @ whole - np.eye(n)).max() <= _EXACT else None
 
 
-def _irreducible(q: Array, coordinates: NDArray[np.intp], random: np.random.Generator) -> Iterator[Array]:
+def _irreducible(q: Array, coordinates: NDArray[np.intp], random: np.random.Generator) -> list[Array]:
     """Orthonormal bases, shape (n, d) each, of irreducible subspaces of the space of some of the coordinates."""
     own = q[:, coordinates[:, None], coordinates]
     k = len(coordinates)
@@ -136,7 +136,7 @@ def _irreducible(q: Array, coordinates: NDArray[np.intp], random: np.random.Gene
     levels = 1.0 + np.searchsorted(border, np.arange(k), side="right")
     embedded = np.zeros((q.shape[1], k))
     embedded[coordinates] = np.linalg.eigh(_mean(own, (vectors * levels) @ vectors.T))[1]
-    yield from np.split(embedded, border, axis=1)
+    return np.split(embedded, border, axis=1)
 
 
 def _mean(q: Array, matrix: Array) -> Array:
@@ -279,7 +279,7 @@ def _fixed_lines(rho: Array, critical: CircleEvent) -> tuple[list[Array], bool]:
     def take(projector: Array) -> None:
         """Note a space, unless it or a conjugate one is known."""
         size = round(float(np.trace(projector)))
-        if size == 0 or seen.known(projector @ seen.probes):
+        if size == 0 or not seen.new(projector @ seen.probes):
             return
         for image in rho @ projector @ np.swapaxes(rho, 1, 2) @ seen.probes:
             seen.new(image)
