@@ -3,6 +3,10 @@
 Two methods are combined. Zeros of functions that are analytic in the parameter (:mod:`.spectra`) show events however
 close they lie, but not two equal ones together. The number of eigenvalues outside the circle, known at every evaluated
 matrix, must change by the crossings in between: if not, the crossing multiplier is followed by its continuous rank.
+
+A search evaluates a few matrices, leaves aside what is critical at all of them, looks for the zeros of the function of
+each kind of event (:mod:`.zeros`), encloses a root in each change of sign, and balances the roots with the numbers
+outside (:mod:`.counts`).
 """
 
 from __future__ import annotations
@@ -19,16 +23,7 @@ from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
-from chilopod.stability.unit_circle.spectra import (
-    TARGETS,
-    CircleEvent,
-    Crossing,
-    Matrices,
-    Root,
-    Spectra,
-    factors,
-    margins,
-)
+from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, Matrices, Root, Spectra, factors, margins
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
 BUDGET = 5000  # default budget of matrices of a search
@@ -96,12 +91,13 @@ def find_crossings(
     spectra = Spectra(lambda places: matrices(parameter(places)), budget + len(known), affordable)
     finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
     try:
-        (status, found), crossings = finder.search(np.clip(place(np.array(known)), a, b)), []
+        status, found = finder.search(np.clip(place(np.array(known)), a, b))
     except SpentError:  # in the errors of multipliers, without which nothing is certain
         return Crossings((), SearchStatus.BUDGET, (), len(spectra.known))
+    crossings = []
     for each in found:
-        value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
-        crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
+        value, left, right, before, after = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
+        crossings.append(replace(each, value=value, bracket=(left, right), around=(before, after)))
     return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), len(spectra.known))
 
 
@@ -164,22 +160,23 @@ class _Finder:
     def _rest(self, places: Array) -> None:
         """Find factors that are critical at all places, with remarks."""
         idle = self.spectra.idle = {event: self._idle(places, event) for event in CircleEvent}
-        for event in (CircleEvent.PLUS, CircleEvent.MINUS):
+        real = CircleEvent.PLUS, CircleEvent.MINUS
+        for event in real:
             if idle[event]:
                 many = "a multiplier is" if idle[event] == 1 else f"{idle[event]} multipliers are"
                 self.report.remarks.append(f"{many} {event.label} throughout and left aside")
-        if idle[CircleEvent.PAIR] > sum(idle[event] * (idle[event] - 1) // 2 for event in TARGETS):
+        if idle[CircleEvent.PAIR] > sum(idle[event] * (idle[event] - 1) // 2 for event in real):
             self.spectra.conservative = True
             pairs = "multipliers come in pairs with product 1 throughout: the family is conservative"
             self.report.remarks.append(pairs)
 
     def _idle(self, places: Array, event: CircleEvent) -> int:
         """Number of factors of an event's function that vanish at all values of the parameter."""
+        if self._factors(event) == 0:
+            return 0
         few, nu = places.size < _PROBES, self.spectra.at(places)
         here = np.isfinite(nu).all(axis=1)
         places, nu = places[here], nu[here]
-        if self._factors(event) == 0:
-            return 0
         # A large eigenvalue makes the small ones, and their products with it, uncertain.
         largest = np.maximum(1.0, np.abs(nu).max(axis=1))
         if event is CircleEvent.PAIR:
