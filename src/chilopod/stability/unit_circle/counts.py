@@ -25,7 +25,7 @@ import numpy as np
 from chilopod.frozen import Array
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.spectra import UNKNOWN, CircleEvent, Crossing, Root, Spectra, margins
-from chilopod.stability.unit_circle.zeros import Interval, between
+from chilopod.stability.unit_circle.zeros import Interval
 
 LOST = "multipliers near the circle are known no better than their distance from it"
 
@@ -40,8 +40,10 @@ _SHADOW = 1.5  # distance of a crossing that explains a touch, in widths of the 
 
 @dataclass
 class Report:
-    """Remarks of a search, a sentence each, and flags for a spent budget and for open questions."""
+    """Remarks of a search, a sentence each, with places as ``shown`` values of the parameter; flags for a spent budget
+    and for open questions."""
 
+    shown: Callable[[float], float]
     remarks: list[str] = field(default_factory=list)
     spent: bool = False
     open: bool = False
@@ -50,6 +52,12 @@ class Report:
         """Note a remark on an open question."""
         self.open = True
         self.remarks.append(remark)
+
+    def between(self, gap: Interval) -> str:
+        """Words for an interval, with enough digits to separate its ends."""
+        low, high = map(self.shown, gap)
+        first, last = f"{low:.9g}", f"{high:.9g}"
+        return f"between {first} and {last}" if first != last else f"between {float(low)!r} and {float(high)!r}"
 
 
 class _Gap(NamedTuple):
@@ -70,11 +78,10 @@ class _Gap(NamedTuple):
 @dataclass
 class Accounts:
     """Numbers of multipliers outside the circle, at all values of an interval with known spectra, and the roots that
-    explain their changes; remarks go to a report, in terms of the parameter at a place."""
+    explain their changes."""
 
     spectra: Spectra
     ends: Interval
-    parameter: Callable[[float], float]
     report: Report
     _counts: dict[float, int | None] = field(default_factory=dict)
     _known: dict[tuple[Root, int], list[Crossing]] = field(default_factory=dict)  # by root and number of spectra
@@ -88,7 +95,7 @@ class Accounts:
     def balance(self, roots: list[Root]) -> list[Crossing]:
         """Crossings that explain the counts, in order."""
         self.spectra.at(np.array(self.ends))
-        roots = [root for root in roots if self._may_cross(root) and self._smooth(root)]
+        roots = [root for root in roots if self._may_cross(root)]
         for _ in range(_ROUNDS):
             roots = sorted(_without_shadows(roots), key=lambda root: root.place)
             gaps = self._gaps(roots)
@@ -115,9 +122,9 @@ class Accounts:
         decided = [(v, count) for v in values if (count := self._counts.get(v)) is not None]
         if not decided:
             return []
-        ends = (-np.inf, decided[0][1]), (np.inf, decided[-1][1])
-        beside = itertools.pairwise([ends[0], *decided, ends[1]])
-        gaps = [_Gap(x, y, before, after, []) for (x, before), (y, after) in beside]
+        first, last = (-np.inf, decided[0][1]), (np.inf, decided[-1][1])
+        neighbours = itertools.pairwise([first, *decided, last])
+        gaps = [_Gap(x, y, before, after, []) for (x, before), (y, after) in neighbours]
         places = [place for place, _ in decided]
         for root in roots:
             gaps[bisect.bisect_right(places, root.place)].inside.append(root)
@@ -200,7 +207,7 @@ class Accounts:
                 near = [v for v in spectra.values if x <= v <= y and self._count(v) is not None]
                 left = max(v for v in near if v <= root.place and (margin(v) > 0) == (margin(x) > 0))
                 right = min(v for v in near if v >= root.place and (margin(v) > 0) == (margin(y) > 0))
-                at = self.parameter(root.place)
+                at = self.report.shown(root.place)
                 self._remark(f"a multiplier jumps across the circle at {at:.9g}", (left, right))
                 jumped = True
             elif all(abs(root.place - other.place) > 16.0 * EPSILON * abs(root.place) for other in roots):
@@ -308,26 +315,23 @@ class Accounts:
         return self._known[key]
 
     def _may_cross(self, root: Root) -> bool:
-        """True if multipliers are critical at a root; a remark if only their errors leave that open."""
-        if self._critical(root):
-            return True
-        if self.spectra.exists(root.place) and float(self.spectra.tolerances(root).max()) > UNKNOWN:
+        """True if multipliers are critical at a root, and do not just jump over the circle there; a remark if only
+        their errors leave that open."""
+        crossings = self._critical(root)
+        if not crossings and self.spectra.exists(root.place):
             gap = root.left, root.right
-            if gap not in self._settled and not (root.touch and root.event is not None):
+            unknown = float(self.spectra.tolerances(root).max()) > UNKNOWN
+            if unknown and gap not in self._settled and not (root.touch and root.event is not None):
                 self._remark(LOST, gap)
-        return False
-
-    def _smooth(self, root: Root) -> bool:
-        """False if a multiplier jumps over the circle at a root of an event's function: it is never on it."""
         if root.touch or self.spectra.conservative:  # there multipliers that meet leave like square roots
-            return True
+            return bool(crossings)
         nu = self.spectra.at(np.array([root.place]))[0]
-        ranks = [int(np.abs(nu - each.multiplier).argmin()) for each in self._critical(root)]
-        return not any(self._jumps(root.place, rank) for rank in ranks)
+        ranks = [int(np.abs(nu - each.multiplier).argmin()) for each in crossings]
+        return bool(crossings) and not any(self._jumps(root.place, rank) for rank in ranks)
 
     def _remark(self, remark: str, gap: Interval) -> None:
         self._settled.add(gap)
-        self.report.leave(f"{remark}, {between(*map(self.parameter, gap))}")
+        self.report.leave(f"{remark}, {self.report.between(gap)}")
 
 
 def _without_shadows(roots: list[Root]) -> list[Root]:

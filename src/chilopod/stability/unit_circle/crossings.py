@@ -12,7 +12,7 @@ outside (:mod:`.counts`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from chilopod.labels import Labelled
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, Matrices, Root, Spectra, factors, margins
-from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
+from chilopod.stability.unit_circle.zeros import Zeros, find_zeros, first_places
 
 BUDGET = 5000  # default budget of matrices of a search
 
@@ -89,7 +89,7 @@ def find_crossings(
         return Crossings((), SearchStatus.BUDGET, (f"a search takes {least} matrices or more (`budget`)",), 0)
     a, b, parameter, place = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget + len(known), affordable)
-    finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
+    finder = _Finder(spectra, a, b, Report(lambda place: shown(float(parameter(place)))))
     try:
         status, found = finder.search(np.clip(place(np.array(known)), a, b))
     except SpentError:  # in the errors of multipliers, without which nothing is certain
@@ -127,8 +127,7 @@ class _Finder:
     spectra: Spectra
     a: float
     b: float
-    shown: Callable[[float], float]
-    report: Report = field(default_factory=Report)
+    report: Report
 
     def search(self, known: Array) -> tuple[SearchStatus, list[Crossing]]:
         """Find the crossings; eigenvalues outside are counted at ``known`` places too."""
@@ -147,7 +146,7 @@ class _Finder:
             self._probe()
         found = self._searched(events)
         roots = [root for event in events for root in self._roots(event, found[event])]
-        crossings = Accounts(spectra, (self.a, self.b), self.shown, report).balance(roots)
+        crossings = Accounts(spectra, (self.a, self.b), report).balance(roots)
         status = SearchStatus.CONSERVATIVE if spectra.conservative else SearchStatus.COMPLETE
         if report.spent or report.open:
             status = SearchStatus.BUDGET if report.spent else SearchStatus.INCOMPLETE
@@ -247,10 +246,10 @@ class _Finder:
         report.spent |= found.spent or spectra.left <= 0
         if not found.spent:
             for piece in found.unresolved:
-                report.leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
+                report.leave(f"the multipliers do not depend smoothly on the parameter {report.between(piece)}")
         if not report.spent:  # else they were not searched
             for piece in found.missing:
-                report.leave(f"there are no matrices {self._between(piece)}, or only in part")
+                report.leave(f"there are no matrices {report.between(piece)}, or only in part")
         roots = []
         for left, right in found.changes:
             if spectra.left <= 0:
@@ -261,7 +260,7 @@ class _Finder:
             if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
                 # Zero only by rounding, or two real multipliers have product 1.
                 if (np.abs(spectra.margins(left)) <= spectra.margin_errors(left)).any():
-                    report.leave(f"{LOST}, at {self.shown(left):.9g}")
+                    report.leave(f"{LOST}, at {report.shown(left):.9g}")
                 continue
             roots.append(Root(left, left, left, event) if left == right else self._root(event, left, right))
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]
@@ -283,6 +282,3 @@ class _Finder:
             return found if abs(found) > slope * max(within, _DIGITS * abs(place)) else 0.0
 
         return self.spectra.rooted(value, left, right, event, within)
-
-    def _between(self, piece: Interval) -> str:
-        return between(*map(self.shown, piece))

@@ -153,8 +153,7 @@ class Spectra:
         """Matrices in common units of the states that give rows and columns similar sizes."""
         if self._units is None:
             size = np.abs(matrices).max(axis=0)
-            filled = size + _FILL * size.max() if size.max() > 0.0 else size
-            units = numerical_balance(filled)
+            units = numerical_balance(size + _FILL * size.max())
             self._units = units if (np.isfinite(units) & (units > 0.0)).all() else np.ones_like(units)
         return np.asarray(matrices * (self._units / self._units[:, None]))
 
@@ -373,8 +372,7 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
 
 @cache
 def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    first, second = np.triu_indices(count, 1)
-    return first, second
+    return np.triu_indices(count, 1)
 
 
 def _meeting(upper: ComplexArray) -> ComplexArray:

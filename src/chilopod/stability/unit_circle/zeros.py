@@ -66,12 +66,6 @@ class Zeros(NamedTuple):
     spent: bool  # the budget ended the search
 
 
-def between(low: float, high: float) -> str:
-    """Words for an interval of the parameter, with enough digits to separate its ends."""
-    first, last = f"{low:.9g}", f"{high:.9g}"
-    return f"between {first} and {last}" if first != last else f"between {float(low)!r} and {float(high)!r}"
-
-
 def first_places(low: float, high: float) -> Array:
     """First places at which a search evaluates any function."""
     return _places(low, high, PLACES)
@@ -283,9 +277,8 @@ class _Search:
 
     def result(self) -> Zeros:
         """The zeros from the current parts."""
-        ends = [(x, x) for x in (self.low, self.high) if self.signs.get(x) == 0.0]
         met = sorted((place, sign) for place, sign in self.signs.items() if sign in (-1.0, 1.0))
-        changes: list[Interval] = []
+        changes: list[Interval] = [(x, x) for x in (self.low, self.high) if self.signs.get(x) == 0.0]
         touches: list[Interval] = []
         for before, run, after in self._runs():
             first, last = run[0], run[-1]
@@ -297,20 +290,16 @@ class _Search:
                 changes += zip(left[-1:], right[:1], strict=False)
             else:
                 touches += [part[:2] for part in run if part.kind is _Kind.ZERO]
-        of_kind = {kind: _joined([part[:2] for part in self.parts if part.kind is kind]) for kind in _Kind}
-        for a, b in of_kind[_Kind.ROUGH]:
+        rough = _joined([part[:2] for part in self.parts if part.kind is _Kind.ROUGH])
+        for a, b in rough:
             # The zeros here are not separated, but the observed changes of sign are certain.
             within = [each for each in met if a <= each[0] <= b]
             changes += [(x, y) for (x, u), (y, v) in itertools.pairwise(within) if u != v]
         # A zero on the border of two pieces leaves no part without a sign.
-        between_signs = [
-            (left.b, left.b)
-            for left, right in itertools.pairwise(self.parts)
-            if left.kind is right.kind is _Kind.SIGN and left.sign * right.sign < 0.0
-        ]
-        changes = sorted(changes + ends + between_signs)
+        changes += [(u.b, u.b) for u, v in itertools.pairwise(self.parts) if u.sign * v.sign < 0.0]
+        changes.sort()
         apart = [(a, b) for a, b in _joined(touches) if not any(x <= b and a <= y for x, y in changes)]
-        rough, missing = of_kind[_Kind.ROUGH], of_kind[_Kind.MISSING]
+        missing = _joined([part[:2] for part in self.parts if part.kind is _Kind.MISSING])
         return Zeros(tuple(changes), tuple(apart), tuple(rough), tuple(missing), self.spent)
 
 
