@@ -24,7 +24,7 @@ from chilopod.labels import Labelled
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, Matrices, Root, Spectra, factors, margins
-from chilopod.stability.unit_circle.zeros import Zeros, find_zeros, first_places
+from chilopod.stability.unit_circle.zeros import PLACES, Zeros, find_zeros, first_places
 
 BUDGET = 5000  # default budget of matrices of a search
 
@@ -85,7 +85,7 @@ def find_crossings(
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")
-    if budget < (least := 2 * first_places(0.0, 1.0).size):
+    if budget < (least := 2 * PLACES.size):
         return Crossings((), SearchStatus.BUDGET, (f"a search takes {least} matrices or more (`budget`)",), 0)
     a, b, parameter, place = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget + len(known), affordable)

@@ -345,22 +345,20 @@ def factors(nu: ComplexArray, event: CircleEvent) -> ComplexArray:
 def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
     """Elementary symmetric polynomials of the rows of ``terms``, all but ``left_out`` of them at a time, as signs and
     logarithms, shapes (k,). The rows are closed under conjugation."""
-    sizes = np.abs(terms)
     small = np.zeros((terms.shape[0], left_out + 1), dtype=np.complex128)
     small[:, 0] = 1.0
     logs = np.zeros(terms.shape[0])
     if left_out:
-        order = np.argsort(sizes, axis=1)
-        terms = np.take_along_axis(terms, order, axis=1)
-        few = min(terms.shape[1], 2 * left_out + _SPARE)
+        terms = np.take_along_axis(terms, np.argsort(np.abs(terms), axis=1), axis=1)
+        few = 2 * left_out + _SPARE
         for term in terms[:, :few].T:
             # Times (term + t), up to t^left_out; the others are too far from zero to matter.
             scale = np.maximum(np.abs(term), 1.0)
             logs += np.log(scale)
             shifted = np.concatenate([np.zeros_like(small[:, :1]), small[:, :-1]], axis=1)
             small = small * (term / scale)[:, None] + shifted / scale[:, None]
-        terms, sizes = terms[:, few:], np.abs(terms[:, few:])
-    last = small[:, left_out]
+        terms = terms[:, few:]
+    sizes, last = np.abs(terms), small[:, left_out]
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real))
     # Real and imaginary part separately: the quotient of a complex subnormal and its size would overflow.
