@@ -1,5 +1,11 @@
-"""Crossings in the blocks of an orbit's symmetries, and their places, with error bounds, along a coordinate in which
-orbits are smooth. At a multiplier +1 of the return map H, where H - 1 is singular, place and orbit are interpolated."""
+"""Crossings in the blocks of an orbit's symmetries, and their places, with error bounds.
+
+:func:`orbit_blocks` splits a return map by the symmetries of the orbit, and :func:`crossings_in` searches one of the
+blocks. A :class:`Course` then gives orbits along a coordinate in which they are smooth, each with its return map H as a
+:class:`Sample`. :func:`place_error` bounds the error of a crossing's place: the error of its critical multipliers over
+their rate of change along the course. At a multiplier +1 the orbit itself is uncertain, because H - 1 is singular;
+there :func:`past_singular` interpolates place and orbit from samples beside it.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +30,18 @@ from chilopod.stability.symmetry.groups import centraliser, commutes, finite_gro
 from chilopod.stability.symmetry.isotypic import Block, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings
 from chilopod.stability.unit_circle.spectra import TARGETS, CircleEvent, Crossing, Matrices, distances
+
+SAFETY = 1.5  # factor on the error of a multiplier, for that of its rate of change
+
+_NEAR = 1e3  # largest distance of known sides of a crossing, relative to the usual one
+_TOUCH_STEP = 1e-3  # distance from a touch at which the multiplier is computed, relative to the course
+_ASIDE = np.arange(1.0, 9.0) / 4.0  # nodes of the interpolation of a singular orbit on one side, in units of the reach
+_AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both sides
+_REACH, _LEAST_REACH = 0.02, 1e-5  # first and least reach, relative to the course
+_SHORTER = 0.25  # ratio of a reach to the one before
+_AGREES = 1e-6  # largest difference of two interpolations, relative to the reach
+_TOGETHER = 0.1  # distance of a multiplier from +1, relative to the next one's, at which both cross together
+_AT_HOME = 0.01  # largest distance from the root finder's place, relative to the reach
 
 
 def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...], tuple[str, ...]]:
@@ -56,19 +74,6 @@ def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matr
         replace(each, multiplicity=times * each.multiplicity, change=times * each.change) for each in found.crossings
     )
     return replace(found, crossings=crossings)
-
-
-SAFETY = 1.5  # factor on the error of a multiplier, for that of its rate of change
-
-_NEAR = 1e3  # largest distance of known sides of a crossing, relative to the usual one
-_TOUCH_STEP = 1e-3  # distance from a touch at which the multiplier is computed, relative to the course
-_ASIDE = np.arange(1.0, 9.0) / 4.0  # nodes of the interpolation of a singular orbit on one side, in units of the reach
-_AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both sides
-_REACH, _LEAST_REACH = 0.02, 1e-5  # first and least reach, relative to the course
-_SHORTER = 0.25
-_AGREES = 1e-6  # largest difference of two interpolations, relative to the reach
-_TOGETHER = 0.1  # distance of a multiplier from +1, relative to the next one's, at which both cross together
-_AT_HOME = 0.01  # largest distance from the root finder's place, relative to the reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,8 +219,7 @@ Bounded = Callable[[float, Array, Array, float], Orbit]
 """The orbit at a place, with error bounds, from an interpolated one with its error, and the duration of a return."""
 
 
-@dataclass(frozen=True, eq=False)
-class Regular(ReadOnlyArrays):
+class Regular(NamedTuple):
     """An interpolated singular orbit: place, error bound, ``orbit`` of a sample there with its error, distance of the
     samples, and the orbit itself."""
 

@@ -1,12 +1,14 @@
 """Multipliers of largest modulus of a large system, without its derivative as a matrix, for ``multipliers(leading=)``.
 
-The derivative is applied to blocks of directions: a block resolves multiple multipliers, as of a ring, and the compiled
-flow carries several directions at nearly the cost of one. The subspace may grow to the whole space, where it is exact.
+:class:`TangentMap` applies the derivative of the return map to a block of directions. A block resolves multiple
+multipliers, as of a ring, and the compiled flow carries several directions at nearly the cost of one. From a block,
+:func:`krylov_subspaces` makes a growing subspace; it may grow to the whole space, where it is exact.
 
-The orbit is found by Newton's method, with linear systems solved in such a subspace to about the accuracy that it can
-use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), from a block with the least contracting
-directions of earlier rounds: a strongly dissipative system takes a few directions (compare the Newton-Picard methods of
-Lust, Roose, Spence and Champneys, *SIAM J. Sci. Comput.* 19, 1188, 1998).
+:func:`closed_orbit` finds the orbit by Newton's method, with linear systems solved in such a subspace to about the
+accuracy that it can use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), from a block with the
+least contracting directions of earlier rounds: a strongly dissipative system takes a few directions (compare the
+Newton-Picard methods of Lust, Roose, Spence and Champneys, *SIAM J. Sci. Comput.* 19, 1188, 1998). Then
+:func:`leading_multipliers` takes the eigenvalues of the derivative in a subspace, and bounds their errors.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +25,7 @@ from chilopod.flows.arguments import UserCode, shape_of
 from chilopod.flows.carrying import REPEATED
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.interface import Capabilities, check_finite, is_autonomous, returns_per_period
+from chilopod.stability.interface import Capabilities, check_finite, returns_per_period
 from chilopod.stability.returns import (
     BESIDE,
     CUTS,
@@ -59,8 +62,7 @@ _CONVERGED = 1e-13  # residual, relative to the size of the matrix
 _SAFETY = 4.0  # factor on a norm estimated from eight or more random components
 
 
-@dataclass(frozen=True, eq=False)
-class KrylovSubspace(ReadOnlyArrays):
+class KrylovSubspace(NamedTuple):
     """A subspace V with A V = V H + Q R; every round applies A to the last block only, and Q continues V."""
 
     basis: Array  # V, orthonormal, shape (n, m)
@@ -160,13 +162,11 @@ class TangentMap(ReadOnlyArrays):
 
 def tangent_map(system: Capabilities, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
-    velocity, across = None, None
-    duration = return_duration(system)
-    if is_autonomous(system) and section is not None:
-        duration = sum(crossing(system, x, section, derived=False)[:2])
+    duration = return_duration(system) if section is None else sum(crossing(system, x, section, derived=False)[:2])
     state = turned(system, carried(system, x[None], 0.0, duration))[0]
     check_finite(state)
-    if is_autonomous(system) and section is not None:
+    velocity, across = None, None
+    if section is not None:
         velocity, across = velocity_at(system, state), Section(x, section.normal, duration)
     return TangentMap(system, x, state, duration, returns_per_period(system), across, velocity)
 

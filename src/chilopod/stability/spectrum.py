@@ -1,16 +1,16 @@
 """Eigenvalues of a return map, whole or in parts, with eigenvectors, bounds on their errors and on those of results.
 
-Where first-order bounds do not hold, a matrix is changed at random within the errors of its entries, and the error of a
-result is ``SAFETY`` times its largest observed change. This holds for simple and for defective eigenvalues, for which
-a condition number gives no error. A draw moves a result along its gradient in a random
-direction, which in one case of twelve is less than a tenth of the root mean square over all directions (Kenney and
-Laub, *SIAM J. Sci. Comput.* 15, 36, 1994); all of ``DRAWS`` are so small in one case of 600 million.
+:func:`spectrum` takes the return map as one matrix. Where first-order bounds do not hold, the matrix is changed at
+random within the errors of its entries, and the error of a result is ``SAFETY`` times its largest observed change. This
+holds for simple and for defective eigenvalues, for which a condition number gives no error. A draw moves a result along
+its gradient in a random direction, which in one case of twelve is less than a tenth of the root mean square over all
+directions (Kenney and Laub, *SIAM J. Sci. Comput.* 15, 36, 1994); all of ``DRAWS`` are so small in one case of 600
+million.
 
-A return in parts is a product of matrices. One of many factors that contract some directions enormously resolves only
-the slow directions; the fast ones vanish in round-off. Subspace iteration forward through the factors gives the nested
-spaces of the slowest directions, iteration backward through the inverses those of the fastest, and their intersections
-split the space into groups of like size (the Oseledets splitting of a periodic cocycle). The product restricted to a
-group is small and well scaled.
+:func:`split_return` takes the return as a product of many matrices, of which only the slow directions survive
+round-off. Subspace iteration forward through the factors gives the nested spaces of the slowest directions, iteration
+backward through the inverses those of the fastest, and their intersections split the space into groups of like size
+(the Oseledets splitting of a periodic cocycle). The product restricted to a group is small and well scaled.
 
 The derivative of a stiff flow does not resolve a direction that decays by e^-1000 within a step of an implicit method,
 and the multipliers do not need it. Its exponent is that of the volume, the integral of the divergence of f (Liouville's
@@ -24,6 +24,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,14 +36,10 @@ from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import Capabilities, SystemLike, checked_flow, is_autonomous, is_stiff, sizes
 from chilopod.stability.returns import ReturnMap, flow_with_error, velocity_at
 
-SAFETY, DRAWS = 10.0, 8  # factor on the largest change of a result under random changes, and their number
-
-FIRST_ORDER = 1e-6  # error, relative to the largest eigenvalue, up to which first-order bounds hold
-
-VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
-"""Words for the results of :func:`stable_within`."""
-
 EPSILON = float(np.finfo(float).eps)
+SAFETY, DRAWS = 10.0, 8  # factor on the largest change of a result under random changes, and their number
+FIRST_ORDER = 1e-6  # error, relative to the largest eigenvalue, up to which first-order bounds hold
+VERDICTS = {True: "stable", False: "unstable", None: "undecided"}  # words for the results of stable_within
 
 
 def stable_within(values: ComplexArray, bound: Array | float, bounds: Array | float | None = None) -> bool | None:
@@ -171,8 +168,7 @@ _FEWEST, _MOST, _MOST_STIFF = 8, 32768, 4096  # numbers of parts of moderate con
 _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, above which the flow has no parts
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """A return in parts, between planes across the motion if a system does not depend on time."""
 
     units: Array  # sizes of the states, shape (n,)
@@ -180,14 +176,8 @@ class Cut:
     factors: Sequence[Array]  # derivatives of the flow over the parts, the last one with the symmetry in time
     errors: Sequence[Array]  # bounds on the errors of their entries
 
-    @property
-    def basis(self) -> Array:
-        """The first plane in the units of the system."""
-        return self.units[:, None] * self.section
 
-
-@dataclass(frozen=True)
-class _Part:
+class _Part(NamedTuple):
     """The derivative of the flow over a part of the return, with the bound on its error, in units; and its end."""
 
     start: float
@@ -226,9 +216,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
 
 def section_basis(system: SystemLike, state: Array, units: Array) -> Array:
     """Orthonormal basis of the plane across the motion, in units, shape (n, n-1), or of the whole space."""
-    if not is_autonomous(system):
-        return np.eye(units.size)
-    return normal_basis(velocity_at(system, state) / units)
+    return normal_basis(velocity_at(system, state) / units) if is_autonomous(system) else np.eye(units.size)
 
 
 def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) -> _Part:
@@ -294,18 +282,15 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
         [one[:, :b] @ np.linalg.svd(one[:, :b].T @ other[:, : n - a])[0][:, : b - a] for one, other in both]
         for a, b in itertools.pairwise(borders)
     ]
-    logarithms, vectors = [], []
-    for bases in groups:
-        # A fast direction carried along would be lost in the round-off of the slow ones.
-        values, columns = _eigen(_restricted(factors, bases))
-        logarithms.append(values)
-        vectors.append(bases[0] @ columns)
-    log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
-    if not np.isfinite(log_all).all():  # directions that could not be separated
+    # A fast direction carried along would be lost in the round-off of the slow ones.
+    found = [_eigen(_restricted(factors, bases)) for bases in groups]
+    logarithms = np.concatenate([values for values, _ in found])
+    vectors = np.hstack([bases[0] @ columns for bases, (_, columns) in zip(groups, found, strict=True)])
+    if not np.isfinite(logarithms).all():  # directions that could not be separated
         raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
-    order = np.argsort(-log_all.real, kind="stable")
-    moved = _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, logarithms)
-    return log_all[order], vec_all[:, order], moved[order]
+    moved = _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, [values for values, _ in found])
+    order = np.argsort(-logarithms.real, kind="stable")
+    return logarithms[order], vectors[:, order], moved[order]
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
@@ -325,10 +310,9 @@ def _iterate(factors: Sequence[Array] | Array, n: int) -> tuple[list[Array], Arr
     column by every factor of the last passes, shape (k, n), zero where a factor maps it to zero; and the change of the
     space of the first j in a pass."""
     basis = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
-    bases: list[Array] = []
     stretches: list[Array] = []
     for _ in range(_PASSES):
-        bases = []
+        bases: list[Array] = []
         for factor in factors:
             bases.append(basis)
             packed, reflections, _, _ = dgeqrf(factor @ basis)  # a fifth of the time of numpy's qr if small
@@ -356,12 +340,11 @@ def _moved(factors: Array, errors: Array, groups: Sequence[Sequence[Array]], kno
     """Largest change of the logarithms when factors change by their errors with random signs, with a safety factor."""
     nodes = np.array([np.hstack(bases) for bases in zip(*groups, strict=True)])
     sizes = np.cumsum([0, *(len(values) for values in known)])
-    moved = np.zeros(sizes[-1])
     try:
         ends = np.roll(np.linalg.inv(nodes), -1, axis=0)
     except np.linalg.LinAlgError:
-        return np.full(moved.size, np.inf)
-    random = np.random.default_rng(0)
+        return np.full(sizes[-1], np.inf)
+    random, moved = np.random.default_rng(0), np.zeros(sizes[-1])
     for _ in range(DRAWS):
         others = ends @ (factors + errors * random.choice([-1.0, 1.0], factors.shape)) @ nodes
         for values, (a, b) in zip(known, itertools.pairwise(sizes), strict=True):
@@ -379,7 +362,7 @@ def split_return(system: SystemLike, x: Array, image: ReturnMap) -> tuple[Comple
         return _split_stiff(system, x, image)
     cut = moderate_cut(system, x, image)
     values, vectors, moved = split_product(cut.factors, cut.errors)
-    return values, cut.basis @ vectors, moved
+    return values, (cut.units[:, None] * cut.section) @ vectors, moved
 
 
 def _split_stiff(system: Capabilities, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
@@ -395,8 +378,8 @@ def _split_stiff(system: Capabilities, x: Array, image: ReturnMap) -> tuple[Comp
     growth, error = system.flow_volume(x, 0.0, image.duration)
     turned = system.symmetry is not None and np.linalg.det(system.symmetry) < 0.0
     fastest = complex(growth, np.pi if turned else 0.0) - values.sum()
-    modes = np.hstack([modes, _fastest(system, x, cut, image.duration)])
-    return np.append(values, fastest), np.asarray(cut.basis @ modes), np.append(errors, error + errors.sum())
+    modes = (cut.units[:, None] * cut.section) @ np.hstack([modes, _fastest(system, x, cut, image.duration)])
+    return np.append(values, fastest), modes, np.append(errors, error + errors.sum())
 
 
 def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:

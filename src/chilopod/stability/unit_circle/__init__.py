@@ -1,1 +1,1 @@
-"""Eigenvalues of a family of matrices on the unit circle: zeros, counts and their errors."""
+"""Eigenvalues of a family of matrices on the unit circle: the search (``crossings``), its spectra, zeros and counts."""

@@ -3,12 +3,16 @@
 Two methods are combined. Zeros of functions that are analytic in the parameter (:mod:`.spectra`) show events however
 close they lie, but not two equal ones together. The number of eigenvalues outside the circle, known at every evaluated
 matrix, must change by the crossings in between: if not, the crossing multiplier is followed by its continuous rank.
+
+A search evaluates a few matrices, leaves aside what is critical at all of them, looks for the zeros of the function of
+each kind of event (:mod:`.zeros`), encloses a root in each change of sign, and balances the roots with the numbers
+outside (:mod:`.counts`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,17 +23,8 @@ from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
-from chilopod.stability.unit_circle.spectra import (
-    TARGETS,
-    CircleEvent,
-    Crossing,
-    Matrices,
-    Root,
-    Spectra,
-    factors,
-    margins,
-)
-from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
+from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, Matrices, Root, Spectra, factors, margins
+from chilopod.stability.unit_circle.zeros import PLACES, Zeros, find_zeros, first_places
 
 BUDGET = 5000  # default budget of matrices of a search
 
@@ -90,18 +85,19 @@ def find_crossings(
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")
-    if budget < (least := 2 * first_places(0.0, 1.0).size):
+    if budget < (least := 2 * PLACES.size):
         return Crossings((), SearchStatus.BUDGET, (f"a search takes {least} matrices or more (`budget`)",), 0)
     a, b, parameter, place = _coordinate(low, high)
     spectra = Spectra(lambda places: matrices(parameter(places)), budget + len(known), affordable)
-    finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
+    finder = _Finder(spectra, a, b, Report(lambda place: shown(float(parameter(place)))))
     try:
-        (status, found), crossings = finder.search(np.clip(place(np.array(known)), a, b)), []
+        status, found = finder.search(np.clip(place(np.array(known)), a, b))
     except SpentError:  # in the errors of multipliers, without which nothing is certain
         return Crossings((), SearchStatus.BUDGET, (), len(spectra.known))
+    crossings = []
     for each in found:
-        value, *bracket, a, b = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
-        crossings.append(replace(each, value=value, bracket=tuple(bracket), around=(a, b)))
+        value, left, right, before, after = parameter(np.array([each.value, *each.bracket, *each.around])).tolist()
+        crossings.append(replace(each, value=value, bracket=(left, right), around=(before, after)))
     return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), len(spectra.known))
 
 
@@ -131,8 +127,7 @@ class _Finder:
     spectra: Spectra
     a: float
     b: float
-    shown: Callable[[float], float]
-    report: Report = field(default_factory=Report)
+    report: Report
 
     def search(self, known: Array) -> tuple[SearchStatus, list[Crossing]]:
         """Find the crossings; eigenvalues outside are counted at ``known`` places too."""
@@ -151,7 +146,7 @@ class _Finder:
             self._probe()
         found = self._searched(events)
         roots = [root for event in events for root in self._roots(event, found[event])]
-        crossings = Accounts(spectra, (self.a, self.b), self.shown, report).balance(roots)
+        crossings = Accounts(spectra, (self.a, self.b), report).balance(roots)
         status = SearchStatus.CONSERVATIVE if spectra.conservative else SearchStatus.COMPLETE
         if report.spent or report.open:
             status = SearchStatus.BUDGET if report.spent else SearchStatus.INCOMPLETE
@@ -164,22 +159,23 @@ class _Finder:
     def _rest(self, places: Array) -> None:
         """Find factors that are critical at all places, with remarks."""
         idle = self.spectra.idle = {event: self._idle(places, event) for event in CircleEvent}
-        for event in (CircleEvent.PLUS, CircleEvent.MINUS):
+        real = CircleEvent.PLUS, CircleEvent.MINUS
+        for event in real:
             if idle[event]:
                 many = "a multiplier is" if idle[event] == 1 else f"{idle[event]} multipliers are"
                 self.report.remarks.append(f"{many} {event.label} throughout and left aside")
-        if idle[CircleEvent.PAIR] > sum(idle[event] * (idle[event] - 1) // 2 for event in TARGETS):
+        if idle[CircleEvent.PAIR] > sum(idle[event] * (idle[event] - 1) // 2 for event in real):
             self.spectra.conservative = True
             pairs = "multipliers come in pairs with product 1 throughout: the family is conservative"
             self.report.remarks.append(pairs)
 
     def _idle(self, places: Array, event: CircleEvent) -> int:
         """Number of factors of an event's function that vanish at all values of the parameter."""
+        if self._factors(event) == 0:
+            return 0
         few, nu = places.size < _PROBES, self.spectra.at(places)
         here = np.isfinite(nu).all(axis=1)
         places, nu = places[here], nu[here]
-        if self._factors(event) == 0:
-            return 0
         # A large eigenvalue makes the small ones, and their products with it, uncertain.
         largest = np.maximum(1.0, np.abs(nu).max(axis=1))
         if event is CircleEvent.PAIR:
@@ -250,10 +246,10 @@ class _Finder:
         report.spent |= found.spent or spectra.left <= 0
         if not found.spent:
             for piece in found.unresolved:
-                report.leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
+                report.leave(f"the multipliers do not depend smoothly on the parameter {report.between(piece)}")
         if not report.spent:  # else they were not searched
             for piece in found.missing:
-                report.leave(f"there are no matrices {self._between(piece)}, or only in part")
+                report.leave(f"there are no matrices {report.between(piece)}, or only in part")
         roots = []
         for left, right in found.changes:
             if spectra.left <= 0:
@@ -264,7 +260,7 @@ class _Finder:
             if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
                 # Zero only by rounding, or two real multipliers have product 1.
                 if (np.abs(spectra.margins(left)) <= spectra.margin_errors(left)).any():
-                    report.leave(f"{LOST}, at {self.shown(left):.9g}")
+                    report.leave(f"{LOST}, at {report.shown(left):.9g}")
                 continue
             roots.append(Root(left, left, left, event) if left == right else self._root(event, left, right))
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]
@@ -286,6 +282,3 @@ class _Finder:
             return found if abs(found) > slope * max(within, _DIGITS * abs(place)) else 0.0
 
         return self.spectra.rooted(value, left, right, event, within)
-
-    def _between(self, piece: Interval) -> str:
-        return between(*map(self.shown, piece))

@@ -1,4 +1,11 @@
-"""Eigenvalues along a family of matrices, their errors, functions that vanish at critical ones, and these."""
+"""Multipliers along a family of matrices: eigenvalues, their errors, and the critical ones.
+
+:class:`Spectra` keeps what is known of a family. At any value it gives the eigenvalues, their margins (distances from
+the circle, with a sign), and bounds on the errors of these, from matrices that are changed within their errors. For
+each :class:`CircleEvent` it has a function, analytic in the parameter, that vanishes where multipliers are critical: a
+product of one factor per multiplier, or per pair of them. Factors that vanish throughout are idle, and left out. At a
+:class:`Root` of such a function the critical multipliers give a :class:`Crossing`.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +39,7 @@ _TURNING = 1e-6  # least imaginary part of a complex multiplier, relative to its
 _SMALL = 1e-3  # modulus of multipliers that are far inside the circle
 _SPARE = 8  # number of factors, beside the idle ones, in the sum over factors to leave out
 UNKNOWN = 1.0  # error of a multiplier's margin that reaches from zero to the circle, and so leaves it undetermined
-_ULPS = 64.0
+_ULPS = 64.0  # least distance, in units in the last place, of the values whose multipliers give a rate of change
 _TELLING = 0.01  # error of a margin, from -1 to 1, that determines the multiplier's side
 _FILL = 1e-30  # value in place of zeros, relative to the largest entry, for the balance of a triangular matrix
 
@@ -146,8 +153,7 @@ class Spectra:
         """Matrices in common units of the states that give rows and columns similar sizes."""
         if self._units is None:
             size = np.abs(matrices).max(axis=0)
-            filled = size + _FILL * size.max() if size.max() > 0.0 else size
-            units = numerical_balance(filled)
+            units = numerical_balance(size + _FILL * size.max())
             self._units = units if (np.isfinite(units) & (units > 0.0)).all() else np.ones_like(units)
         return np.asarray(matrices * (self._units / self._units[:, None]))
 
@@ -202,11 +208,11 @@ class Spectra:
     def _with_error(self, matrix: Array, error: Array) -> tuple[Array, Array]:
         """A matrix in units that balance it, and the errors of its entries."""
         balanced = self._balanced(matrix)
-        rows, columns = np.abs(balanced).max(axis=1), np.abs(balanced).max(axis=0)
+        size = np.abs(balanced)
+        spread = np.sqrt(size.max(axis=1))[:, None] * np.sqrt(size.max(axis=0))
         error = np.nan_to_num(np.abs(error), nan=0.0, posinf=1.0)
-        spread = np.sqrt(rows)[:, None] * np.sqrt(columns)
-        relative = error.ndim == 0
-        return balanced, (_ROUNDING + error) * spread if relative else _ROUNDING * spread + self._balanced(error)
+        one = error.ndim == 0  # for all entries
+        return balanced, (_ROUNDING + error) * spread if one else _ROUNDING * spread + self._balanced(error)
 
     def margins(self, value: float) -> Array:
         """Margin of each multiplier (see :func:`margins`), falling, shape (m,)."""
@@ -235,8 +241,7 @@ class Spectra:
         nu = self.at(values)
         here = np.isfinite(nu).all(axis=1)
         signs, logs = np.full((2, values.size), np.nan)
-        if here.any():
-            signs[here], logs[here] = symmetric(factors(nu[here], event), self.idle[event])
+        signs[here], logs[here] = symmetric(factors(nu[here], event), self.idle[event])
         return signs, logs - self._bounds(values, event)
 
     def _bounds(self, values: Array, event: CircleEvent) -> Array:
@@ -256,7 +261,7 @@ class Spectra:
         return np.asarray(largest - self._bounds(values, event) + np.log(SAFETY))
 
     def rooted(
-        self, function: Callable[[float], float], a: float, b: float, event: CircleEvent | None, within: float = 0.0
+        self, function: Callable[[float], float], a: float, b: float, event: CircleEvent | None, within: float
     ) -> Root:
         """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
         most = min(200, max(self.left, 1))
@@ -267,8 +272,8 @@ class Spectra:
 
     def tolerances(self, root: Root) -> Array:
         """Largest margins of multipliers that may be on the circle at a root, shape (m,)."""
-        ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
-        left, right = self.beside(root.place, ulps)
+        apart = max(_ULPS * float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left))
+        left, right = self.beside(root.place, apart)
         errors = self.margin_errors(root.place)
         if left != right:
             changes = np.abs(self.margins(right) - self.margins(left))
@@ -287,8 +292,8 @@ class Spectra:
         if not telling:
             return np.asarray(errors)
         first, last = (self.margins(root.place if side is None else side) for side in sides)
-        apart = np.max([self.margin_errors(side) for side in telling], axis=0)
-        return np.minimum(errors, apart + np.abs(last - first))
+        certain = np.max([self.margin_errors(side) for side in telling], axis=0)
+        return np.minimum(errors, certain + np.abs(last - first))
 
     def critical_at(self, root: Root) -> list[Crossing]:
         """Crossings at a root, by place on the circle, without multipliers that rest there; changes are unknown yet."""
@@ -314,7 +319,8 @@ class Spectra:
             rest = rest[~near]
         upper = rest[rest.imag > 0.0]
         if conservative:
-            upper = _meeting(upper) if root.event is CircleEvent.PAIR and not root.touch else upper[:0]
+            two_meet = root.event is CircleEvent.PAIR and not root.touch and upper.size >= 2
+            upper = _meeting(upper) if two_meet else upper[:0]
         if upper.size:
             best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
             found.append(Crossing(root.place, bracket, CircleEvent.PAIR, 2 * upper.size, 0, best, conservative, around))
@@ -329,10 +335,8 @@ def margins(nu: ComplexArray) -> Array:
 
 def factors(nu: ComplexArray, event: CircleEvent) -> ComplexArray:
     """Factors that vanish at an event: nu + 1, nu - 1, or nu_i nu_j - 1 over all pairs, along the last axis."""
-    if event is CircleEvent.MINUS:
-        return nu + 1.0
-    if event is CircleEvent.PLUS:
-        return nu - 1.0
+    if event is not CircleEvent.PAIR:
+        return nu - TARGETS[event]
     first, second = _pairs(nu.shape[-1])
     nu = nu * (_LARGEST / np.maximum(np.abs(nu), _LARGEST))  # so that no product overflows
     return np.asarray(nu[..., first] * nu[..., second] - 1.0)
@@ -341,24 +345,22 @@ def factors(nu: ComplexArray, event: CircleEvent) -> ComplexArray:
 def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
     """Elementary symmetric polynomials of the rows of ``terms``, all but ``left_out`` of them at a time, as signs and
     logarithms, shapes (k,). The rows are closed under conjugation."""
-    sizes = np.abs(terms)
     small = np.zeros((terms.shape[0], left_out + 1), dtype=np.complex128)
     small[:, 0] = 1.0
     logs = np.zeros(terms.shape[0])
     if left_out:
-        order = np.argsort(sizes, axis=1)
-        terms = np.take_along_axis(terms, order, axis=1)
-        few = min(terms.shape[1], 2 * left_out + _SPARE)
+        terms = np.take_along_axis(terms, np.argsort(np.abs(terms), axis=1), axis=1)
+        few = 2 * left_out + _SPARE
         for term in terms[:, :few].T:
             # Times (term + t), up to t^left_out; the others are too far from zero to matter.
             scale = np.maximum(np.abs(term), 1.0)
             logs += np.log(scale)
             shifted = np.concatenate([np.zeros_like(small[:, :1]), small[:, :-1]], axis=1)
             small = small * (term / scale)[:, None] + shifted / scale[:, None]
-        terms, sizes = terms[:, few:], np.abs(terms[:, few:])
-    last = small[:, left_out]
+        terms = terms[:, few:]
+    sizes, last = np.abs(terms), small[:, left_out]
     with np.errstate(divide="ignore", invalid="ignore"):
-        logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real if left_out else last))
+        logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real))
     # Real and imaginary part separately: the quotient of a complex subnormal and its size would overflow.
     divisors = np.where(sizes == 0.0, 1.0, sizes)
     directions = terms.real / divisors + 1j * (terms.imag / divisors)
@@ -368,15 +370,12 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
 
 @cache
 def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    first, second = np.triu_indices(count, 1)
-    return first, second
+    return np.triu_indices(count, 1)
 
 
 def _meeting(upper: ComplexArray) -> ComplexArray:
     """The two nearest to each other."""
-    if upper.size < 2:
-        return upper[:0]
-    first, second = np.triu_indices(upper.size, 1)
+    first, second = _pairs(upper.size)
     nearest = int(np.abs(upper[first] - upper[second]).argmin())
     return upper[[first[nearest], second[nearest]]]
 

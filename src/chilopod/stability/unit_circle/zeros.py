@@ -1,11 +1,12 @@
 """All zeros of an analytic function in an interval.
 
-The interval is cut until the function is a polynomial of degree eight on every piece, or sixteen on a wide one, to a
-small part of its size there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to its own
-error. So every piece consists of parts with a certain sign and narrow parts where the function may vanish. Between
-opposite signs such a part contains one zero, if the polynomial is monotonic there and the function has these signs at
-both ends. Any other part, which may contain no zero, two, or a double one, is refined until it has a sign or is zero
-within its error.
+The interval is cut into pieces until the function is a polynomial of degree eight on every piece, or sixteen on a wide
+one, to a small part of its size there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to
+its own error. The polynomial cuts a piece into parts: some have a certain sign, and the function may vanish in the
+narrow ones between them. These are doubtful. A doubtful part between opposite signs contains one zero, if the
+polynomial is monotonic there and the function has these signs at both ends. Any other doubtful part, which may contain
+no zero, two, or a double one, becomes a piece again, until it has a sign or is zero within its error. The zeros are
+read from the final parts.
 """
 
 from __future__ import annotations
@@ -25,36 +26,10 @@ from chilopod.frozen import Array
 DEGREE = 8
 _NODES = np.cos(np.pi * np.arange(DEGREE, -1, -1) / DEGREE)
 
-PLACES: Array = np.append(_NODES, [-0.618, 0.137])
-"""Nodes of the polynomial, and the two places of the comparison."""
-
-FEW_PLACES: Array = _NODES[[0, 2, 4, 6, 8, 3, 5]]
-"""The nodes of half the degree, and two others of these nodes for the comparison."""
-
-MORE_PLACES: Array = np.append(PLACES, np.cos(np.pi * (np.arange(DEGREE) + 0.5) / DEGREE))
-"""``PLACES`` and the nodes in between, for twice the degree."""
-
-DENSE = np.linspace(-1.0, 1.0, 65)
-"""Places where the polynomial is evaluated."""
-
-
-def interpolated(values: Array, places: Array) -> tuple[Array, Array, Array]:
-    """Chebyshev coefficients of polynomials through values at a set of places above, errors, values at ``DENSE``."""
-    fit, at_checks, at_dense, checks = _matrices(places.size)
-    coefficients: Array = fit @ np.delete(values, checks, axis=0)
-    off = np.abs(at_checks @ coefficients - values[checks]).max(axis=0)
-    return coefficients, np.maximum(off, np.abs(coefficients[-2:]).max(axis=0)), at_dense @ coefficients
-
-
-@cache
-def _matrices(count: int) -> tuple[Array, Array, Array, list[int]]:
-    """Matrices from values at nodes to coefficients, from these to values at checks and ``DENSE``; the checks."""
-    places, first = (FEW_PLACES, 5) if count == FEW_PLACES.size else (MORE_PLACES[:count], DEGREE + 1)
-    checks = [first, first + 1]
-    nodes = np.delete(places, checks)
-    fit, others, dense = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, places[checks], DENSE))
-    return np.asarray(np.linalg.inv(fit)), np.asarray(others), np.asarray(dense), checks
-
+PLACES: Array = np.append(_NODES, [-0.618, 0.137])  # nodes of the polynomial, and two places of the comparison
+FEW_PLACES: Array = _NODES[[0, 2, 4, 6, 8, 3, 5]]  # nodes of half the degree, and two of the others for the comparison
+MORE_PLACES: Array = np.append(PLACES, np.cos(np.pi * (np.arange(DEGREE) + 0.5) / DEGREE))  # those of twice the degree
+DENSE = np.linspace(-1.0, 1.0, 65)  # places where the polynomial is evaluated
 
 Interval = tuple[float, float]
 SignedLog = Callable[[Array], tuple[Array, Array]]
@@ -89,12 +64,6 @@ class Zeros(NamedTuple):
     unresolved: tuple[Interval, ...]  # not polynomial: the function is not smooth there, or the budget was spent
     missing: tuple[Interval, ...]  # the function cannot be evaluated, or only in part
     spent: bool  # the budget ended the search
-
-
-def between(low: float, high: float) -> str:
-    """Words for an interval of the parameter, with enough digits to separate its ends."""
-    texts = f"{low:.9g}", f"{high:.9g}"
-    return "between {} and {}".format(*(texts if texts[0] != texts[1] else (repr(float(low)), repr(float(high)))))
 
 
 def first_places(low: float, high: float) -> Array:
@@ -308,9 +277,8 @@ class _Search:
 
     def result(self) -> Zeros:
         """The zeros from the current parts."""
-        ends = [(x, x) for x in (self.low, self.high) if self.signs.get(x) == 0.0]
         met = sorted((place, sign) for place, sign in self.signs.items() if sign in (-1.0, 1.0))
-        changes: list[Interval] = []
+        changes: list[Interval] = [(x, x) for x in (self.low, self.high) if self.signs.get(x) == 0.0]
         touches: list[Interval] = []
         for before, run, after in self._runs():
             first, last = run[0], run[-1]
@@ -322,21 +290,35 @@ class _Search:
                 changes += zip(left[-1:], right[:1], strict=False)
             else:
                 touches += [part[:2] for part in run if part.kind is _Kind.ZERO]
-        of_kind = {kind: _joined([part[:2] for part in self.parts if part.kind is kind]) for kind in _Kind}
-        for a, b in of_kind[_Kind.ROUGH]:
+        rough = _joined([part[:2] for part in self.parts if part.kind is _Kind.ROUGH])
+        for a, b in rough:
             # The zeros here are not separated, but the observed changes of sign are certain.
             within = [each for each in met if a <= each[0] <= b]
             changes += [(x, y) for (x, u), (y, v) in itertools.pairwise(within) if u != v]
         # A zero on the border of two pieces leaves no part without a sign.
-        between_signs = [
-            (left.b, left.b)
-            for left, right in itertools.pairwise(self.parts)
-            if left.kind is right.kind is _Kind.SIGN and left.sign * right.sign < 0.0
-        ]
-        changes = sorted(changes + ends + between_signs)
+        changes += [(u.b, u.b) for u, v in itertools.pairwise(self.parts) if u.sign * v.sign < 0.0]
+        changes.sort()
         apart = [(a, b) for a, b in _joined(touches) if not any(x <= b and a <= y for x, y in changes)]
-        rough, missing = of_kind[_Kind.ROUGH], of_kind[_Kind.MISSING]
+        missing = _joined([part[:2] for part in self.parts if part.kind is _Kind.MISSING])
         return Zeros(tuple(changes), tuple(apart), tuple(rough), tuple(missing), self.spent)
+
+
+def interpolated(values: Array, places: Array) -> tuple[Array, Array, Array]:
+    """Chebyshev coefficients of polynomials through values at a set of places above, errors, values at ``DENSE``."""
+    fit, at_checks, at_dense, checks = _matrices(places.size)
+    coefficients: Array = fit @ np.delete(values, checks, axis=0)
+    off = np.abs(at_checks @ coefficients - values[checks]).max(axis=0)
+    return coefficients, np.maximum(off, np.abs(coefficients[-2:]).max(axis=0)), at_dense @ coefficients
+
+
+@cache
+def _matrices(count: int) -> tuple[Array, Array, Array, list[int]]:
+    """Matrices from values at nodes to coefficients, from these to values at checks and ``DENSE``; the checks."""
+    places, first = (FEW_PLACES, 5) if count == FEW_PLACES.size else (MORE_PLACES[:count], DEGREE + 1)
+    checks = [first, first + 1]
+    nodes = np.delete(places, checks)
+    fit, others, dense = (chebyshev.chebvander(each, nodes.size - 1) for each in (nodes, places[checks], DENSE))
+    return np.asarray(np.linalg.inv(fit)), np.asarray(others), np.asarray(dense), checks
 
 
 def _wide(part: _Part, a: float, b: float) -> bool:
