@@ -1,7 +1,11 @@
 """Numbers and arrays that record operations, and versions of numpy, math and builtins for them.
 
-A function that is called with these records its operations in a :class:`chilopod.flows.tracing.graph.Graph`.
-A use of the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`.
+A function that is called with a :class:`Traced` number, or a :class:`TracedArray` of these and plain numbers, records
+its operations in a :class:`chilopod.flows.tracing.graph.Graph`. Numpy hands its ufuncs to ``_apply``, which applies
+those of ``SCALAR`` entry by entry, and its other functions to ``_call``, which uses the version in ``REPLACED``, or
+else the function itself on an array of objects. Functions that never ask their arguments, as ``np.array`` and those of
+math, have stand-ins (:func:`stand_in`), to be put into the globals of the function. A use of the value of a traced
+number (a branch, an index, a foreign library) raises :class:`Untraceable`.
 """
 
 from __future__ import annotations
@@ -126,10 +130,6 @@ def as_traced(value: Any) -> Any:
     """An array-like as an array that may hold traced numbers."""
     if isinstance(value, TracedArray):
         return value
-    if isinstance(value, Traced):
-        array = np.empty((), dtype=object)
-        array[()] = value
-        return array.view(TracedArray)
     return np.array(value, dtype=object).view(TracedArray)
 
 
@@ -159,7 +159,7 @@ def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[
         out = None  # as in x += 1: the name now refers to another number
     operands = [plain(value if isinstance(value, np.ndarray) else as_traced(value)) for value in inputs]
     if ufunc is np.matmul and method == "__call__":
-        result = _matmul(operands[0], operands[1])
+        result = np.matmul(*operands)
     elif ufunc.__name__ not in SCALAR:
         raise Untraceable(f"it calls numpy.{ufunc.__name__}")
     else:
@@ -170,10 +170,6 @@ def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[
         plain(out[0])[...] = result
         return out[0]
     return wrapped(result)
-
-
-def _matmul(a: Any, b: Any) -> Any:
-    return np.dot(a.astype(object), b.astype(object)) if b.ndim <= 2 else np.matmul(a, b)
 
 
 def _call(function: Any, args: tuple[Any, ...], options: dict[str, Any]) -> Any:
@@ -282,9 +278,8 @@ def _blank(make: Callable[..., Any]) -> Callable[..., Any]:
             result[...] = value
             return result.view(TracedArray)
         options = {key: value for key, value in options.items() if not _means_object(value)}
-        plain_args = [value for value in args if not _means_object(value)]
-        args = tuple(np.zeros(each.shape) if isinstance(each, TracedArray) else each for each in plain_args)
-        result = make(*args, **options)
+        known = [value for value in args if not _means_object(value)]
+        result = make(*(np.zeros(each.shape) if isinstance(each, TracedArray) else each for each in known), **options)
         return as_traced(result) if result.dtype.kind == "f" else result
 
     return shaped
