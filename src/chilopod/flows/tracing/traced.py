@@ -106,6 +106,8 @@ def _scalar(name: str, build: Callable[..., int]) -> Callable[..., Any]:
 SCALAR: dict[str, Callable[..., Any]] = {name: _scalar(name, build) for name, build in BUILDS.items()}
 """Functions of single numbers, traced or plain, by the name of their ufunc."""
 
+_ENTRY_BY_ENTRY = {name: np.frompyfunc(apply, getattr(np, name).nin, 1) for name, apply in SCALAR.items()}
+
 
 def _replaced(name: str) -> Any:
     return lambda self, *args, **options: REPLACED[getattr(np, name)](self, *args, **options)
@@ -145,11 +147,6 @@ def wrapped(value: Any) -> Any:
     return value
 
 
-@functools.cache
-def _elementwise(name: str, operands: int) -> Any:
-    return np.frompyfunc(SCALAR[name], operands, 1)
-
-
 def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[str, Any]) -> Any:
     out = options.pop("out", None)
     options = {key: value for key, value in options.items() if key not in ("dtype", "casting", "subok", "order")}
@@ -163,7 +160,7 @@ def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[
     elif ufunc.__name__ not in SCALAR:
         raise Untraceable(f"it calls numpy.{ufunc.__name__}")
     else:
-        result = getattr(_elementwise(ufunc.__name__, ufunc.nin), method)(*operands, **options)
+        result = getattr(_ENTRY_BY_ENTRY[ufunc.__name__], method)(*operands, **options)
     if out is not None:
         if not isinstance(out[0], TracedArray):
             raise Untraceable("it writes into an array of plain numbers")
@@ -219,39 +216,39 @@ def _where_arrays(condition: Any, *choices: Any) -> Any:
 
 
 def _solve(matrix: Any, right: Any) -> Any:
-    """Gaussian elimination; a pivot of unknown size is taken from the diagonal."""
+    """Gaussian elimination."""
     if not (_has_traced(matrix) or _has_traced(right)):
         return np.linalg.solve(matrix, right)
     a, b = plain(as_traced(matrix)).copy(), plain(as_traced(right)).copy()
     n = a.shape[0]
     if a.shape != (n, n):
         raise Untraceable("it solves with a stack of matrices")
-
-    def worth(value: Any) -> float:
-        return -1.0 if isinstance(value, Traced) else abs(value)
-
     for column in range(n):
-        rows = range(column, n)
-        pivot = max(rows, key=lambda row: worth(a[row, column]))
-        if any(isinstance(a[row, column], Traced) for row in rows):
-            # The largest pivot is unknown while tracing: the diagonal one is used, which suits mass matrices.
-            pivot = column if worth(a[column, column]) != 0.0 else pivot
-            if worth(a[pivot, column]) == 0.0:
-                pivot = next(row for row in rows if isinstance(a[row, column], Traced))
-        elif worth(a[pivot, column]) == 0.0:
-            raise Untraceable("it solves with a singular matrix")
+        pivot = column + _pivot(a[column:, column])
         a[[column, pivot]], b[[column, pivot]] = a[[pivot, column]], b[[pivot, column]]
         for row in range(column + 1, n):
-            if worth(a[row, column]) == 0.0:
-                continue
-            factor = a[row, column] / a[column, column]
-            a[row, column:] = a[row, column:] - factor * a[column, column:]
-            b[row] = b[row] - factor * b[column]
+            if a[row, column] != 0.0:  # or a traced number
+                factor = a[row, column] / a[column, column]
+                a[row, column:] = a[row, column:] - factor * a[column, column:]
+                b[row] = b[row] - factor * b[column]
     for row in range(n - 1, -1, -1):
         for column in range(row + 1, n):
             b[row] = b[row] - a[row, column] * b[column]
         b[row] = b[row] / a[row, row]
     return b.view(TracedArray)
+
+
+def _pivot(column: Any) -> int:
+    """Place of the largest number in a column, or of the first where it is not zero and the largest is unknown while
+    tracing, which suits mass matrices."""
+    sizes = [-1.0 if isinstance(value, Traced) else abs(value) for value in column]
+    if -1.0 in sizes and sizes[0] != 0.0:
+        return 0
+    if max(sizes) != 0.0:
+        return sizes.index(max(sizes))
+    if -1.0 not in sizes:
+        raise Untraceable("it solves with a singular matrix")
+    return sizes.index(-1.0)
 
 
 def _has_traced(value: Any) -> bool:
