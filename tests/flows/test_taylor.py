@@ -298,6 +298,6 @@ def test_what_goes_through_switches_is_compiled_only_where_there_are_any():
         return names
 
     smooth, _ = flow_of(lambda t, x: [-x[0]], 1)
-    switching = {"settle", "await_events", "_first_crossing", "cross"}
+    switching = {"settle", "await_events", "first_crossing", "cross"}
     assert left(ball(0.8)[0]) >= switching
     assert not left(smooth) & switching

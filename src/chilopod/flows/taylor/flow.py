@@ -1,7 +1,9 @@
 """Flows of taped right-hand sides by Taylor series, in compiled code that all tapes share.
 
 A :class:`TaylorFlow` holds a tape (:func:`chilopod.flows.tracing.trace.trace`) and the limits of its steps; the
-values of the parameters are an argument of every call, so one object serves a whole family.
+values of the parameters are an argument of every call, so one object serves a whole family. Every call cuts its
+interval at the edges, lets :mod:`.stepping` carry the state and the derivative through each piece, and looks for the
+cause in the right-hand side where that ends early.
 
 Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
 Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0; the
@@ -70,7 +72,6 @@ class TaylorFlow:
         self.tape, self.edges, self.period, self.patience = tape, np.array(edges), period, patience
         self._epsilon = max(tolerance, _LEAST_TOLERANCE)
         self.order = max(8, math.ceil(-0.65 * math.log(self._epsilon)))  # near the order of least work
-        self._shape = n, tape.parameters
         self._directions = np.array(directions, dtype=np.float64) if tape.switches.size else None
         self._shaken = 1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0))
         self._clock = functools.lru_cache(_MOST_CLOCKS)(self._clock_table)
@@ -133,31 +134,33 @@ class TaylorFlow:
         """Carry one state, or several without derivatives, in place, by the second way if ``other``; the steps."""
         from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
 
-        (n, parameters), stop = self._shape, deadline.stop()
+        n, stop = self.tape.dimension, deadline.stop()
         several = x.ndim == 2 and derivative.shape == (n, 0)
         fits = x.shape[several:] == derivative.shape[:1] == (n,)
-        if not (fits and params.shape == (parameters,)):
+        if not (fits and params.shape == (self.tape.parameters,)):
             # Compiled code would read out of bounds.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
-        report, steps = np.zeros(2), 0
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
         # A pulse in time makes steps short, too.
         shortest = _SHORTEST if self.patience and not self.tape.clocks.size else 0.0
-        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shortest, shake, stepwise, stop)
-        outcome = kernels.Outcome(derivative, bound, report)
-        clock = self._clock(params.tobytes())
+        most_steps, patience, clock = self.most_steps, self.patience, self._clock(params.tobytes())
+        control = kernels.Control(self._epsilon, order, most_steps, patience, shortest, shake, stepwise, stop)
+        outcome, steps = kernels.Outcome(derivative, bound), 0
         carry = kernels.advance_each if several else kernels.advance
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
             begin = [(each, each.copy()) for each in (x, derivative, bound)]
-            while status := carry(self.tape, self._directions, clock, params, x, span, control, outcome):
+            while True:
+                status, taken, t = carry(self.tape, self._directions, clock, params, x, span, control, outcome)
+                if not status:
+                    break
                 stuck = status in (NOT_FINITE, STALLED, SHORT)
-                cause = self._cause(report[1], x.reshape(-1, n), params, span) if stuck else ""
+                cause = self._cause(t, x.reshape(-1, n), params, span) if stuck else ""
                 if status != SHORT or cause == ZERO_BY_ZERO:
-                    raise failure(status, report[1], cause)
+                    raise failure(status, t, cause)
                 control = control._replace(shortest=0.0)  # a motion that is merely fast, as a close encounter
                 for each, first in begin:
                     each[...] = first
-            steps += int(report[0])
+            steps += taken
         return steps
 
     def _cause(self, t: float, states: Array, params: Array, span: tuple[float, float]) -> str:

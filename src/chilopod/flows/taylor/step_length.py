@@ -1,123 +1,18 @@
-"""Length of a step of a Taylor series (:mod:`.stepping`), and the first place where a polynomial becomes negative."""
+"""Length of a step of a Taylor series, for :mod:`.stepping`.
+
+Every series that matters, of a state, a switching function or an entry of the derivative, limits the step by its last
+terms. Two kinds of functions hide from these: those that are flat where the step starts, as tanh of a large number, and
+pulses in time. :func:`step_size` lets the argument of a flat function change little, and :func:`agrees` compares
+functions of time with their values on a grid.
+"""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-import numpy as np
-
-from chilopod.compiled import fused_njit, njit
+from chilopod.compiled import fused_njit
 from chilopod.flows.tracing import tape as ops
-
-_DEEPEST = 48
-
-
-@njit(error_model="numpy")
-def _bernstein(coefficients: Any, order: int, h: float, out: Any) -> None:
-    """Bernstein coefficients on [0, h]: b_i = sum over k of C(i, k) / C(order, k) c_k h^k."""
-    for i in range(order + 1):
-        s = coefficients[0]
-        factor = 1.0
-        for k in range(1, i + 1):
-            factor *= h * (i - k + 1) / (order - k + 1)
-            s += factor * coefficients[k]
-        out[i] = s
-
-
-@njit(error_model="numpy")
-def _halve(stack: Any, top: int, order: int) -> None:
-    """De Casteljau's halving of the interval of the polynomial on top: the right half stays, the left goes above it."""
-    for i in range(order + 1):
-        stack[top + 1, i] = stack[top, 0]
-        for j in range(order - i):
-            stack[top, j] = 0.5 * (stack[top, j] + stack[top, j + 1])
-
-
-@njit(error_model="numpy")
-def _refined(coefficients: Any, order: int, low: float, high: float) -> float:
-    """The root between a nonnegative and a negative point of a polynomial, by bisection and Newton's method."""
-    z = 0.5 * (low + high)
-    for _ in range(80):
-        s = 0.0
-        slope = 0.0
-        for k in range(order, -1, -1):
-            slope = slope * z + s
-            s = s * z + coefficients[k]
-        if s >= 0.0:
-            low = z
-        else:
-            high = z
-        better = z - s / slope if slope != 0.0 else low
-        if not low < better < high:
-            better = 0.5 * (low + high)
-        if abs(better - z) <= 2.3e-16 * abs(z) or not low < better < high:
-            return better
-        z = better
-    return z
-
-
-@njit(error_model="numpy")
-def first_exit(coefficients: Any, order: int, h: float) -> float:
-    """The first z in [0, h] after which a polynomial is negative; -1 if it stays nonnegative.
-
-    A polynomial that rises from zero or, by round-off, from just below counts as nonnegative there.
-
-    Intervals are halved until Descartes' rule of signs for the Bernstein coefficients leaves no root or one (Basu,
-    Pollack and Roy, *Algorithms in Real Algebraic Geometry*, ch. 10).
-    """
-    rest = 0.0
-    power = 1.0
-    for k in range(1, order + 1):
-        power *= h
-        rest += abs(coefficients[k]) * power
-    if coefficients[0] > rest:
-        return -1.0
-    offset = 0
-    if coefficients[0] <= 0.0:
-        for k in range(1, order + 1):
-            if coefficients[k] != 0.0:
-                offset = k
-                break
-        if offset == 0:
-            return -1.0  # never leaves zero
-        if coefficients[offset] < 0.0:
-            return 0.0
-    poly = coefficients[offset:]
-    order -= offset
-    stack = np.empty((_DEEPEST + 2, order + 1))
-    lows = np.empty(_DEEPEST + 2)
-    widths = np.empty(_DEEPEST + 2)
-    _bernstein(poly, order, h, stack[0])
-    lows[0], widths[0] = 0.0, h
-    top = 0
-    while top >= 0:
-        changes = 0
-        sign = 1.0
-        for i in range(order + 1):
-            b = stack[top, i]
-            if b * sign < 0.0:
-                changes += 1
-                sign = -sign
-        low = lows[top]
-        width = widths[top]
-        if changes == 0:
-            top -= 1
-            continue
-        if changes == 1:
-            return _refined(poly, order, low, low + width)
-        if top >= _DEEPEST or width < 1e-15 * h:
-            if stack[top, order] < 0.0:
-                return low
-            top -= 1  # touches zero, or nearly
-            continue
-        _halve(stack, top, order)
-        widths[top] = widths[top + 1] = 0.5 * width
-        lows[top + 1] = low
-        lows[top] = low + 0.5 * width
-        top += 1
-    return -1.0
-
 
 _FAR, _FAR_TANH = 36.0, 9.0
 """Sizes of arguments beyond which exp, sinh and cosh, and tanh, may be constant to round-off beside other terms."""
@@ -125,6 +20,50 @@ _CHANGE = 0.25  # largest relative change of such an argument in a step
 _UNDERFLOW = 1e-290  # limit below which numbers lose precision: their round-off would look like a singularity
 _SAME = 3e-13
 """Round-off in a pulse of a thousandth of the period; a narrower one costs a step at each of its grid points."""
+
+
+@fused_njit(error_model="numpy", inline="always")
+def step_size(tape: Any, series: Any, columns: int, order: int, h: float, epsilon: float) -> float:
+    """The largest step up to h with series exact to epsilon, in which no function leaves saturation unseen."""
+    values, tangents = series.values, series.tangents
+    for i in range(tape.layout[0]):
+        h = _allowed(values[i], order, h, epsilon)
+    for s in range(tape.switches.shape[1]):
+        h = _allowed(values[tape.switches[1, s]], order, h, epsilon)
+    for i in range(tape.layout[0]):
+        for j in range(columns):
+            h = _allowed(tangents[i, :, j], order, h, epsilon)
+    return _unsaturated(tape, values, order, h)
+
+
+@fused_njit(error_model="numpy", inline="always")
+def agrees(tape: Any, clock: Any, series: Any, order: int, t: float, h: float, unit: float) -> float:
+    """A step within which the series of functions of time agree with their values on a grid over the period."""
+    clocks, values = tape.clocks, series.values
+    table, period = clock
+    if clocks.size == 0 or table.shape[1] < 2:
+        return h
+    spacing = period / (table.shape[1] - 1)
+    at = math.floor(t / spacing) + 1
+    while True:
+        u = at * spacing - t
+        if u >= h * unit * (1.0 - 1e-9):
+            return h
+        if u > 1e-9 * spacing:
+            z = u / unit
+            row = int(at % (table.shape[1] - 1))
+            for c in range(clocks.size):
+                s = 0.0
+                size = 0.0
+                for k in range(order, -1, -1):
+                    s = s * z + values[clocks[c], k]
+                    size = size * z + abs(values[clocks[c], k])
+                value = table[c, row]
+                # Only this part of the largest value may be neglected.
+                if not abs(s - value) <= _SAME * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
+                    before = (u - spacing) / unit
+                    return before if before > 0.1 * z else 0.5 * min(h, z)
+        at += 1
 
 
 @fused_njit(error_model="numpy")
@@ -183,47 +122,3 @@ def _unsaturated(tape: Any, values: Any, order: int, h: float) -> float:
                     if change > _CHANGE:
                         h *= max(_CHANGE / change, 0.5)
     return h
-
-
-@fused_njit(error_model="numpy", inline="always")
-def step_size(tape: Any, series: Any, columns: int, order: int, h: float, epsilon: float) -> float:
-    """The largest step up to h with series exact to epsilon, in which no function leaves saturation unseen."""
-    values, tangents = series.values, series.tangents
-    for i in range(tape.layout[0]):
-        h = _allowed(values[i], order, h, epsilon)
-    for s in range(tape.switches.shape[1]):
-        h = _allowed(values[tape.switches[1, s]], order, h, epsilon)
-    for i in range(tape.layout[0]):
-        for j in range(columns):
-            h = _allowed(tangents[i, :, j], order, h, epsilon)
-    return _unsaturated(tape, values, order, h)
-
-
-@fused_njit(error_model="numpy", inline="always")
-def agrees(tape: Any, clock: Any, series: Any, order: int, t: float, h: float, unit: float) -> float:
-    """A step within which the series of functions of time agree with their values on a grid over the period."""
-    clocks, values = tape.clocks, series.values
-    table, period = clock
-    if clocks.size == 0 or table.shape[1] < 2:
-        return h
-    spacing = period / (table.shape[1] - 1)
-    at = math.floor(t / spacing) + 1
-    while True:
-        u = at * spacing - t
-        if u >= h * unit * (1.0 - 1e-9):
-            return h
-        if u > 1e-9 * spacing:
-            z = u / unit
-            row = int(at % (table.shape[1] - 1))
-            for c in range(clocks.size):
-                s = 0.0
-                size = 0.0
-                for k in range(order, -1, -1):
-                    s = s * z + values[clocks[c], k]
-                    size = size * z + abs(values[clocks[c], k])
-                value = table[c, row]
-                # Only this part of the largest value may be neglected.
-                if not abs(s - value) <= _SAME * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
-                    before = (u - spacing) / unit
-                    return before if before > 0.1 * z else 0.5 * min(h, z)
-        at += 1

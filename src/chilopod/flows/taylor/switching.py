@@ -1,4 +1,10 @@
-"""Branches of switches, and motions through a switch or an event."""
+"""Branches of switches, and motions through a switch or an event, for :mod:`.stepping`.
+
+Along a step every switch stays on its branch: 1 or -1, the sign of its switching function, or of a ``FLOOR`` the whole
+number. At the start of an interval :func:`settle` chooses the branches, and :func:`await_events` those of guards that
+are zero there. Where a step ends at a switch, :func:`cross` changes its branch, applies the reset of an event and finds
+the jump of the derivative.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +15,7 @@ import numpy as np
 from chilopod.compiled import fused_njit
 from chilopod.flows.carrying import DONE, GRAZES, JUMPS, SLIDES
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.series import Series, branch_at, choose, expand, expand_values, values_at
+from chilopod.flows.tracing.series import Series, branch_at, choose, expand, expand_values, values_between
 
 _ZERO = 1e-13  # size of a switching function, relative to its earlier values, that counts as zero
 
@@ -46,8 +52,7 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
         expand_values(tape, 1, tape.layout[4], unit, motion.series)
         settled = True
         for s in range(switches.shape[1]):
-            g = values[switches[1, s], 0]
-            slope = values[switches[1, s], 1]
+            g, slope = values[switches[1, s], 0], values[switches[1, s], 1]
             if switches[0, s] == ops.FLOOR:
                 if g == branches[s] and slope < 0.0:
                     branches[s] -= 1.0
@@ -65,47 +70,20 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
     return DONE
 
 
+@fused_njit(error_model="numpy", inline="always")
+def enlarge_scales(tape: Any, motion: Any, order: int, h: float) -> None:
+    """Keep the largest values of the switching functions."""
+    for s in range(tape.switches.shape[1]):
+        power = 1.0
+        for k in range(order + 1):
+            motion.scales[s] = max(motion.scales[s], abs(motion.series.values[tape.switches[1, s], k]) * power)
+            power *= h
+
+
 @fused_njit(error_model="numpy")
 def is_timed(tape: Any, s: int) -> bool:
     """True if a switch is a guard that depends on time only."""
     return bool(tape.switches[0, s] == ops.GUARD and tape.program[4, tape.switches[1, s]] == 0)
-
-
-@fused_njit(error_model="numpy")
-def _carry_over(tape: Any, directions: Any, motion: Any, switched: int, surfaces: Any) -> int:
-    """Update the branches of switches whose own functions jump with another switch; a guard's must not pass zero."""
-    program, terms, slopes, switches = tape.program, tape.terms, tape.slopes, tape.switches
-    values, branches, scales = motion.series.values, motion.series.branches, motion.scales
-    first = tape.layout[3]
-    for s in range(switches.shape[1]):
-        stop = tape.layout[4] if switches[0, s] == ops.GUARD else switches[2, s]
-        values_at(program, terms, slopes, (first, stop), 0, 1.0, values, branches)
-        first = stop
-        g = values[switches[1, s], 0]
-        if s != switched and abs(g - surfaces[s]) > _ZERO * scales[s]:
-            before = branches[s]
-            branches[s] = branch_at(switches[0, s], g)
-            turn = branches[s] - before
-            if switches[0, s] == ops.GUARD and turn != 0.0 and turn * directions[switches[2, s]] >= 0.0:
-                return JUMPS
-    values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
-    return DONE
-
-
-@fused_njit(error_model="numpy")
-def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
-    """Apply the reset of an event to the state, the tangents and dx/dt; return True if the state changes."""
-    values, tangents = motion.series.values, motion.series.tangents
-    moves = False
-    for i in range(tape.layout[0]):
-        node = tape.resets[event, i]
-        if node != i:
-            moves = True
-        motion.x[i] = values[node, 0]
-        before[i] = values[node, 1]
-        for j in range(jump.shape[1]):
-            jump[i, j] = tangents[node, 0, j]
-    return moves
 
 
 @fused_njit(error_model="numpy")
@@ -116,52 +94,60 @@ def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, uni
     (the saltation matrix; Dr f- is ``before``, grad g . f- is ``slope``, grad g times the seeds ``gradient``).
     """
     n, switches = tape.layout[0], tape.switches
-    values, branches = motion.series.values, motion.series.branches
-    g = switches[1, s]
-    event = -1
-    if switches[0, s] == ops.GUARD and directions[switches[2, s]] * direction >= 0.0:
-        event = switches[2, s]
+    values, tangents, branches = motion.series.values, motion.series.tangents, motion.series.branches
+    g, is_guard = switches[1, s], switches[0, s] == ops.GUARD
+    event = switches[2, s] if is_guard and directions[switches[2, s]] * direction >= 0.0 else -1
     start(tape, motion, t)
     expand(tape, 1, tape.layout[5] if event >= 0 else tape.layout[4], unit, motion.series)
-    slope = values[g, 1]
-    gradient = motion.series.tangents[g, 0].copy()
-    surfaces = values[switches[1], 0]
-    before = np.empty(n)
+    slope, gradient, surfaces = values[g, 1], tangents[g, 0].copy(), values[switches[1], 0]
+    before, moves = np.empty(n), False
     for i in range(n):
-        before[i] = values[i, 1]
+        node = tape.resets[event, i] if event >= 0 else i
+        moves = moves or node != i
+        motion.x[i] = values[node, 0]
+        before[i] = values[node, 1]
         for j in range(jump.shape[1]):
-            jump[i, j] = motion.seeds[i, j]
+            jump[i, j] = tangents[node, 0, j]
     branches[s] = branches[s] + direction if switches[0, s] == ops.FLOOR else direction
-    moves = event >= 0 and _reset(tape, motion, event, before, jump)
     start(tape, motion, t)
     if moves:
         status = settle(tape, motion, unit)
-        if status != DONE:
-            return status
-    elif switches[0, s] == ops.GUARD:
+    elif is_guard:
         return DONE  # f does not switch here
     else:
         status = _carry_over(tape, directions, motion, s, surfaces)
-        if status != DONE:
-            return status
+    if status != DONE:
+        return status
     expand_values(tape, 1, tape.layout[4], unit, motion.series)
     if not moves and values[g, 1] * direction < 0.0:
         return SLIDES
-    steepest = 0.0
-    for j in range(gradient.size):
-        steepest = max(steepest, abs(gradient[j]))
-    if steepest > 0.0:
-        differs = False
-        for i in range(n):
-            if values[i, 1] != before[i]:
-                differs = True
-        if differs and slope * direction <= 0.0:
+    if gradient.any() and (values[:n, 1] != before).any():
+        if slope * direction <= 0.0:
             return GRAZES
-        if differs:
-            for i in range(n):
-                f = (values[i, 1] - before[i]) / slope
-                for j in range(jump.shape[1]):
-                    jump[i, j] += f * gradient[j]
+        for i in range(n):
+            f = (values[i, 1] - before[i]) / slope
+            for j in range(jump.shape[1]):
+                jump[i, j] += f * gradient[j]
+    return DONE
+
+
+@fused_njit(error_model="numpy")
+def _carry_over(tape: Any, directions: Any, motion: Any, switched: int, surfaces: Any) -> int:
+    """Update the branches of switches whose own functions jump with another switch; a guard's must not pass zero."""
+    switches, values, branches, first = tape.switches, motion.series.values, motion.series.branches, tape.layout[3]
+    for s in range(switches.shape[1]):
+        is_guard = switches[0, s] == ops.GUARD
+        stop = tape.layout[4] if is_guard else switches[2, s]
+        values_between(tape, motion.series, first, stop)
+        first = stop
+        g = values[switches[1, s], 0]
+        if s != switched and abs(g - surfaces[s]) > _ZERO * motion.scales[s]:
+            before = branches[s]
+            branches[s] = branch_at(switches[0, s], g)
+            turn = branches[s] - before
+            if is_guard and turn != 0.0 and turn * directions[switches[2, s]] >= 0.0:
+                return JUMPS
+    values_between(tape, motion.series, first, tape.layout[4])
     return DONE
 
 
@@ -190,7 +176,6 @@ def await_events(tape: Any, directions: Any, motion: Any, unit: float, soon: flo
             after = Motion(motion.x.copy(), motion.seeds, then, scales)
             cross(tape, directions, after, s, direction, unit, t, np.empty(motion.seeds.shape))
             ahead = series.values[switches[1, s], 1] * direction < 0.0
-            back = Motion(motion.x, motion.seeds, then, scales)  # expand the series at the start again
-            start(tape, back, t)
-            settle(tape, back, unit)
+            start(tape, motion, t)  # expand the series at the start again
+            settle(tape, Motion(motion.x, motion.seeds, then, scales), unit)
         series.branches[s] = -direction if ahead else direction

@@ -1,4 +1,10 @@
-"""Operations under construction, with shared subexpressions, folded numbers and gathered sums."""
+"""Operations under construction, with shared subexpressions, folded numbers and gathered sums.
+
+A node is an operation with its operands, which are earlier nodes; equal operations are one node. A :class:`Graph` has
+methods for the arithmetic, in which numbers are computed at once, equal terms of a sum are added up, and constants
+move to the front of products. ``FUNCTIONS`` are the elementary functions with their derivatives; ``BUILDS`` gives the
+nodes of every ufunc of numpy that can be traced, in terms of these.
+"""
 
 from __future__ import annotations
 
@@ -54,14 +60,11 @@ class Graph:
 
     def _new(self, code: int, operands: tuple[int, ...]) -> int:
         node = (code, operands)
-        found = self._known.get(node)
-        if found is not None:
-            return found
-        depends = LEAVES.get(code)
-        self.nodes.append(node)
-        self.depends.append(max(self.depends[i] for i in operands) if depends is None else depends)
-        self._known[node] = len(self.nodes) - 1
-        return len(self.nodes) - 1
+        if node not in self._known:
+            self._known[node] = len(self.nodes)
+            self.nodes.append(node)
+            self.depends.append(LEAVES[code] if code in LEAVES else max(self.depends[i] for i in operands))
+        return self._known[node]
 
     def number(self, value: float) -> int:
         """The node of a number."""
@@ -107,11 +110,9 @@ class Graph:
 
     def multiply(self, a: int, b: int) -> int:
         """a b."""
-        if self.depends[a] > self.depends[b] or (self.depends[a] == self.depends[b] and a > b):
-            a, b = b, a
+        # Numbers come first, then other constants.
+        a, b = sorted((a, b), key=lambda node: (self.value(node) is None, self.depends[node], node))
         va, vb = self.value(a), self.value(b)
-        if vb is not None:
-            a, b, va, vb = b, a, vb, va
         if va is not None:
             if vb is not None:
                 return self.number(va * vb)
@@ -119,14 +120,14 @@ class Graph:
                 return self.number(0.0)
             if va == 1.0:
                 return b
-            if self.nodes[b][0] == ops.LINEAR and len(self.nodes[b][1]) == 2:
-                weight, node = self.nodes[b][1]
-                return self.linear([(self.multiply(a, weight), node)])
+            code, operands = self.nodes[b]
+            if code == ops.LINEAR and len(operands) == 2:
+                return self.linear([(self.multiply(a, operands[0]), operands[1])])
         if va is not None or (self.depends[a] == ops.CONSTANT and self.depends[b] != ops.CONSTANT):
             return self.linear([(a, b)])
         if a == b:
             return self._new(ops.SQUARE, (a,))
-        # Numbers in front of a factor move to the front of the product, at no cost.
+        # Constants in front of a factor move to the front of the product, at no cost.
         for one, other in ((a, b), (b, a)):
             code, operands = self.nodes[one]
             if code == ops.LINEAR and len(operands) == 2 and self.depends[other] != ops.CONSTANT:
@@ -197,10 +198,9 @@ class Graph:
             except (ValueError, OverflowError):
                 return self.number(math.nan)
         node = self._new(code, (a,))
-        if node in self.weights:
-            return node
-        self.weights[node] = -1  # w may depend on the node itself
-        self.weights[node] = FUNCTIONS[code].weight(self, a, node)
+        if node not in self.weights:
+            self.weights[node] = -1  # w may depend on the node itself
+            self.weights[node] = FUNCTIONS[code].weight(self, a, node)
         return node
 
     def step(self, a: int) -> int:
@@ -244,78 +244,82 @@ BUILDS: dict[str, Callable[..., int]] = {}
 """``BUILDS[name](graph, *operands) -> node``."""
 
 
-def _builds(*names: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    def register(build: Callable[..., int]) -> Callable[..., int]:
-        BUILDS.update({getattr(np, name).__name__: build for name in names})
-        return build
-
-    return register
+def _enter(names: str, build: Callable[..., int]) -> None:
+    """Let a function build the nodes of some ufuncs of numpy."""
+    BUILDS.update({getattr(np, name).__name__: build for name in names.split()})
 
 
 def _one(g: Graph) -> int:
     return g.number(1.0)
 
 
-for _code, _function in FUNCTIONS.items():
-    _builds(_function.value.__name__)(lambda g, a, code=_code: g.function(code, a))
-
-_builds("add")(Graph.add)
-_builds("subtract")(lambda g, a, b: g.add(a, b, -1.0))
-_builds("multiply")(Graph.multiply)
-_builds("divide")(Graph.divide)
-_builds("power", "float_power")(Graph.power)
-_builds("negative")(lambda g, a: g.multiply(g.number(-1.0), a))
-_builds("positive", "conjugate")(lambda g, a: a)
-_builds("square")(lambda g, a: g.multiply(a, a))
-_builds("reciprocal")(lambda g, a: g.divide(_one(g), a))
-_builds("cbrt")(lambda g, a: g.multiply(g.step(a), g.power(g.multiply(g.step(a), a), g.number(1.0 / 3.0))))
-_builds("expm1")(lambda g, a: g.add(g.function(ops.EXP, a), _one(g), -1.0))
-_builds("log1p")(lambda g, a: g.function(ops.LOG, g.add(a, _one(g))))
-_builds("exp2")(lambda g, a: g.function(ops.EXP, g.multiply(g.number(math.log(2.0)), a)))
-_builds("log2")(lambda g, a: g.divide(g.function(ops.LOG, a), g.number(math.log(2.0))))
-_builds("log10")(lambda g, a: g.divide(g.function(ops.LOG, a), g.number(math.log(10.0))))
-_builds("arccos")(lambda g, a: g.add(g.number(0.5 * math.pi), g.function(ops.ASIN, a), -1.0))
-_builds("deg2rad", "radians")(lambda g, a: g.multiply(g.number(math.pi / 180.0), a))
-_builds("rad2deg", "degrees")(lambda g, a: g.multiply(g.number(180.0 / math.pi), a))
-_builds("absolute", "fabs")(lambda g, a: g.select(a, a, g.multiply(g.number(-1.0), a)))
-_builds("sign")(Graph.step)
-_builds("heaviside")(lambda g, a, b: g.select(a, _one(g), g.number(0.0)))
-_builds("maximum", "fmax")(lambda g, a, b: g.select(g.add(a, b, -1.0), a, b))
-_builds("minimum", "fmin")(lambda g, a, b: g.select(g.add(a, b, -1.0), b, a))
-# Equal nodes have the difference 0, whose sign is not positive.
-_builds("greater")(lambda g, a, b: g.select(g.add(a, b, -1.0), _one(g), g.number(0.0)))
-_builds("greater_equal")(lambda g, a, b: g.select(g.add(b, a, -1.0), g.number(0.0), _one(g)))
-_builds("less")(lambda g, a, b: g.select(g.add(b, a, -1.0), _one(g), g.number(0.0)))
-_builds("less_equal")(lambda g, a, b: g.select(g.add(a, b, -1.0), g.number(0.0), _one(g)))
-_builds("logical_not", "invert")(lambda g, a: g.add(_one(g), a, -1.0))
-_builds("logical_and", "bitwise_and")(Graph.multiply)
-_builds("logical_or", "bitwise_or")(lambda g, a, b: g.add(g.add(a, b), g.multiply(a, b), -1.0))
-_builds("floor")(Graph.floor)
-_builds("trunc")(lambda g, a: g.select(a, g.floor(a), _ceil(g, a)))
-_builds("floor_divide")(lambda g, a, b: g.floor(g.divide(a, b)))
-_builds("remainder")(lambda g, a, b: g.add(a, g.multiply(b, g.floor(g.divide(a, b))), -1.0))
-_builds("hypot")(lambda g, a, b: g.function(ops.SQRT, g.add(g.multiply(a, a), g.multiply(b, b))))
+def _minus(g: Graph, a: int) -> int:
+    return g.multiply(g.number(-1.0), a)
 
 
-@_builds("copysign")
-def _copysign(g: Graph, a: int, b: int) -> int:
-    minus = g.number(-1.0)
-    size = g.select(a, a, g.multiply(minus, a))
-    return g.select(g.multiply(minus, b), g.multiply(minus, size), size)
+def _absolute(g: Graph, a: int) -> int:
+    return g.select(a, a, _minus(g, a))
 
 
-@_builds("ceil")
 def _ceil(g: Graph, a: int) -> int:
-    return g.multiply(g.number(-1.0), g.floor(g.multiply(g.number(-1.0), a)))
+    return _minus(g, g.floor(_minus(g, a)))
 
 
-@_builds("arctan2")
+def _copysign(g: Graph, a: int, b: int) -> int:
+    size = _absolute(g, a)
+    return g.select(_minus(g, b), _minus(g, size), size)
+
+
 def _arctan2(g: Graph, y: int, x: int) -> int:
     """In halves of the plane where one of the two quotients has no pole."""
     square = g.add(g.multiply(x, x), g.multiply(y, y), -1.0)
-    minus = g.multiply(g.number(-1.0), x)
+    minus = _minus(g, x)
     beside = g.function(ops.ATAN, g.divide(y, x))
     turned = g.add(beside, g.multiply(g.number(math.pi), g.step(y)))
     across = g.multiply(g.number(0.5 * math.pi), g.step(y))
     upright = g.add(across, g.function(ops.ATAN, g.divide(minus, y)))
     return g.select(square, g.select(x, beside, turned), upright)
+
+
+for _code, _function in FUNCTIONS.items():
+    _enter(_function.value.__name__, lambda g, a, code=_code: g.function(code, a))
+
+_enter("add", Graph.add)
+_enter("subtract", lambda g, a, b: g.add(a, b, -1.0))
+_enter("multiply", Graph.multiply)
+_enter("divide", Graph.divide)
+_enter("power float_power", Graph.power)
+_enter("negative", _minus)
+_enter("positive conjugate", lambda g, a: a)
+_enter("square", lambda g, a: g.multiply(a, a))
+_enter("reciprocal", lambda g, a: g.divide(_one(g), a))
+_enter("cbrt", lambda g, a: g.multiply(g.step(a), g.power(g.multiply(g.step(a), a), g.number(1.0 / 3.0))))
+_enter("expm1", lambda g, a: g.add(g.function(ops.EXP, a), _one(g), -1.0))
+_enter("log1p", lambda g, a: g.function(ops.LOG, g.add(a, _one(g))))
+_enter("exp2", lambda g, a: g.function(ops.EXP, g.multiply(g.number(math.log(2.0)), a)))
+_enter("log2", lambda g, a: g.divide(g.function(ops.LOG, a), g.number(math.log(2.0))))
+_enter("log10", lambda g, a: g.divide(g.function(ops.LOG, a), g.number(math.log(10.0))))
+_enter("arccos", lambda g, a: g.add(g.number(0.5 * math.pi), g.function(ops.ASIN, a), -1.0))
+_enter("deg2rad radians", lambda g, a: g.multiply(g.number(math.pi / 180.0), a))
+_enter("rad2deg degrees", lambda g, a: g.multiply(g.number(180.0 / math.pi), a))
+_enter("absolute fabs", _absolute)
+_enter("sign", Graph.step)
+_enter("copysign", _copysign)
+_enter("heaviside", lambda g, a, b: g.select(a, _one(g), g.number(0.0)))
+_enter("maximum fmax", lambda g, a, b: g.select(g.add(a, b, -1.0), a, b))
+_enter("minimum fmin", lambda g, a, b: g.select(g.add(a, b, -1.0), b, a))
+# Equal nodes have the difference 0, whose sign is not positive.
+_enter("greater", lambda g, a, b: g.select(g.add(a, b, -1.0), _one(g), g.number(0.0)))
+_enter("greater_equal", lambda g, a, b: g.select(g.add(b, a, -1.0), g.number(0.0), _one(g)))
+_enter("less", lambda g, a, b: g.select(g.add(b, a, -1.0), _one(g), g.number(0.0)))
+_enter("less_equal", lambda g, a, b: g.select(g.add(a, b, -1.0), g.number(0.0), _one(g)))
+_enter("logical_not invert", lambda g, a: g.add(_one(g), a, -1.0))
+_enter("logical_and bitwise_and", Graph.multiply)
+_enter("logical_or bitwise_or", lambda g, a, b: g.add(g.add(a, b), g.multiply(a, b), -1.0))
+_enter("floor", Graph.floor)
+_enter("ceil", _ceil)
+_enter("trunc", lambda g, a: g.select(a, g.floor(a), _ceil(g, a)))
+_enter("floor_divide", lambda g, a, b: g.floor(g.divide(a, b)))
+_enter("remainder", lambda g, a, b: g.add(a, g.multiply(b, g.floor(g.divide(a, b))), -1.0))
+_enter("hypot", lambda g, a, b: g.function(ops.SQRT, g.add(g.multiply(a, a), g.multiply(b, b))))
+_enter("arctan2", _arctan2)

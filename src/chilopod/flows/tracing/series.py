@@ -5,6 +5,10 @@ tangents of a function phi(a) from d phi = w da, w = phi'(a), so that each costs
 
 A value that nearly overflows is infinite, as exp(a) in 1 / (1 + exp(a)): its own coefficients are meaningless, those of
 a quotient by it or of a function that is flat there are zero.
+
+:func:`loaded` makes the series of a tape, :func:`choose` the branches of its switches at a state, and :func:`expand`
+fills in all orders, by :func:`values_at` and :func:`tangents_at`. For single values there are :func:`sample`,
+:func:`slope_at` and :func:`compose`.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from chilopod.compiled import fused_njit
+from chilopod.compiled import copy_into, fused_njit
 from chilopod.flows.tracing import tape as ops
 from chilopod.lanes import HALF, as_lanes
 
@@ -200,48 +204,47 @@ def tangents_at(
                     tangents[i, k + 1, lane] = (unit / (k + 1)) * tangents[slopes[i], k, lane]
 
 
+@fused_njit(error_model="numpy", inline="always")
+def values_between(tape: Any, series: Any, first: int, stop: int) -> None:
+    """Values of the operations from ``first`` to before ``stop`` at the state and time of a series."""
+    values_at(tape.program, tape.terms, tape.slopes, (first, stop), 0, 1.0, series.values, series.branches)
+
+
 @fused_njit(error_model="numpy")
 def loaded(tape: Any, params: Any, orders: int, directions: int, branches: Any) -> Any:
     """Series with the numbers, the parameters and their functions, and zeros for everything that moves."""
     n, parameters, first, stop, _, nodes = tape.layout
-    values, lanes = np.zeros((nodes, orders)), -(-directions // HALF) * HALF
-    for i in range(parameters):
-        values[n + 1 + i, 0] = params[i]
-    for i in range(tape.numbers.size):
-        values[n + 1 + parameters + i, 0] = tape.numbers[i]
-    values_at(tape.program, tape.terms, tape.slopes, (first, stop), 0, 1.0, values, branches)
-    return Series(values, np.zeros((nodes, orders, lanes)), branches)
+    lanes = -(-directions // HALF) * HALF
+    series = Series(np.zeros((nodes, orders)), np.zeros((nodes, orders, lanes)), branches)
+    copy_into(series.values[n + 1 : n + 1 + parameters, 0], params)
+    copy_into(series.values[n + 1 + parameters : first, 0], tape.numbers)
+    values_between(tape, series, first, stop)
+    return series
 
 
 @fused_njit(error_model="numpy")
 def choose(tape: Any, series: Any) -> None:
     """Choose the branch of every switch by its function at a state, with the values of f and the guards there."""
-    program, terms, slopes, switches = tape.program, tape.terms, tape.slopes, tape.switches
-    values, branches = series.values, series.branches
-    first = tape.layout[3]
+    switches, first = tape.switches, tape.layout[3]
     for s in range(switches.shape[1]):
-        if switches[0, s] != ops.GUARD:
-            values_at(program, terms, slopes, (first, switches[2, s]), 0, 1.0, values, branches)
-            branches[s] = branch_at(switches[0, s], values[switches[1, s], 0])
-            first = switches[2, s]
-    values_at(program, terms, slopes, (first, tape.layout[4]), 0, 1.0, values, branches)
-    for s in range(switches.shape[1]):
-        if switches[0, s] == ops.GUARD:
-            branches[s] = branch_at(ops.GUARD, values[switches[1, s], 0])
+        stop = tape.layout[4] if switches[0, s] == ops.GUARD else switches[2, s]
+        values_between(tape, series, first, stop)
+        series.branches[s] = branch_at(switches[0, s], series.values[switches[1, s], 0])
+        first = stop
+    values_between(tape, series, first, tape.layout[4])
 
 
 @fused_njit(error_model="numpy")
 def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: Any) -> None:
     """Values of nodes, shape (nodes, samples), at times and states, of which all may share one."""
     series = loaded(tape, params, 1, 0, np.zeros(tape.switches.shape[1]))
-    n, values, with_resets = tape.layout[0], series.values, (nodes >= tape.layout[4]).any()
+    n, values = tape.layout[0], series.values
+    stop = tape.layout[5] if (nodes >= tape.layout[4]).any() else tape.layout[4]
     for m in range(found.shape[1]):
-        for i in range(n):
-            values[i, 0] = states[i, m % states.shape[1]]
+        copy_into(values[:n, 0], states[:, m % states.shape[1]])
         values[n, 0] = times[m % times.size]
         choose(tape, series)
-        if with_resets:
-            values_at(tape.program, tape.terms, tape.slopes, tape.layout[4:6], 0, 1.0, values, series.branches)
+        values_between(tape, series, tape.layout[4], stop)  # resets
         for i in range(nodes.size):
             found[i, m] = values[nodes[i], 0]
 
@@ -249,13 +252,12 @@ def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: A
 @fused_njit(error_model="numpy")
 def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, jacobian: Any) -> bool:
     """f and its jacobian at a state, in units of the states, with the current branches; False if not finite."""
-    program, terms, slopes, first, stop = tape.program, tape.terms, tape.slopes, tape.layout[3], tape.layout[4]
-    values, tangents = series.values, series.tangents
+    values, tangents, slopes, span = series.values, series.tangents, tape.slopes, tape.layout[3:5]
     for i in range(x.size):
         values[i, 0] = x[i] * units[i]
     values[x.size, 0] = t
-    values_at(program, terms, slopes, (first, stop), 0, 1.0, values, series.branches)
-    tangents_at(program, terms, slopes, (first, stop), 0, 1.0, values, tangents)
+    values_between(tape, series, span[0], span[1])
+    tangents_at(tape.program, tape.terms, slopes, span, 0, 1.0, values, tangents)
     s = 0.0
     for i in range(x.size):
         slope[i] = values[slopes[i], 0] / units[i]

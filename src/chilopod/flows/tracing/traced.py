@@ -1,7 +1,11 @@
 """Numbers and arrays that record operations, and versions of numpy, math and builtins for them.
 
-A function that is called with these records its operations in a :class:`chilopod.flows.tracing.graph.Graph`.
-A use of the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`.
+A function that is called with a :class:`Traced` number, or a :class:`TracedArray` of these and plain numbers, records
+its operations in a :class:`chilopod.flows.tracing.graph.Graph`. Numpy hands its ufuncs to ``_apply``, which applies
+those of ``SCALAR`` entry by entry, and its other functions to ``_call``, which uses the version in ``REPLACED``, or
+else the function itself on an array of objects. Functions that never ask their arguments, as ``np.array`` and those of
+math, have stand-ins (:func:`stand_in`), to be put into the globals of the function. A use of the value of a traced
+number (a branch, an index, a foreign library) raises :class:`Untraceable`.
 """
 
 from __future__ import annotations
@@ -102,6 +106,8 @@ def _scalar(name: str, build: Callable[..., int]) -> Callable[..., Any]:
 SCALAR: dict[str, Callable[..., Any]] = {name: _scalar(name, build) for name, build in BUILDS.items()}
 """Functions of single numbers, traced or plain, by the name of their ufunc."""
 
+_ENTRY_BY_ENTRY = {name: np.frompyfunc(apply, getattr(np, name).nin, 1) for name, apply in SCALAR.items()}
+
 
 def _replaced(name: str) -> Any:
     return lambda self, *args, **options: REPLACED[getattr(np, name)](self, *args, **options)
@@ -126,10 +132,6 @@ def as_traced(value: Any) -> Any:
     """An array-like as an array that may hold traced numbers."""
     if isinstance(value, TracedArray):
         return value
-    if isinstance(value, Traced):
-        array = np.empty((), dtype=object)
-        array[()] = value
-        return array.view(TracedArray)
     return np.array(value, dtype=object).view(TracedArray)
 
 
@@ -145,11 +147,6 @@ def wrapped(value: Any) -> Any:
     return value
 
 
-@functools.cache
-def _elementwise(name: str, operands: int) -> Any:
-    return np.frompyfunc(SCALAR[name], operands, 1)
-
-
 def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[str, Any]) -> Any:
     out = options.pop("out", None)
     options = {key: value for key, value in options.items() if key not in ("dtype", "casting", "subok", "order")}
@@ -159,21 +156,17 @@ def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[
         out = None  # as in x += 1: the name now refers to another number
     operands = [plain(value if isinstance(value, np.ndarray) else as_traced(value)) for value in inputs]
     if ufunc is np.matmul and method == "__call__":
-        result = _matmul(operands[0], operands[1])
+        result = np.matmul(*operands)
     elif ufunc.__name__ not in SCALAR:
         raise Untraceable(f"it calls numpy.{ufunc.__name__}")
     else:
-        result = getattr(_elementwise(ufunc.__name__, ufunc.nin), method)(*operands, **options)
+        result = getattr(_ENTRY_BY_ENTRY[ufunc.__name__], method)(*operands, **options)
     if out is not None:
         if not isinstance(out[0], TracedArray):
             raise Untraceable("it writes into an array of plain numbers")
         plain(out[0])[...] = result
         return out[0]
     return wrapped(result)
-
-
-def _matmul(a: Any, b: Any) -> Any:
-    return np.dot(a.astype(object), b.astype(object)) if b.ndim <= 2 else np.matmul(a, b)
 
 
 def _call(function: Any, args: tuple[Any, ...], options: dict[str, Any]) -> Any:
@@ -223,39 +216,39 @@ def _where_arrays(condition: Any, *choices: Any) -> Any:
 
 
 def _solve(matrix: Any, right: Any) -> Any:
-    """Gaussian elimination; a pivot of unknown size is taken from the diagonal."""
+    """Gaussian elimination."""
     if not (_has_traced(matrix) or _has_traced(right)):
         return np.linalg.solve(matrix, right)
     a, b = plain(as_traced(matrix)).copy(), plain(as_traced(right)).copy()
     n = a.shape[0]
     if a.shape != (n, n):
         raise Untraceable("it solves with a stack of matrices")
-
-    def worth(value: Any) -> float:
-        return -1.0 if isinstance(value, Traced) else abs(value)
-
     for column in range(n):
-        rows = range(column, n)
-        pivot = max(rows, key=lambda row: worth(a[row, column]))
-        if any(isinstance(a[row, column], Traced) for row in rows):
-            # The largest pivot is unknown while tracing: the diagonal one is used, which suits mass matrices.
-            pivot = column if worth(a[column, column]) != 0.0 else pivot
-            if worth(a[pivot, column]) == 0.0:
-                pivot = next(row for row in rows if isinstance(a[row, column], Traced))
-        elif worth(a[pivot, column]) == 0.0:
-            raise Untraceable("it solves with a singular matrix")
+        pivot = column + _pivot(a[column:, column])
         a[[column, pivot]], b[[column, pivot]] = a[[pivot, column]], b[[pivot, column]]
         for row in range(column + 1, n):
-            if worth(a[row, column]) == 0.0:
-                continue
-            factor = a[row, column] / a[column, column]
-            a[row, column:] = a[row, column:] - factor * a[column, column:]
-            b[row] = b[row] - factor * b[column]
+            if a[row, column] != 0.0:  # or a traced number
+                factor = a[row, column] / a[column, column]
+                a[row, column:] = a[row, column:] - factor * a[column, column:]
+                b[row] = b[row] - factor * b[column]
     for row in range(n - 1, -1, -1):
         for column in range(row + 1, n):
             b[row] = b[row] - a[row, column] * b[column]
         b[row] = b[row] / a[row, row]
     return b.view(TracedArray)
+
+
+def _pivot(column: Any) -> int:
+    """Place of the largest number in a column, or of the first where it is not zero and the largest is unknown while
+    tracing, which suits mass matrices."""
+    sizes = [-1.0 if isinstance(value, Traced) else abs(value) for value in column]
+    if -1.0 in sizes and sizes[0] != 0.0:
+        return 0
+    if max(sizes) != 0.0:
+        return sizes.index(max(sizes))
+    if -1.0 not in sizes:
+        raise Untraceable("it solves with a singular matrix")
+    return sizes.index(-1.0)
 
 
 def _has_traced(value: Any) -> bool:
@@ -282,9 +275,8 @@ def _blank(make: Callable[..., Any]) -> Callable[..., Any]:
             result[...] = value
             return result.view(TracedArray)
         options = {key: value for key, value in options.items() if not _means_object(value)}
-        plain_args = [value for value in args if not _means_object(value)]
-        args = tuple(np.zeros(each.shape) if isinstance(each, TracedArray) else each for each in plain_args)
-        result = make(*args, **options)
+        known = [value for value in args if not _means_object(value)]
+        result = make(*(np.zeros(each.shape) if isinstance(each, TracedArray) else each for each in known), **options)
         return as_traced(result) if result.dtype.kind == "f" else result
 
     return shaped
