@@ -369,9 +369,10 @@ def _old_tangent(curve: Curve, start: Start, units: Array) -> Array:
     """Unit tangent of the old branch, in units; along the parameter if unknown."""
     if start.old is not None:
         old = start.old / units
-        return np.asarray(old / np.linalg.norm(old))
-    if not offers(curve.system(start.value), "orbit"):
-        return np.eye(units.size)[-1]
-    beside = np.clip(start.value + _BESIDE * curve.scale * np.array([-1.0, 1.0]), *curve.between).tolist()
-    low, high = (np.append(known_state(curve.system(value)), value) / units for value in beside)
-    return np.asarray((high - low) / np.linalg.norm(high - low))
+    elif offers(curve.system(start.value), "orbit"):
+        beside = np.clip(start.value + _BESIDE * curve.scale * np.array([-1.0, 1.0]), *curve.between).tolist()
+        low, high = (np.append(known_state(curve.system(value)), value) / units for value in beside)
+        old = high - low
+    else:
+        old = np.eye(units.size)[-1]
+    return np.asarray(old / np.linalg.norm(old))
