@@ -1,9 +1,16 @@
-"""Bifurcation points and their descriptions: kind, modes, normal form and symmetry."""
+"""Bifurcation points and their descriptions: kind, modes, normal form and symmetry.
+
+``described`` makes a point from a crossing of the unit circle and the orbit there. It takes the critical multiplier
+with its eigenvectors (``_critical``) and, for a single one, the normal form (``_formed``). The kind follows from where
+the circle is crossed; at +1 from the symmetry that the mode breaks, or from the normal form (``kind_at_plus_one``).
+Several modes due to a symmetry are turned along the new orbits (``_modes``).
+"""
 
 from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -171,18 +178,6 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
         return [*lines, f"{state}: {in_one_line(self.orbit)}", f"critical mode: {mode}"]
 
 
-def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
-    """A point with the coefficients of its normal form, if valid."""
-    point = replace(point, normal_form=form)
-    verdict = criticality(form)
-    if point.kind in WITHOUT_CRITICALITY or not verdict.known:
-        return point
-    point = replace(point, criticality=verdict, coefficient=form.cubic, coefficient_error=form.cubic_error)
-    if point.kind is Kind.NEIMARK_SACKER:
-        point = replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
-    return point
-
-
 _FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
 _SETTLED = 1e-7  # change of the mean from half as many parts; its error is about the square of that
 
@@ -209,49 +204,65 @@ def described(
 ) -> BifurcationPoint:
     """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added. The
     critical multipliers belong to the whole return map; their block and the kind of the point are given if known."""
-    value, error_bound = place
+    (value, error_bound), event, returns = place, crossing.event, orbit.image.returns
     spec = spectrum(orbit.image)
     critical = critical_multipliers(spec, crossing)
-    nu = complex(spec.values[critical[0]])
-    mode, left = spec.right[:, critical[0]], spec.left[:, critical[0]]
-    peak = mode[np.abs(mode).argmax()]
-    scale = np.abs(peak) / peak / _mean_size(system, orbit, mode)
-    mode, left = mode * scale, left / scale.conjugate()
-    frequency, k = 0.0, orbit.image.returns
-    if crossing.event is CircleEvent.PAIR:
-        angle = float(np.angle(np.exp(1j * k * np.angle(nu))))
-        # The mode of a conjugate pair with positive frequency.
-        if angle < 0:
-            nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
-        frequency = angle / orbit.period
-    elif crossing.event is CircleEvent.MINUS and k % 2:
-        frequency = np.pi / orbit.period
-    simple = critical.size == (2 if crossing.event is CircleEvent.PAIR else 1)
+    simple = critical.size == (2 if event is CircleEvent.PAIR else 1)
     breaking = block is not None and not block.trivial
     # At +1 the normal form, or a broken symmetry, determines the kind.
-    asked = with_normal_form or (crossing.event is CircleEvent.PLUS and not breaking and kind is None)
-    formed = simple and asked and not crossing.collision
-    form = _formed(system, orbit, crossing.event, nu, mode, left) if formed else None
+    unknown = kind is None and event is CircleEvent.PLUS and not crossing.collision
+    nu, mode, left, frequency = _critical(system, orbit, spec, int(critical[0]), event)
+    formed = simple and (with_normal_form or (unknown and not breaking)) and not crossing.collision
+    form = _formed(system, orbit, event, nu, mode, left) if formed else None
     # No orbits branch off from a Krein collision, whatever the symmetries.
-    krein = crossing.collision and crossing.event is CircleEvent.PAIR
-    symmetry = None if block is None or krein else symmetric_crossing(block, crossing.event, k)
-    if kind is None and crossing.event is CircleEvent.PLUS and not crossing.collision:
-        alone = simple and (form is None or form.status is not NormalFormStatus.SEVERAL_CRITICAL)
-        if not alone and _is_continuum(system, orbit, mode):
-            count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
-            said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
-            raise ContinuumError(said)
+    krein = crossing.collision and event is CircleEvent.PAIR
+    symmetry = None if block is None or krein else symmetric_crossing(block, event, returns)
+    several = not simple or (form is not None and form.status is NormalFormStatus.SEVERAL_CRITICAL)
+    if unknown and several and _is_continuum(system, orbit, mode):
+        count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
+        said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
+        raise ContinuumError(said)
     modes = None if simple else _modes(spec, crossing, orbit, block, symmetry)
     if kind is None:
-        kind = _kind(crossing, k, form, symmetry if breaking else None)
+        kind = _kind(crossing, returns, form, symmetry if breaking else None)
         if kind is Kind.TRANSCRITICAL and modes is not None and symmetry is not None:
             kind, symmetry = _by_quadratic_term(system, orbit, modes, symmetry)
     verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
-    about: dict[str, Any] = {"criticality": verdict, "multiplicity": critical.size, "symmetry": symmetry}
-    about |= {"period": orbit.period, "modes": modes}
+    about: dict[str, Any] = {"period": orbit.period, "multiplicity": critical.size, "modes": modes}
+    about |= {"symmetry": symmetry, "criticality": verdict}
     error_bound += 4.0 * EPSILON * abs(value)
     point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, **about)
-    return with_coefficients(point, form) if form is not None and with_normal_form else point
+    return _with_coefficients(point, form) if form is not None and with_normal_form else point
+
+
+def _with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
+    """A point with the coefficients of its normal form, if valid."""
+    point = replace(point, normal_form=form)
+    verdict = criticality(form)
+    if point.kind in WITHOUT_CRITICALITY or not verdict.known:
+        return point
+    point = replace(point, criticality=verdict, coefficient=form.cubic, coefficient_error=form.cubic_error)
+    if point.kind is Kind.NEIMARK_SACKER:
+        return replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
+    return point
+
+
+def _critical(
+    system: SystemLike, orbit: Orbit, spec: Spectrum, index: int, event: CircleEvent
+) -> tuple[complex, ComplexArray, ComplexArray, float]:
+    """A critical multiplier, its right and left eigenvectors, and the frequency of the mode; those of positive
+    frequency of a conjugate pair."""
+    nu, mode, left = complex(spec.values[index]), spec.right[:, index], spec.left[:, index]
+    peak = mode[np.abs(mode).argmax()]
+    scale = np.abs(peak) / peak / _mean_size(system, orbit, mode)
+    mode, left = mode * scale, left / scale.conjugate()
+    if event is not CircleEvent.PAIR:
+        turns = event is CircleEvent.MINUS and orbit.image.returns % 2
+        return nu, mode, left, np.pi / orbit.period if turns else 0.0
+    angle = float(np.angle(np.exp(1j * orbit.image.returns * np.angle(nu))))
+    if angle < 0:
+        nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
+    return nu, mode, left, angle / orbit.period
 
 
 def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
@@ -310,10 +321,7 @@ def _formed(
         mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
     bounded = replace(image, error=np.nan_to_num(image.error, nan=0.0, posinf=0.0))
     scale = sizes(system, orbit.state, image.duration)
-
-    def mapped(states: Array) -> Array:
-        return returned_states(system, states, orbit.section)
-
+    mapped = partial(returned_states, system, section=orbit.section)
     try:
         return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)
     except (AnalysisError, SpentError, ValueError):
@@ -380,8 +388,7 @@ def _modes(
         vectors = spec.right[:, critical]
         if crossing.event is CircleEvent.PAIR:
             return vectors
-        real = np.linalg.svd(np.hstack([vectors.real, vectors.imag]))[0][:, : critical.size]
-        return real.astype(np.complex128)
+        return np.linalg.svd(np.hstack([vectors.real, vectors.imag]))[0][:, : critical.size].astype(np.complex128)
     values, vectors = np.linalg.eig(block.reduced(orbit.image.jacobian))
     eigenvector = vectors[:, np.abs(values - spec.values[critical[0]]).argmin()]
     modes = phased(np.stack([block.mode(eigenvector, branch.direction) for branch in symmetry.branches], axis=1))

@@ -4,6 +4,10 @@ For a known period T it is H = S flow(T/k), with S the symmetry of order k, if a
 time, H carries a state to the next crossing of its motion, turned by S, with a section, a hyperplane, along its normal:
 a one-sided Poincare map in the states' coordinates (Parker & Chua, *Practical Numerical Algorithms for Chaotic
 Systems*, 1989, ch. 2). Its derivative maps the direction of motion to exactly 0, in place of the trivial multiplier 1.
+
+``return_map`` finds the time of the return (``crossing``), flows there, turns the result by S and projects it onto the
+section (``on_section``). ``returned_states`` maps many states without derivatives. A system that depends on time has no
+section. ``jumps_at_ends``, ``starts`` and ``event_beside`` concern events that pass time 0.
 """
 
 from __future__ import annotations
@@ -24,7 +28,6 @@ from chilopod.flows.arguments import UserCode, numbers
 from chilopod.flows.carrying import REPEATED
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
 from chilopod.stability.interface import (
-    Autonomous,
     SystemLike,
     check_finite,
     checked_flow,
@@ -130,13 +133,12 @@ class ReturnMap(ReadOnlyArrays):
 
 
 _MISSED = 4.0  # factor on what the image of the motion misses
-_STATED = "dimension", "spatial_symmetry", "scale", "velocity"
-_FLOWS = "flow", "flow_with_error", "flow_states", "flow_tangents"
+_KEPT = "dimension", "spatial_symmetry", "scale", "velocity", "flow", "flow_with_error", "flow_states", "flow_tangents"
 
 
 def whole_period(system: SystemLike, periods: int = 1) -> SystemLike:
     """System for orbits over several periods, or without its symmetry in time and its known orbit."""
-    whole: Any = SimpleNamespace(**{name: getattr(system, name, None) for name in (*_STATED, *_FLOWS)})
+    whole: Any = SimpleNamespace(**{name: getattr(system, name, None) for name in _KEPT})
     whole.symmetry, whole.period = None, None if system.period is None else periods * system.period
     if is_autonomous(system):
         whole.guess_period = periods * system.guess_period
@@ -168,8 +170,9 @@ def return_duration(system: SystemLike) -> float:
     return whole / returns_per_period(system)
 
 
-def velocity_at(system: Autonomous, x: Array) -> Array:
-    """dx/dt at a state, checked."""
+def velocity_at(system: SystemLike, x: Array) -> Array:
+    """dx/dt at a state, checked; only of a system that does not depend on time."""
+    assert is_autonomous(system)
     with UserCode("velocity"):
         velocity = numbers(system.velocity(np.array(x)), x.shape, "velocity")
     if not np.isfinite(velocity).all():
@@ -181,8 +184,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     """The flow with an error bound, the system's own or an estimate from a computation in parts: a step-controlled
     integrator makes independent errors in the two; one with fixed steps should provide its own bound."""
     if offers(system, "flow_with_error"):
-        state, derivative, error = checked_flow(system, x, t0, t1, with_error=True)
-        return state, derivative, error
+        return checked_flow(system, x, t0, t1, with_error=True)
     state, derivative = checked_flow(system, x, t0, t1)
     check_finite(state, derivative)
     times = [t0 + part * (t1 - t0) for part in CUTS] + [t1]
@@ -201,14 +203,13 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
 def return_map(system: SystemLike, x: Array, with_error: bool = True, section: Section | None = None) -> ReturnMap:
     """The return map H and its derivative at a state, shape (n,), with a bound on the error if wanted. If the system
     does not depend on time, a return ends on the section: by default across the motion at ``x``."""
-    if is_autonomous(system):
-        section = section or section_at(system, x)
-        assert section is not None
+    section = section or section_at(system, x)
+    error: float | Array = np.nan
+    if section is None:
+        duration = return_duration(system)
+    else:
         start, rest, before, first = crossing(system, x, section)
         duration = start + rest
-    else:
-        section, duration = None, return_duration(system)
-    error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, duration)
     elif section is None:
@@ -219,7 +220,7 @@ def return_map(system: SystemLike, x: Array, with_error: bool = True, section: S
     if system.symmetry is not None:
         state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
     image = on_section(system, section, state, jacobian, duration, error)
-    if not (with_error and is_autonomous(system)) or image.velocity is None or image.normal is None:
+    if not with_error or image.velocity is None or image.normal is None:
         return image
     # The flow maps the motion at the start to that at the end. In a stiff system rounding of the state changes this
     # motion, and so the projection along it.
@@ -232,14 +233,14 @@ def on_section(
 ) -> ReturnMap:
     """The return map from a return, to a section if given, and its derivative; ``error`` bounds that of the flow."""
     check_finite(state, matrix)
-    count, wrong = returns_per_period(system), None if system.symmetry is None else np.abs(system.symmetry)
+    count, growth = returns_per_period(system), None if system.symmetry is None else np.abs(system.symmetry)
     velocity = normal = None
-    if section is not None and is_autonomous(system):
+    if section is not None:
         velocity, normal = velocity_at(system, state), section.normal
         across = _projection(velocity, normal)
-        matrix, wrong = across @ matrix, np.abs(across) if wrong is None else np.abs(across) @ wrong
-    if wrong is not None:
-        error = wrong @ error if isinstance(error, np.ndarray) else error * float(wrong.sum(axis=1).max())
+        matrix, growth = across @ matrix, np.abs(across) if growth is None else np.abs(across) @ growth
+    if growth is not None:
+        error = growth @ error if isinstance(error, np.ndarray) else error * float(growth.sum(axis=1).max())
     return ReturnMap(state, matrix, error, count, count * time, velocity, normal)
 
 
@@ -248,7 +249,7 @@ def _projection(velocity: Array, normal: Array) -> Array:
     return np.asarray(np.eye(normal.size) - np.outer(velocity, normal) / float(normal @ velocity))
 
 
-def crossing(system: Autonomous, x: Array, section: Section, derived: bool = True) -> tuple[float, float, Array, Array]:
+def crossing(system: SystemLike, x: Array, section: Section, derived: bool = True) -> tuple[float, float, Array, Array]:
     """Time of a motion's return to the section: a time shortly before, and the rest; the state and, unless it is not
     ``derived``, the derivative at that time."""
     for approach in _APPROACHES:
@@ -265,10 +266,10 @@ def crossing(system: Autonomous, x: Array, section: Section, derived: bool = Tru
     raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit and its period")
 
 
-def _arrival(system: Autonomous, before: Array, section: Section, rest: float) -> tuple[float, Array] | None:
+def _arrival(system: SystemLike, before: Array, section: Section, rest: float) -> tuple[float, Array] | None:
     """Remaining time of a state near its return to the section, and the state there, by Newton's method with the change
     of the speed; None if it does not arrive, has passed it or crosses it backwards."""
-    earlier: tuple[float, float] | None = None
+    earlier: tuple[float, float] | None = None  # time and speed of the round before
     for _ in range(_CROSSING_ROUNDS):
         state = turned(system, carried(system, before[None], 0.0, rest))[0]
         velocity = velocity_at(system, state)
@@ -380,7 +381,6 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     states = np.array(states)  # a system may write into its argument
     if section is None:
         return turned(system, carried(system, states, 0.0, return_duration(system)))
-    assert is_autonomous(system)
     approach = _APPROACHES[0]
     before = carried(system, states, 0.0, (1.0 - approach) * section.duration)
     result = np.empty_like(states)
@@ -397,14 +397,13 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
 def return_maps(systems: Sequence[SystemLike], orbits: Sequence[Array]) -> list[ReturnMap]:
     """The return maps of many systems at states on their orbits, with errors, together if possible."""
     first = systems[0]
-    if len(systems) > 1 and offers(first, "flow_many"):
-        alike = [system for system in systems if isinstance(system, type(first)) and first.can_flow_with(system)]
-        if len(alike) == len(systems):
-            count, duration = returns_per_period(first), return_duration(first)
-            jacobians, errors = first.flow_many(alike, 0.0, duration)
-            turn = np.eye(first.dimension) if first.symmetry is None else first.symmetry
-            return [
-                ReturnMap(orbit, turn @ jacobian, float(error), count, count * duration)
-                for orbit, jacobian, error in zip(orbits, jacobians, errors, strict=True)
-            ]
-    return [return_map(system, orbit) for system, orbit in zip(systems, orbits, strict=True)]
+    alike = [each for each in systems if isinstance(each, type(first))]
+    if not (1 < len(systems) == len(alike) and offers(first, "flow_many") and all(map(first.can_flow_with, alike))):
+        return [return_map(system, orbit) for system, orbit in zip(systems, orbits, strict=True)]
+    count, duration = returns_per_period(first), return_duration(first)
+    jacobians, errors = first.flow_many(alike, 0.0, duration)
+    turn = np.eye(first.dimension) if first.symmetry is None else first.symmetry
+    return [
+        ReturnMap(orbit, turn @ jacobian, float(error), count, count * duration)
+        for orbit, jacobian, error in zip(orbits, jacobians, errors, strict=True)
+    ]

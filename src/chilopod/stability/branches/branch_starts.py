@@ -1,10 +1,15 @@
-"""Starts of branches: at a known orbit, or at a bifurcation point of another branch."""
+"""Starts of branches: at a known orbit, or at a bifurcation point of another branch.
+
+A ``Start`` is a place and a direction. ``begin`` makes one at an orbit, ``switch`` those of the branches that leave a
+point. To follow one, ``branch_sizes`` gives the units of the states and ``anchored`` the first point with its tangent:
+along the curve through the orbit (``_along``), along a critical mode, or, where the mode does not suffice, along the
+second of two curves that cross (``_other``).
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -185,10 +190,9 @@ def switch(
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
-    kind = point.kind
-    if kind in _LEFT_BY_NONE:
-        raise ParameterError(_LEFT_BY_NONE[kind], field="point", value=point.value)
-    if kind is Kind.HOPF:
+    if point.kind in _LEFT_BY_NONE:
+        raise ParameterError(_LEFT_BY_NONE[point.kind], field="point", value=point.value)
+    if point.kind is Kind.HOPF:
         with Deadline(seconds):
             value, cycle, outward = hopf_cycle(family, point)
         return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
@@ -203,23 +207,25 @@ def switch(
             # The point knows its period better than the family's guess.
             section = section_at(whole, point.orbit, duration=point.period * periods / known)
             period = searched_orbit(whole, point.orbit, with_error=False, section=section).period
-    axial = point.symmetry is not None and bool(point.symmetry.branches)
+    at = Start(point.value, point.orbit, old=old, periods=periods, period=period, bifurcation=point)
+    return _along_modes(at, point, returns_per_period(system))
+
+
+def _along_modes(at: Start, point: BifurcationPoint, returns: int) -> tuple[Start, ...]:
+    """The starts at a point along its critical modes, for a number of returns in a period."""
+    kind, axial = point.kind, point.symmetry is not None and bool(point.symmetry.branches)
     modes = point.mode.real[None]
     if point.modes is not None and (axial or kind is not Kind.COLLISION):  # two that meet have one eigenvector
         modes = point.modes.real.T
     if kind is Kind.COLLISION and point.multiplier.real < 0.0:
-        kind = Kind.PERIOD_DOUBLING if returns_per_period(system) % 2 else Kind.PITCHFORK
+        kind = Kind.PERIOD_DOUBLING if returns % 2 else Kind.PITCHFORK
     if kind is Kind.PERIOD_DOUBLING:
-        about: dict[str, Any] = {"periods": 2 * periods, "period": period and 2.0 * period, "bifurcation": point}
-        return tuple(Start(point.value, point.orbit, mode=mode, **about) for mode in modes)
+        at = replace(at, old=None, periods=2 * at.periods, period=at.period and 2.0 * at.period)
+        return tuple(replace(at, mode=mode) for mode in modes)
     # With several modes each has its own branch, and the equation for a crossing of two curves holds only where a
     # symmetry separates them.
     crossing = kind is not Kind.PITCHFORK and (len(modes) == 1 or axial)
-    return tuple(
-        Start(point.value, point.orbit, True, sign * mode, crossing, old, periods, period, point)
-        for mode in modes
-        for sign in (1.0, -1.0)
-    )
+    return tuple(replace(at, mode=sign * mode, crossing=crossing) for mode in modes for sign in (1.0, -1.0))
 
 
 def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
@@ -252,18 +258,18 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
         state, derivative = checked_flow(system, x, 0.0, time)
         flown.append((time, (state, derivative @ direction)))
 
-    def departs(states: Array, linear: tuple[Array, Array], r: float) -> bool:
+    def departs(state: Array, linear: tuple[Array, Array], r: float) -> bool:
         reach = max(float(np.abs(linear[1] / base).max()), 1.0)
-        return not float(np.abs((states - linear[0] - r * linear[1]) / base).max()) <= _BENT * r * reach
+        return not float(np.abs((state - linear[0] - r * linear[1]) / base).max()) <= _BENT * r * reach
 
     def bent(r: float) -> bool:
-        # A strongly contracting map forgets its argument: the motion is then nonlinear, not its end.
         try:
             with np.errstate(all="ignore"):
                 there = x + r * direction
-                return departs(returned_states(system, there[None], section)[0], returned, r) or any(
-                    departs(checked_flow(system, there, 0.0, time)[0], linear, r) for time, linear in flown
-                )
+                if departs(returned_states(system, there[None], section)[0], returned, r):
+                    return True
+                # A strongly contracting map forgets its argument: the motion is then nonlinear, not its end.
+                return any(departs(checked_flow(system, there, 0.0, time)[0], linear, r) for time, linear in flown)
         except (AnalysisError, ArithmeticError, ValueError):
             return True
 
@@ -307,10 +313,9 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     leaving = start.mode is not None
     known = image if leaving else with_bounds(curve.system(start.value), start.orbit, image.duration).image
     values, bound = curve.multipliers(known)
-    about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": curve.periods}
-    if start.bifurcation is not None:
-        about |= {"special": start.bifurcation.kind, "bifurcation": start.bifurcation}
-    point = BranchPoint(start.value, start.orbit, values, tangent, units, **about)
+    left = start.bifurcation
+    about = None if left is None else left.kind, image.period, bound, left, curve.periods
+    point = BranchPoint(start.value, start.orbit, values, tangent, units, *about)
     return curve.anchor(point, ahead=ahead if leaving else 0.0)
 
 
@@ -319,10 +324,8 @@ def _along(matrix: Array, rising: bool) -> Array:
     _, values, rows = np.linalg.svd(matrix)
     if values[-1] <= _SINGULAR * max(1.0, float(values[0])):
         said = "branches meet here: the orbit alone does not determine one"
-        allowed = (
-            "another value; switch from a located point; for families by energy a term l * grad H, l the parameter"
-        )
-        raise AnalysisError(said, field="start", allowed=allowed)
+        other = "another value; switch from a located point; for families by energy a term l * grad H, l the parameter"
+        raise AnalysisError(said, field="start", allowed=other)
     tangent: Array = rows[-1]
     # At a fold the parameter does not rise: the largest part of the state gives the direction.
     along = tangent[-1] if abs(tangent[-1]) > IN_FOLD else tangent[np.abs(tangent).argmax()]
@@ -366,9 +369,10 @@ def _old_tangent(curve: Curve, start: Start, units: Array) -> Array:
     """Unit tangent of the old branch, in units; along the parameter if unknown."""
     if start.old is not None:
         old = start.old / units
-        return np.asarray(old / np.linalg.norm(old))
-    if not offers(curve.system(start.value), "orbit"):
-        return np.eye(units.size)[-1]
-    beside = np.clip(start.value + _BESIDE * curve.scale * np.array([-1.0, 1.0]), *curve.between).tolist()
-    low, high = (np.append(known_state(curve.system(value)), value) / units for value in beside)
-    return np.asarray((high - low) / np.linalg.norm(high - low))
+    elif offers(curve.system(start.value), "orbit"):
+        beside = np.clip(start.value + _BESIDE * curve.scale * np.array([-1.0, 1.0]), *curve.between).tolist()
+        low, high = (np.append(known_state(curve.system(value)), value) / units for value in beside)
+        old = high - low
+    else:
+        old = np.eye(units.size)[-1]
+    return np.asarray(old / np.linalg.norm(old))

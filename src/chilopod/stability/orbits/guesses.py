@@ -1,4 +1,9 @@
-"""Guesses of periodic orbits: whole ones, and further starts of Newton's method after a failure."""
+"""Guesses of periodic orbits, as nodes for Newton's method (``shooting``).
+
+A user's guess is a state or a whole orbit (``whole_orbit``). A state where an impact happens may be replaced
+(``past_impact``). Where Newton's method fails at it, ``nearer_orbits`` gives further starts, the cheap ones first: with
+careful steps, with several nodes, from a state further along, and from where the motion has settled.
+"""
 
 from __future__ import annotations
 
@@ -61,18 +66,19 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
 def past_impact(system: SystemLike, x: Array, duration: float) -> Array:
     """The state, or one further along its motion if that jumps there and then comes back nearer: round-off decides
     whether the state is before the jump or after it."""
-    if is_autonomous(system):
-        with contextlib.suppress(AnalysisError):
-            before = x - _EARLIER * duration * velocity_at(system, x)
-            after = carried(system, before[None], 0.0, 2.0 * _EARLIER * duration)[0]
-            fastest = np.maximum(*(np.abs(velocity_at(system, each)) for each in (before, after)))
-            if (np.abs(after - before) > _JUMPS * np.abs(before) + 20.0 * _EARLIER * duration * fastest).any():
-                later = carried(system, before[None], 0.0, _ONWARD * duration)[0]
-                both = np.array([x, later])
-                missed = np.abs(turned(system, carried(system, both, 0.0, duration)) - both)
-                size = np.abs(both).max(axis=0)
-                near, far = (missed / np.where(size > 0.0, size, 1.0)).max(axis=1)
-                return x if near <= far else later
+    if not is_autonomous(system):
+        return x
+    with contextlib.suppress(AnalysisError):
+        before = x - _EARLIER * duration * velocity_at(system, x)
+        after = carried(system, before[None], 0.0, 2.0 * _EARLIER * duration)[0]
+        fastest = np.maximum(*(np.abs(velocity_at(system, each)) for each in (before, after)))
+        if (np.abs(after - before) > _JUMPS * np.abs(before) + 20.0 * _EARLIER * duration * fastest).any():
+            later = carried(system, before[None], 0.0, _ONWARD * duration)[0]
+            both = np.array([x, later])
+            missed = np.abs(turned(system, carried(system, both, 0.0, duration)) - both)
+            size = np.abs(both).max(axis=0)
+            near, far = (missed / np.where(size > 0.0, size, 1.0)).max(axis=1)
+            return x if near <= far else later
     return x
 
 
@@ -90,27 +96,22 @@ def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
         # At an event, such as an impact, round-off decides whether a motion that ends there is before or after it.
         with contextlib.suppress(AnalysisError):
             yield Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration), False
-    for nodes in _settled(system, x):
+    for nodes in _settled_autonomous(system, x) if is_autonomous(system) else _settled(system, x):
         yield nodes, False
 
 
 def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:
     """States on an attracting orbit of the motion from a state, if any."""
-    if is_autonomous(system):
-        yield from _settled_autonomous(system, x)
-        return
-    for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):
-        try:
+    with contextlib.suppress(AnalysisError):
+        for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):
             for _ in range(count):
                 x = returned_states(system, x[None])[0]
-        except AnalysisError:
-            return
-        if not np.isfinite(x).all():
-            return
-        yield Nodes(x[None], return_duration(system))
+            if not np.isfinite(x).all():
+                return
+            yield Nodes(x[None], return_duration(system))
 
 
-def _settled_autonomous(system: Autonomous, x: Array) -> list[Nodes]:
+def _settled_autonomous(system: Autonomous, x: Array) -> Iterator[Nodes]:
     """As :func:`_settled`, with a new guess of the period: the first close return of the motion."""
     step = system.guess_period / _MARCHED
     try:
@@ -120,18 +121,16 @@ def _settled_autonomous(system: Autonomous, x: Array) -> list[Nodes]:
         for _ in range(_MARCHES * _MARCHED):
             path.append(carried(system, path[-1][None], 0.0, step)[0])
     except AnalysisError:
-        return []
+        return
     states = np.array(path)
     if not np.isfinite(states).all():
-        return []
+        return
     # A state that hardly moves, relative to its size, gives no information.
     size = sizes(system, x, system.guess_period)
     moves = np.ptp(states, axis=0) / size
     size = size * np.maximum(moves, _STILL * moves.max())
-    if not size.all():
-        return []
-    away = (np.abs(states - x) / size).max(axis=1)
-    turned = np.flatnonzero((away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)) + 1
-    if not turned.size:
-        return []
-    return [Nodes(x[None], float(turned[0]) * step / returns_per_period(system))]
+    if size.all():
+        away = (np.abs(states - x) / size).max(axis=1)
+        back = (away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)
+        if back.any():
+            yield Nodes(x[None], float(1 + back.argmax()) * step / returns_per_period(system))

@@ -1,4 +1,9 @@
-"""Periodic orbits: fixed points of the return map, by Newton's method."""
+"""Periodic orbits: fixed points of the return map, by Newton's method.
+
+``searched_orbit`` takes a guess, or the system's own state (``from_known``). ``near_orbit`` corrects it, by ``shot``
+or, for a large system, without the derivative as a matrix. After a failure other guesses are tried. An orbit of several
+rounds is cut down to one (``closings``). ``with_bounds`` bounds the errors.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +20,7 @@ from chilopod.flows.arguments import check_arguments, finite_array
 from chilopod.flows.carrying import REPEATED, TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
+from chilopod.stability import returns
 from chilopod.stability.interface import (
     Capabilities,
     SystemLike,
@@ -28,19 +34,7 @@ from chilopod.stability.interface import (
 from chilopod.stability.krylov import LARGE, RESTS, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, past_impact, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, nodes_along, shot
-from chilopod.stability.returns import (
-    BESIDE,
-    ReturnMap,
-    Section,
-    carried,
-    in_parts,
-    on_section,
-    return_duration,
-    return_map,
-    section_at,
-    turned,
-    velocity_at,
-)
+from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.groups import symmetric_basis
 
@@ -164,14 +158,18 @@ def searched_orbit(
     if whole is not None:
         return near_orbit(system, whole, with_error, budget)
     x = finite_array(guess, (system.dimension,), "orbit")
-    shortened = shortest and section is None
-    duration = return_duration(system) if section is None else section.duration
+    duration = returns.return_duration(system) if section is None else section.duration
     if isinstance(guess, Orbit) and section is None and is_autonomous(system):
         duration = guess.period / returns_per_period(system)
+
+    def near(start: Nodes, section: Section | None = None, careful: bool = False) -> Orbit:
+        found = near_orbit(system, start, with_error, budget, section, careful)
+        return _shortest(system, found, with_error, budget) if shortened else found
+
+    shortened = shortest and section is None
     try:
         x = past_impact(system, x, duration) if section is None else x
-        found = near_orbit(system, Nodes(x[None], duration), with_error, budget, section)
-        return _shortest(system, found, with_error, budget) if shortened else found
+        return near(Nodes(x[None], duration), section)
     except TooManySteps as error:
         allowed = ", ".join(filter(None, ("a guess closer to the orbit and its period", error.allowed)))
         said = f"the motion from the guess {error.problem}"
@@ -181,12 +179,9 @@ def searched_orbit(
             raise
         if budget is not None:
             budget.take(_SETTLING)
-        for nearer, careful in nearer_orbits(system, x):
-            try:
-                found = near_orbit(system, nearer, with_error, budget, careful=careful)
-                return _shortest(system, found, with_error, budget) if shortened else found
-            except AnalysisError:
-                continue
+        for nodes, careful in nearer_orbits(system, x):
+            with contextlib.suppress(AnalysisError):
+                return near(nodes, careful=careful)
         raise failed
 
 
@@ -203,7 +198,7 @@ def find_large_orbit(system: Capabilities, guess: ArrayLike | None = None) -> tu
         return tangent_map(system, found.state, found.section), size
     with contextlib.suppress(AnalysisError):
         while (parts := closings(system, image.point, image.duration, size, _MOST_PARTS)) > 1:
-            section = section_at(system, image.point, size, image.duration / parts)
+            section = returns.section_at(system, image.point, size, image.duration / parts)
             image, size = closed_orbit(system, image.point, section)
     return image, size
 
@@ -242,12 +237,12 @@ def closings(system: SystemLike, x: Array, duration: float, size: Array, most: i
     counts = np.array([m for m in range(most, 1, -1) if m <= few or all(m % d for d in range(2, m))])
     states, passed = [x], 0.0
     for time in duration / counts:
-        states.append(carried(system, states[-1][None], 0.0, time - passed)[0])
+        states.append(returns.carried(system, states[-1][None], 0.0, time - passed)[0])
         passed = time
     # Over several rounds a sixteenth of the time may be half a round, where a state is zero again.
     size = np.maximum(size, np.abs(states).max(axis=0))
-    near = _CLOSES * min(1.0, _relative(velocity_at(system, x) * duration, size))
-    away = (np.abs(turned(system, np.array(states[1:])) - x) / size).max(axis=1)
+    near = _CLOSES * min(1.0, _relative(returns.velocity_at(system, x) * duration, size))
+    away = (np.abs(returns.turned(system, np.array(states[1:])) - x) / size).max(axis=1)
     closed = counts[away <= near]
     return int(closed[0]) if closed.size else 1
 
@@ -258,7 +253,7 @@ def from_known(
     """The orbit through the system's own state, corrected if not exact; the return map there may be given."""
     if is_autonomous(system):
         return searched_orbit(system, x, with_error, budget=budget)
-    image = return_map(system, x, with_error) if image is None else image
+    image = returns.return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
     # No size is smaller than the state's value, unless the system gives the sizes.
     if not moved.any() or (not offers(system, "scale") and (moved <= _RETURNED * np.abs(x)).all()):
@@ -268,14 +263,10 @@ def from_known(
     if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
         return Orbit(x, image, np.zeros(x.size))
     if off <= _KNOWN:
-        return near_orbit(system, Nodes(x[None], return_duration(system)), with_error, budget)
+        return near_orbit(system, Nodes(x[None], returns.return_duration(system)), with_error, budget)
     said = f"must be a periodic orbit: one return moves the state by {float(moved.max()):.1e}"
     allowed = "a state on the orbit at time 0, or a first guess, which is then improved"
     raise AnalysisError(said, field="orbit", allowed=allowed)
-
-
-def _relative(values: Array, size: Array) -> float:
-    return float((np.abs(values) / size).max())
 
 
 def near_orbit(
@@ -291,7 +282,7 @@ def near_orbit(
     orbit is at right angles in ``units`` of the states, shape (n,), by default their sizes."""
     x, duration = start.states[0], start.duration
     size, end, closed = sizes(system, x, duration), None, None
-    section = section or section_at(system, x, size, duration)
+    section = section or returns.section_at(system, x, size, duration)
     if system.dimension >= LARGE and offers(system, "flow_tangents") and len(start.states) == 1:
         with contextlib.suppress(AnalysisError):
             closed = closed_orbit(system, x, section, budget=budget)[0]
@@ -308,20 +299,25 @@ def near_orbit(
         found = shot(Problem(lambda _: system, None, shared, budget, careful), start, size, section)
         x, duration, size, end = found.nodes.states[0], found.nodes.duration, found.sizes, (found.end, found.jacobian)
         # A state that only jumps, such as a mode, is free where no event happens: the corrector may put it anywhere.
-        free = (found.jacobian == np.eye(x.size)).all(axis=1) & (np.abs(x - start.states[0]) > RESTS * size)
-        free &= is_autonomous(system) and velocity_at(system, x) == 0.0
-        later = nodes_along(system, start.states[0], 1.5 * duration, 4 if free.any() else 1).states
-        if (later != start.states[0])[:, free].any():
-            raise AnalysisError("no event happens on the orbit found", field="orbit", allowed="a guess closer to it")
-    if is_autonomous(system) and _relative(velocity_at(system, x) * duration, size) <= RESTS:
+        if is_autonomous(system):
+            rests = (found.jacobian == np.eye(x.size)).all(axis=1) & (returns.velocity_at(system, x) == 0.0)
+            free = rests & (np.abs(x - start.states[0]) > RESTS * size)
+            later = nodes_along(system, start.states[0], 1.5 * duration, 4 if free.any() else 1).states
+            if (later != start.states[0])[:, free].any():
+                said = "no event happens on the orbit found"
+                raise AnalysisError(said, field="orbit", allowed="a guess closer to it")
+    if is_autonomous(system) and _relative(returns.velocity_at(system, x) * duration, size) <= RESTS:
         said = "the corrector found an equilibrium near the guess"
         raise AnalysisError(said, field="orbit", allowed="a guess closer to an orbit")
     if with_error:
         if system.symmetry is not None and not is_autonomous(system):
             _check_symmetry(system, x, duration, size, np.eye(x.size) if end is None else end[1])
         return with_bounds(system, x, duration)
-    section = section_at(system, x, units, duration)
-    image = return_map(system, x, False, section) if end is None else on_section(system, section, *end, duration)
+    section = returns.section_at(system, x, units, duration)
+    if end is None:
+        image = returns.return_map(system, x, False, section)
+    else:
+        image = returns.on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
 
 
@@ -329,7 +325,7 @@ def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array, 
     """AnalysisError if the second return from an orbit's state is not symmetric to the first, with its derivative."""
     symmetry = np.asarray(system.symmetry)
     after: Array = np.linalg.solve(symmetry, x).astype(np.float64)
-    second = carried(system, after[None], duration, 2.0 * duration)[0]
+    second = returns.carried(system, after[None], duration, 2.0 * duration)[0]
     off = _relative(symmetry @ second - after, size)
     if off > _ALIKE * max(1.0, float(np.abs(jacobian * size / size[:, None]).max())):
         said = f"must be one of the motion: after a return it misses the symmetric one by {off:.1e} of its size"
@@ -344,8 +340,8 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
     shared, given = symmetric_basis(system, x, size, _SYMMETRIC), x
     basis = np.eye(x.size) if shared is None else shared
     x = size * (basis @ (basis.T @ (x / size))) if shared is not None else x
-    section = section_at(system, x, size, duration)
-    image = return_map(system, x, True, section)
+    section = returns.section_at(system, x, size, duration)
+    image = returns.return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
     if error is None:
         if _relative(image.state - x, size) > _MISSES * max(1.0, float(np.abs(scaled).max())):
@@ -356,13 +352,17 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
         flow = (image.error if isinstance(image.error, np.ndarray) else np.full(scaled.shape, image.error)) @ size
         stiff = is_stiff(system, x, duration)  # the derivative and its error may vanish
         if stiff or (flow > _COARSE * size).any():
-            twice = REPEATED * np.abs(in_parts(system, x, image.duration) - image.state) + _CHANCE * size
+            twice = REPEATED * np.abs(returns.in_parts(system, x, image.duration) - image.state) + _CHANCE * size
             flow = flow + twice if stiff else np.minimum(flow, twice)
         wrong = np.abs(image.state - x) + flow
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative belongs to a state with this error: along the orbit's least certain direction.
     weakest = size * np.linalg.svd(scaled)[2][-1]
-    beside = return_map(system, x + BESIDE * weakest, with_error=False, section=section)
-    bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / BESIDE)
+    beside = returns.return_map(system, x + returns.BESIDE * weakest, with_error=False, section=section)
+    bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / returns.BESIDE)
     return Orbit(x, replace(image, error=image.error + bend), error)
+
+
+def _relative(values: Array, size: Array) -> float:
+    return float((np.abs(values) / size).max())

@@ -4,6 +4,10 @@ One node is single shooting. Over a whole return a motion may magnify a deviatio
 useless; over a part of it a deviation grows only by a root of that. The linear equations are condensed to the
 first state, the time of a return and the parameter (Ascher, Mattheij & Russell, *Numerical Solution of Boundary Value
 Problems*, section 4.3), the time to that at which the return ends on the section.
+
+``shot`` is Newton's method. In every round ``_Equations`` carries the nodes, gives the residual and a correction, and
+the equations after part of it. With a given parameter parts are halved until one comes nearer; with the parameter as an
+unknown the start is near, and every correction is taken whole.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from scipy.linalg.lapack import dgesv
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.interface import Autonomous, SystemLike, checked_flow, is_autonomous
+from chilopod.stability.interface import SystemLike, checked_flow, is_autonomous
 from chilopod.stability.returns import NODES, RETURN, Section, carried, crossing, section_at
 
 _EVALUATIONS, FEW_ROUNDS = 60, 12  # largest numbers of damped corrections, and of those on a curve, with near points
@@ -101,16 +105,6 @@ class Problem:
     budget: Budget | None = None
     careful: bool = False
 
-    def beside(self, value: float) -> tuple[SystemLike, float] | None:
-        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
-        if self.free is None:
-            return None
-        step = _DIFFERENCE * self.free.scale
-        try:
-            return self.system_at(value + step), step
-        except AnalysisError:  # the family ends here
-            return self.system_at(value - step), -step
-
 
 def shot(problem: Problem, start: Nodes, sizes: Array, section: Section | None) -> Closed:
     """The orbit near some nodes, by Newton's method, damped while the parameter is given.
@@ -118,31 +112,40 @@ def shot(problem: Problem, start: Nodes, sizes: Array, section: Section | None) 
     ``sizes`` of the states, shape (n,), grow with these while the parameter is given. The first state has a ``section``
     if the system has no period of its own.
     """
-    free = problem.free
-    equations = _Equations(problem, start, _Frame(sizes, sizes, section, problem.careful))
-    rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
-    correction: Nodes | None = None
-    whole, obstacle = True, ""
-    cutoff = _CUTOFF if free is not None else _SINGULAR if len(start.states) == 1 else _FAMILY
-    for _ in range(_EVALUATIONS if free is None else FEW_ROUNDS):
+    equations, best = _Equations(problem, start, _Frame(sizes, sizes, section, problem.careful)), np.inf
+    if problem.free is None:
+        return _damped(equations, start)
+    for _ in range(FEW_ROUNDS):
+        if NODES.met(equations.residual, best):
+            return equations.closed()
+        if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
+            break
+        best = min(best, equations.residual)
+        equations = equations.after(equations.correction(equations, _CUTOFF), 1.0)
+    raise _not_found(best)
+
+
+def _damped(equations: _Equations, start: Nodes) -> Closed:
+    """The orbit near some nodes at a given parameter."""
+    correction: Nodes | None = None  # correction at ``equations``, until part of it is taken
+    part, whole = 1.0, True  # part of it that is tried next, and if the last one was taken whole
+    best, strays, obstacle = np.inf, 0, ""
+    cutoff = _SINGULAR if len(start.states) == 1 else _FAMILY
+    for _ in range(_EVALUATIONS):
         if correction is None:
             # Halved steps may approach a jump of the motion, and the residual falls with them.
-            if rule.met(equations.residual, best if whole else np.inf):
-                return (equations if free is not None else equations.cleared()).closed()
-            if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
-                break
-            strays += equations.frame.astray
-            if strays > _STRAYS:
+            if RETURN.met(equations.residual, best if whole else np.inf):
+                return equations.cleared().closed()
+            longer, strays = equations.nodes.duration / start.duration, strays + equations.frame.astray
+            if strays > _STRAYS or not 1.0 / _LONGEST <= longer <= _LONGEST:
                 break
             best = min(best, equations.residual)
             correction = equations.correction(equations, cutoff)
         try:
             there = equations.after(correction, part)
         except AnalysisError as error:
-            if free is not None:
-                raise
             there, obstacle = None, f": {error.problem}"
-        if there is not None and (free is not None or equations.is_nearer(there, correction, part, cutoff, best)):
+        if there is not None and equations.is_nearer(there, correction, part, cutoff, best):
             equations, part, correction, whole, obstacle = there, min(1.0, 2.0 * part), None, part == 1.0, ""
         elif part > _SHORTEST:
             part *= 0.5
@@ -152,10 +155,14 @@ def shot(problem: Problem, start: Nodes, sizes: Array, section: Section | None) 
             correction = equations.correction(equations, cutoff)
         else:
             break
-    if free is None and best <= rule.settled:  # no step comes nearer: an equilibrium, or the equations' accuracy
+    if best <= RETURN.settled:  # no step comes nearer: an equilibrium, or the equations' accuracy
         return equations.closed()
+    raise _not_found(best, obstacle)
+
+
+def _not_found(best: float, obstacle: str = "") -> AnalysisError:
     said = f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size){obstacle}"
-    raise AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
+    return AnalysisError(said, field="orbit", allowed="a guess closer to the orbit")
 
 
 class _Frame(NamedTuple):
@@ -170,9 +177,9 @@ class _Frame(NamedTuple):
 class _Equations:
     """The equations at some nodes and their derivatives.
 
-    For nodes x_i, the time T of a return and the parameter p they are F_i = phi(x_i; T/m, p) - x_{i+1} = 0. Row i of
-    ``_linear`` is [dF_i/dx_i | dF_i/dT | dF_i/dp | F_i]; products of these rows make every node a linear function of
-    x_0, T, p and 1.
+    For nodes x_i, the time T of a return and the parameter p they are F_i = phi(x_i; T/m, p) - x_{i+1} = 0. ``_ends``
+    has the phi, ``_off`` the F. Row i of ``_linear`` is [dF_i/dx_i | dF_i/dT | dF_i/dp | room for F_i]; products of
+    these rows make every node a linear function of x_0, T, p and 1.
     """
 
     def __init__(self, problem: Problem, nodes: Nodes, frame: _Frame) -> None:
@@ -181,11 +188,9 @@ class _Equations:
         self._problem, self.nodes, free = problem, nodes, problem.free
         system = problem.system_at(nodes.value)
         m, n = nodes.states.shape
-        # Flows between the nodes, and their derivatives by the state, the time of a return and the parameter, beside
-        # the distance from the next node.
         self._ends, self._linear = np.empty((m, n)), np.zeros((m, n, n + 3))
-        self._returned = False
-        if free is None and m == 1 and frame.section is not None and is_autonomous(system):
+        self._returned = False  # True if the time is that of the return to the section
+        if free is None and m == 1 and frame.section is not None:
             frame = self._to_section(system, frame)
         else:
             self._to_nodes(system)
@@ -194,8 +199,7 @@ class _Equations:
             self._linear[:, :, n] /= m
         if system.symmetry is not None:
             self._ends[-1], self._linear[-1] = system.symmetry @ self._ends[-1], system.symmetry @ self._linear[-1]
-        self._off = self._ends - (nodes.states if m == 1 else np.roll(nodes.states, -1, axis=0))
-        self._linear[:, :, -1] = self._off
+        self._off = self._ends - np.concatenate([nodes.states[1:], nodes.states[:1]])
         sizes, x = frame.sizes, nodes.states[0]
         if free is None and x.any():
             sizes = np.maximum(sizes, np.maximum(np.abs(nodes.states), np.abs(self._ends)).max(axis=0))
@@ -205,7 +209,7 @@ class _Equations:
             moved = (np.append(x, nodes.value) - free.start) / np.append(sizes, free.scale)
             self._missing = float(free.row @ moved - free.target)
         self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
-        self.frame = _Frame(sizes, np.minimum(sizes, frame.reach), frame.section, frame.astray)
+        self.frame = frame._replace(sizes=sizes, reach=np.minimum(sizes, frame.reach))
         if not math.isfinite(self.residual):
             lost = np.flatnonzero(~np.isfinite(self._ends).all(axis=1))
             where = f"node {lost[0]} of {m}: " if lost.size else ""
@@ -213,25 +217,35 @@ class _Equations:
 
     def _to_nodes(self, system: SystemLike) -> None:
         """Carry every node to the next one."""
-        (m, n), value = self.nodes.states.shape, self.nodes.value
-        part, beside = self.nodes.duration / m, self._problem.beside(value)
+        (m, n), part = self.nodes.states.shape, self.nodes.duration / len(self.nodes.states)
+        beside, step = self._beside()
         for i, x in enumerate(self.nodes.states):
             a, b = (0.0, part) if is_autonomous(system) else (i * part, (i + 1) * part)
             try:
                 self._ends[i], self._linear[i, :, :n] = checked_flow(system, x, a, b)
                 if beside is not None:
                     with np.errstate(all="ignore"):  # values that are not finite are refused later
-                        self._linear[i, :, n + 1] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
+                        self._linear[i, :, n + 1] = (carried(beside, x[None], a, b)[0] - self._ends[i]) / step
             except AnalysisError as error:
                 if m == 1:
                     raise
                 raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
 
-    def _to_section(self, system: Autonomous, frame: _Frame) -> _Frame:
+    def _beside(self) -> tuple[SystemLike | None, float]:
+        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
+        problem, value = self._problem, self.nodes.value
+        if problem.free is None:
+            return None, 0.0
+        step = _DIFFERENCE * problem.free.scale
+        try:
+            return problem.system_at(value + step), step
+        except AnalysisError:  # the family ends here
+            return problem.system_at(value - step), -step
+
+    def _to_section(self, system: SystemLike, frame: _Frame) -> _Frame:
         """Carry a single node until its motion returns to the section, or over the time, to a new section."""
         x, duration = self.nodes.states[0], self.nodes.duration
-        assert frame.section is not None
-        if not frame.astray:
+        if not frame.astray and frame.section is not None:
             try:
                 near = replace(frame.section, duration=duration)
                 start, rest, before, first = crossing(system, x, near)
@@ -246,13 +260,12 @@ class _Equations:
         return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
 
     def _totals(self, off: Array) -> list[Array]:
-        """The node after each as a linear function of first state, time, parameter, and 1, shape (n, n+3)."""
-        own, n = self._linear, off.shape[1]
-        if off is not self._off:
-            own = own.copy()
-            own[:, :, -1] = off
-        totals = [own[0]]
-        for each in own[1:]:
+        """The node after each, with the residuals ``off``, as a linear function of first state, time, parameter, and 1,
+        shape (n, n+3)."""
+        rows, n = self._linear.copy(), off.shape[1]
+        rows[:, :, -1] = off
+        totals = [rows[0]]
+        for each in rows[1:]:
             total = each[:, :n] @ totals[-1]
             total[:, n:] += each[:, n:]
             totals.append(total)
@@ -294,10 +307,8 @@ class _Equations:
 
     def after(self, correction: Nodes, part: float) -> _Equations:
         """The equations after part of a correction, or less."""
-        here = self.nodes
+        here, frame, farthest = self.nodes, self.frame, _FARTHEST
         part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
-        frame = self.frame
-        farthest = _FARTHEST
         if frame.astray:
             motion = self._linear[0, :, -3] * here.duration / frame.sizes
             farthest = _CAREFUL * min(1.0, float(np.linalg.norm(motion)))

@@ -1,4 +1,8 @@
-"""Extent of the orbit that a search follows: where it begins and ends, and why."""
+"""Extent of the orbit that a search follows: where it begins and ends, and why.
+
+An orbit may end before its interval in a fold, which a short branch round it shows (``_fold_beside``), in an
+equilibrium (``_at_rest``), or at another orbit.
+"""
 
 from __future__ import annotations
 

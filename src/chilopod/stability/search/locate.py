@@ -1,4 +1,10 @@
-"""Search for the points where a periodic orbit loses or gains stability as one parameter changes."""
+"""Search for the points where a periodic orbit loses or gains stability as one parameter changes.
+
+``locate`` samples the orbit (``Samples``), finds where multipliers cross the unit circle between its ends, block by
+block (``_crossings``), looks closely where one only touches it (``_resolved``), and describes each crossing
+(``_described``). ``located`` puts these parts together, also for Hopf points. Where time 0 must be moved away from an
+event, a second search goes on from there.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +28,7 @@ from chilopod.stability.interface import Family, with_shared_symmetries
 from chilopod.stability.orbits.orbit import Orbit, from_known, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind, described
 from chilopod.stability.returns import MOVED
+from chilopod.stability.search.accuracy import Accuracy
 from chilopod.stability.search.extent import extent
 from chilopod.stability.search.samples import SPENT, Samples
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, rows, said
@@ -94,11 +101,15 @@ class Located(Result, Sequence[BifurcationPoint]):
 
     def _lines(self) -> list[str]:
         many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"
-        table = rows(point.row for point in self.points)
         first = f"Located: {many}, {self.status.label}: {self.status.sentence}"
         low, high = self.searched
         orbits = f"{self.evaluations} orbits, at most {self.spacing:.2g} apart"
-        return [first, f"searched: {low:.9g} to {high:.9g}, {orbits}", *table, *said(self.remarks)]
+        return [
+            first,
+            f"searched: {low:.9g} to {high:.9g}, {orbits}",
+            *rows(point.row for point in self.points),
+            *said(self.remarks),
+        ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the kinds of bifurcations over the parameter, on axes of matplotlib or on new ones."""
@@ -248,7 +259,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     """The crossings in every block of the return map."""
     try:
         blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
-        uncertain = samples.of_flow
+        accuracy = Accuracy(samples)
     except SpentError as error:
         return [(None, Crossings((), SearchStatus.BUDGET, (error.problem,), 0))]
 
@@ -258,9 +269,9 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
             shape = found[0].image.jacobian.shape
             errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
         elif block is None or block.trivial:
-            errors = samples.errors(found)
+            errors = accuracy.errors(found)
         else:  # a symmetry-breaking mode does not affect the orbit's accuracy
-            errors = np.full(len(found), uncertain)
+            errors = np.full(len(found), accuracy.of_flow)
         return np.stack([each.image.jacobian for each in found]), errors
 
     def search(matrices: Matrices) -> Crossings:

@@ -3,30 +3,27 @@
 A followed orbit is first sampled along a path to the upper end (``_whole_path``), each sample corrected (``_sampled``)
 from a prediction (``_predicted``); later ones lie between two of them (``_between``). Newton's method may find another
 orbit near by: a sample that jumps, turns back at a multiplier +1, or has one on another side than predicted, or is not
-on the branch of the last one is not taken, and a shorter step is tried.
+on the branch of the last one is not taken, and a shorter step is tried (``_followed``).
 """
 
 from __future__ import annotations
 
 import bisect
 import contextlib
-import functools
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ChilopodError
-from chilopod.flows import deadline
 from chilopod.flows.arguments import UserCode
-from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
 from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, rounds_in, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.returns import BESIDE, return_duration, return_map, return_maps, section_at, starts
+from chilopod.stability.returns import return_duration, return_maps, section_at, starts
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -35,28 +32,30 @@ NEAR_FOLD = 0.02
 SPENT = "the orbits (`budget`) were spent"
 """Remark of a search that computed as many orbits as it may."""
 
+# Budgets.
 _FIRST = 400  # least number of return maps allowed for the first orbit
-_SHORTEST = 2.0**-11  # shortest step of a followed orbit, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # largest assumed cost of an orbit, in return maps
+# Predictions, and steps along the path.
+_BEHIND = 6  # number of samples of a prediction
+_APART = 0.1  # least distance of a third sample on the curve through two, relative to theirs
+_BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
+_ACROSS = 0.7  # least cosine between the motion and the normal of a section that is kept
+_CLOSE, _BRIEF = 0.2, 0.01  # distance of a first multiplier from +1 that calls for a brief step, relative to the usual
+_SHORTEST = 2.0**-11  # shortest step of a followed orbit, relative to the first
 _ATTEMPTS = 24  # largest number of steps to a value from the sample beside it: ten halvings, then more
-_SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as accurate as the flow
+# Is it the same orbit?
+_JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 _FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
 _SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
-_HALVED, _CLOSER = 13, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
 _HALFWAY = 0.25  # largest distance of an orbit halfway from the mean of its neighbours, relative to their distance
-_APART = 0.1  # least distance of a third sample on the curve through two, relative to theirs
-_ACROSS = 0.7  # least cosine between the motion and the normal of a section that is kept
-_BEHIND = 6  # number of samples of a prediction
-_BENT = 0.3  # largest distance of an orbit from the line between its neighbours, relative to theirs
-_TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
-_TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
+_HALVED, _CLOSER = 13, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
 _MEETING = 1e-4  # distance of a first multiplier from +1 that does not tell its side
-_CLOSE, _BRIEF = 0.2, 0.01  # distance of a first multiplier from +1 that calls for a brief step, relative to the usual
+_TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
+# Does it meet another orbit?
+_TOUCHING = 0.25  # distance from +1, relative to the multiplier's, at which straight lines that meet may touch it
 _NEAR_MERGED = 1e-2  # gap, relative to the interval, in which a failed correction confirms that two orbits meet
 _MERGED = 1e-5  # gap, relative to the interval, below which no sample between two orbits that meet is tried
-_FOLLOWED, _LEAST_ERROR = 10.0, 1e-15  # factor on the error of the first orbit for that of others, and least error
-_JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 
 
 class Samples:
@@ -78,9 +77,8 @@ class Samples:
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
         self.count = 0  # orbits computed
         self._by_value: dict[float, Sample] = {}
-        self._values: list[float] = []
-        self._missing: dict[float, AnalysisError] = {}
-        self._bends: dict[float, float] = {}
+        self._values: list[float] = []  # its keys by size
+        self._missing: dict[float, AnalysisError] = {}  # reasons for missing samples, by value
         self._normal: Array | None = None  # of the section of the last orbit
         self.orbits, allowed = budget, _RETURNS * budget
         self.budget = Budget(max(allowed, _FIRST), seconds)
@@ -133,47 +131,15 @@ class Samples:
         # Failed orbits do not predict the cost of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
-    def errors(self, samples: list[Sample]) -> Array:
-        """Relative errors of the derivatives at samples of a followed orbit: that of the flow and its derivative, and
-        that due to the orbit's error, the flow's times the inverse of H - 1."""
-        deadline.check(deadline.MORE)  # the decompositions take long for many states
-        of_flow, units = self.of_flow, self.size / self.size[:, None]
-        result = np.full(len(samples), of_flow)
-        scaled = np.array([each.image.jacobian for each in samples]) * units
-        _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
-        for i in np.flatnonzero(values[:, -1] <= _SURE):
-            sample = samples[i]
-            if sample.value not in self._bends:
-                system, duration = self.family(sample.value), sample.image.duration
-                section = section_at(system, sample.orbit, self.size, duration)
-                beside = return_map(system, sample.orbit + BESIDE * self.size * rows[i, -1], False, section)
-                change = (beside.jacobian - sample.image.jacobian) * units
-                self._bends[sample.value] = float(np.linalg.norm(change)) / BESIDE
-            # Where H - 1 vanishes along a direction, the rest is of third order, except in special cases.
-            off = min(of_flow / max(float(values[i, -1]), of_flow), of_flow ** (1.0 / 3.0))
-            result[i] = min(1.0, of_flow + self._bends[sample.value] * off)
-        return result
-
-    @functools.cached_property
-    def of_flow(self) -> float:
-        """Relative error of the derivative of the flow over a return, in units that balance the states, from that at
-        the first orbit: it may contract strongly within a return, and followed ones less."""
-        image = self.first.image
-        if Sample(self.low, self.first.state, image).off_plus_one <= NEAR_FOLD:  # the orbit is less accurate
-            image = return_map(self.family(self.low), self.first.state, True, self.first.section)
-        # An entry of round-off gives no information on the units.
-        units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
-        largest = max(1.0, float(np.abs(image.jacobian * units / units[:, None]).max()))
-        return _FOLLOWED * max(_LEAST_ERROR, float(np.max(image.error * units / units[:, None])) / largest)
-
     def jumped(self, orbit: Array, guess: Array) -> bool:
         """True if an orbit is so far from its prediction that it must be another one."""
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
 
-    def _keep(self, sample: Sample) -> None:
-        self.count += 1
-        self._by_value[sample.value] = sample
-        bisect.insort(self._values, sample.value)
+    def _keep(self, *samples: Sample) -> None:
+        for sample in samples:
+            self.count += 1
+            self._by_value[sample.value] = sample
+            bisect.insort(self._values, sample.value)
 
     def _keep_known(self, values: list[float]) -> None:
         """Samples of systems that depend on time and know their orbits."""
@@ -218,8 +184,7 @@ class Samples:
             return found
         except AnalysisError:
             behind = sorted((each for each in around if each.value < value), key=lambda each: each.value)
-            reached = self._followed(behind, value, _ATTEMPTS)
-            for sample in reached:
+            for sample in self._followed(behind, value, _ATTEMPTS):
                 if sample.value == value:
                     return sample
                 self._keep(sample)
@@ -254,11 +219,10 @@ class Samples:
         places = first_values(self.low, self.high)[1:].tolist()
         if _MEETING < path[0].off_plus_one < _CLOSE:
             # The direction of the orbit tells it from another one that crosses it.
-            places = [self.low + _BRIEF * (places[0] - self.low), *places]
+            places.insert(0, self.low + _BRIEF * (places[0] - self.low))
         for value in places:
             reached = self._followed(path, value)
-            for sample in reached:
-                self._keep(sample)
+            self._keep(*reached)
             path += reached
             if path[-1].value != value:
                 self.spent = self.budget.spent or (SPENT if self.count >= self.orbits else "")
@@ -300,10 +264,8 @@ class Samples:
         """Sample between the last one and another, in the middle or nearer to the last; None if there is none."""
         for part in (0.5, 0.25, 0.125, 0.0625):
             value = behind[-1].value + part * (ahead.value - behind[-1].value)
-            try:
+            with contextlib.suppress(AnalysisError):
                 return self._sampled(value, self._predicted(behind[: -_BEHIND - 1 : -1], value), behind[-1])
-            except AnalysisError:
-                continue
         return None
 
     def _followed(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
@@ -316,27 +278,31 @@ class Samples:
             attempts = None if attempts is None else attempts - 1
             last, recent = path[-1], path[: -_BEHIND - 1 : -1]
             guess = self._predicted(recent, target)
+            # Where this orbit ends at another one the path may go on there in the end: it is cut later.
+            sided = attempts is not None or target - last.value >= 2.0 * smallest
             try:
                 found = self._sampled(target, guess, last)
-                # A large jump shows that Newton's method has found another orbit.
-                other = self.jumped(found.orbit, guess)
-                # Where this orbit ends at another one the path may go on there in the end: it is cut later.
-                if attempts is not None or target - last.value >= 2.0 * smallest:
-                    other = other or not self._on_its_side(recent, guess, found)
-                other = other or not self._on_same_branch(last, guess, found) or self._turns_back(path[-2:], found)
+                passes = found.passes(last)  # then another orbit may be arbitrarily near
+                same = (
+                    not self.jumped(found.orbit, guess)
+                    and (not sided or self._on_its_side(recent, guess, found))
+                    and (not passes or self._goes_through(last, found))
+                    and self._continues(last, guess, found, _SAME if passes else _SMALL)
+                    and not self._turns_back(path[-2:], found)
+                )
             except SpentError:
                 break
             except AnalysisError as error:
-                other, closes = True, error.field == "period"
-            if other:
+                same, closes = False, error.field == "period"
+            if same:
+                path.append(found)
+                longer = target + 2.0 * (target - last.value)
+                target = longer if abs(value - longer) > smallest and longer < value else value
+            else:
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
                     self.merges |= closes and attempts is None  # an orbit of two rounds meets that of one
                     break
-                continue
-            path.append(found)
-            longer = target + 2.0 * (target - last.value)
-            target = longer if abs(value - longer) > smallest and longer < value else value
         return path[len(behind) :]
 
     def _turns_back(self, behind: list[Sample], found: Sample) -> bool:
@@ -345,8 +311,8 @@ class Samples:
         if len(behind) < 2 or found.value - behind[-1].value <= _TELLING * self.width:
             return False
         first, left = behind
-        off = np.array([first.beside_plus_one, left.beside_plus_one, found.beside_plus_one])
-        if not (np.isfinite(off).all() and (off > -1.0).all() and (np.sign(off) == np.sign(off[1])).all()):
+        off = _on_one_side([first, left, found])
+        if off is None or not (off > -1.0).all():
             return False
         rates = np.log1p(off)
         ahead = rates[1] + (rates[1] - rates[0]) * (found.value - left.value) / (left.value - first.value)
@@ -363,14 +329,6 @@ class Samples:
         places, sides = np.array([[each.value, each.side] for each in samples]).T
         ahead = [float(through(places[:count], sides[:count], found.value)) for count in (2, 3)]
         return max(abs(side - found.side) for side in ahead) <= abs(found.side)
-
-    def _on_same_branch(self, last: Sample, guess: Array, found: Sample) -> bool:
-        """True if an orbit is on the branch of the last one."""
-        # Where a multiplier passes +1 another orbit may be arbitrarily near.
-        passes = found.passes(last)
-        if passes and not self._goes_through(last, found):
-            return False
-        return self._continues(last, guess, found, _SAME if passes else _SMALL)
 
     def _continues(self, last: Sample, guess: Array, found: Sample, small: float = _SMALL) -> bool:
         """True if an orbit was predicted, or another lies about halfway between it and the last one: in a fold at the
@@ -407,13 +365,18 @@ class Samples:
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
     """True if a multiplier on one side of +1 approaches it from both sides of the gap between two of four samples."""
-    places = np.array([each.value for each in (first, left, right, last)])
-    off = np.array([each.beside_plus_one for each in (first, left, right, last)])
-    if not np.isfinite(off).all() or (np.sign(off) != np.sign(off[1])).any():
+    off = _on_one_side([first, left, right, last])
+    if off is None:
         return False
-    off = np.abs(off)
+    places, off = np.array([each.value for each in (first, left, right, last)]), np.abs(off)
     into, out = np.diff(off)[[0, 2]] / np.diff(places)[[0, 2]]
     if not into < 0.0 < out:
         return False
     meeting = (off[2] - off[1] + into * places[1] - out * places[2]) / (into - out)
     return bool(off[1] + into * (meeting - places[1]) < _TOUCHING * off[1:3].max())
+
+
+def _on_one_side(samples: list[Sample]) -> Array | None:
+    """Signed distances of real multipliers from +1, shape (samples,); None unless all are on one side."""
+    off = np.array([each.beside_plus_one for each in samples])
+    return off if np.isfinite(off).all() and (np.sign(off) == np.sign(off[1])).all() else None
