@@ -54,10 +54,11 @@ def draw(found: Any, axes: Axes | None, show: str) -> Axes:
             axes.contourf(x, y, found.folded, levels=[0.5, 1.5], colors="none", hatches=["////"])
     else:
         _field(axes, x, y, found, show)
-    for curve in found.curves if show != "criticality" else ():
-        _curve(axes, found, curve)
     if show == "criticality":
         _coefficients(axes, found)
+    else:
+        for curve in found.curves:
+            _curve(axes, found, curve)
     for point in found.special:
         at = (axis.shown(value) for axis, value in zip((found.x, found.y), point.values, strict=True))
         axes.plot(*at, "D", color=_MARK, markeredgecolor="white", markersize=7, zorder=6, label="codimension two")
@@ -84,9 +85,7 @@ def _field(axes: Axes, x: Array, y: Array, found: Any, show: str) -> None:
     from matplotlib.colors import LogNorm, TwoSlopeNorm
 
     axes.set_facecolor(_COLORS[Fate.INVALID])
-    values = {"growth": found.growth, "radius": found.radius}.get(
-        show, np.where(found.frequency > 0.0, found.frequency, np.nan)
-    )
+    values = np.where(found.frequency > 0.0, found.frequency, np.nan) if show == "frequency" else getattr(found, show)
     if show == "radius":
         rows, columns = (np.flatnonzero(np.isfinite(values).any(axis=axis)) for axis in (1, 0))
         x, y, values = x[columns], y[rows], values[np.ix_(rows, columns)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -86,14 +87,13 @@ class StabilityMap(Summary, ReadOnlyArrays):
         straight = self.fate == FATES.index(Fate.STRAIGHT)
         found = np.zeros_like(straight)
         axes = self.x_values, self.y_values
-        for axis, view, free in ((0, found, straight), (1, found.T, straight.T)):
-            for row, value in enumerate(axes[1 - axis].tolist()):
+        for axis, rows in ((0, found), (1, found.T)):
+            for row, value in zip(rows, axes[1 - axis].tolist(), strict=True):
                 folds, hard = (_crossed(self.curves, kind, axis, value) for kind in (Kind.FOLD, Kind.PITCHFORK))
                 for fold in folds if hard.size else ():
-                    ends = np.sort([fold, hard[np.abs(hard - fold).argmin()]])
-                    within = (axes[axis] >= ends[0]) & (axes[axis] <= ends[1])
-                    view[row] |= within & free[row]
-        return read_only(found)
+                    low, high = np.sort([fold, hard[np.abs(hard - fold).argmin()]])
+                    row |= (axes[axis] >= low) & (axes[axis] <= high)
+        return read_only(found & straight)
 
     @property
     def shares(self) -> dict[Fate, float]:
@@ -112,9 +112,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         above = [f"{shares} of {columns} x {rows} values, {self.computed.sum()} of which were computed"]
         if self.folded.any():
             above.append(f"beside curved walks, straight ones hold at {100.0 * self.folded.mean():.3g} % of the values")
-        kinds = [curve.kind.label for curve in self.curves]
-        counts = [f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)]
-        above.append(f"curves: {', '.join(counts) or 'none'}")
+        kinds = Counter(curve.kind.label for curve in self.curves)
+        above.append(f"curves: {', '.join(f'{count} of {kind}' for kind, count in kinds.items()) or 'none'}")
         table: list[Sequence[str]] = [("on them", self.x.label, self.y.label)]
         for point in self.special:
             numbers = zip((self.x, self.y), np.column_stack([point.values, point.error_bound]), strict=True)
@@ -194,7 +193,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
         found["curve_kind"] = ("point", np.repeat(kinds, sizes))
         varied = f"{self.x.path}, {self.y.path}"
         attrs = {"robot": self.robot.name, "varied": varied, "robot_toml": self.robot.to_toml()}
-        return xr.Dataset(found, coords=coords, attrs=attrs)
+        return xr.Dataset(found, coords, attrs)
 
 
 def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) -> Array:
