@@ -11,6 +11,7 @@ a module, over the period. This is exact. The law is that F hardly depends on ei
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -104,16 +105,14 @@ def collapse(context: Context, progress: Progress = silent) -> xr.Dataset:
     size, robot = context.size, context.robot
     rest = np.geomspace(*REST, size.of(17, 9, 2))
     masses = np.geomspace(0.1, 1000.0, size.of(17, 9, 2))
-    strides, steps = (0.5, 1.0, 2.0), 0.0
+    strides = 0.5, 1.0, 2.0
+    steps = itertools.count(1)
     total = len(ROBOTS) * rest.size + len(strides) * masses.size
 
     def at(springs: float, **factors: float) -> float:
-        nonlocal steps
         found = scaled(robot, **factors)
-        for joint in range(1, len(robot.springs.stiffness)):
-            found = found.with_value(f"{ALL}[{joint}]", springs * spring_scale(found))
-        steps += 1.0
-        progress(steps / total, "critical springs of scaled robots")
+        found = found.with_value(f"{ALL}[1:]", springs * spring_scale(found))
+        progress(next(steps) / total, "critical springs of scaled robots")
         return critical(found)
 
     built = robot.springs.stiffness[1] / spring_scale(robot)
@@ -177,11 +176,5 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
 
 
 SCALING: Section[xr.Dataset] = Section(
-    "scaling",
-    CHAPTER,
-    "the scaling law of critical springs",
-    collapse,
-    panels=panel,
-    beyond=True,
-    headline=True,
+    "scaling", CHAPTER, "the scaling law of critical springs", collapse, panels=panel, beyond=True, headline=True
 )
