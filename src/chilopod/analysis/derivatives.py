@@ -14,13 +14,12 @@ import numpy as np
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Array
 
-LEVELS = 4
-"""Number of steps on each side."""
-
-_STEP = 1e-3  # largest step, relative to the size of the argument
-_SAFETY = 4.0  # factor on the last change of the extrapolation: switches within the steps slow its convergence
 ROUND_OFF = 8.0 * 2.0**-52
 """Error of a value, relative to the values."""
+
+_LEVELS = 4  # steps on each side
+_STEP = 1e-3  # largest step, relative to the size of the argument
+_SAFETY = 4.0  # factor on the last change of the extrapolation: switches within the steps slow its convergence
 
 
 def derivative(
@@ -32,7 +31,7 @@ def derivative(
     function raises a ParameterError on one side, as at the end of a range, the derivative is that towards the other
     side. AnalysisError if it cannot be evaluated on both sides.
     """
-    steps = _STEP * size * 0.5 ** np.arange(LEVELS)
+    steps = _STEP * size * 0.5 ** np.arange(_LEVELS)
     here = np.asarray(function(at), dtype=np.float64)
     sides: list[Array] = []
     for sign in (1.0, -1.0):
@@ -47,7 +46,7 @@ def derivative(
         raise AnalysisError(f"has no derivative at {at:.6g}: neighbouring values are out of range", field="robot")
     above, below = (values if values.size else here for values in sides)
     slopes = (above - below) / (len(known) * steps.reshape(-1, *[1] * here.ndim))
-    for power in range(1, LEVELS):
+    for power in range(1, _LEVELS):
         before, slopes = slopes, (2.0**power * slopes[1:] - slopes[:-1]) / (2.0**power - 1.0)
     noise = round_off * np.maximum(np.abs(here), max(float(np.abs(values).max()) for values in known))
-    return slopes[0], _SAFETY * np.abs(slopes[0] - before[-1]) + noise * 2.0**LEVELS / steps[-1]
+    return slopes[0], _SAFETY * np.abs(slopes[0] - before[-1]) + noise * 2.0**_LEVELS / steps[-1]

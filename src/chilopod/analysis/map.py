@@ -33,12 +33,7 @@ from chilopod.output import write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 
-VERSION = 1
-"""Version of the file of growth rates, increased whenever their meaning or computation changes."""
-
-POINTS = 129
-"""Default number of values along an axis."""
-
+_VERSION = 1  # of the file of growth rates, increased whenever their meaning or computation changes
 _ALSO = ("folds", "radius")
 _MOST_POINTS = 4097
 _LONG = 600.0  # s: a map that takes longer is announced
@@ -53,7 +48,7 @@ def map(
     x: Given,
     y: Given,
     *,
-    points: int = POINTS,
+    points: int = 129,
     also: Collection[str] = (),
     kept: str | Path | None = None,
     replace: bool = False,
@@ -193,7 +188,7 @@ def _radii(grid: Grid, bending: Onset | None, progress: Progress) -> tuple[Array
 
 def _key(plane: Plane) -> str:
     axes = [(axis.path, axis.low, axis.high) for axis in (plane.x, plane.y)]
-    return hashlib.sha256(repr((VERSION, plane.robot.to_toml(), axes)).encode()).hexdigest()
+    return hashlib.sha256(repr((_VERSION, plane.robot.to_toml(), axes)).encode()).hexdigest()
 
 
 def _keep(grid: Grid, file: Path) -> None:

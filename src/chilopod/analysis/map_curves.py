@@ -54,15 +54,13 @@ class MapCurve(ReadOnlyArrays):
 
     Attributes
     ----------
-    kind
-        Kind of the bifurcation.
+    kind, special
+        Kind of the bifurcation, and points of codimension two on the curve.
     values, error_bound
         Values of both numbers in SI units, and bounds on their errors, shape (points, 2).
     coefficient
         Cubic coefficient of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
         supercritical, NaN where it is not known, shape (points,).
-    special
-        Points of codimension two on it.
     line
         True if the points follow each other on a curve, False if each belongs to a number of modules.
     """
@@ -239,11 +237,11 @@ class Search:
                 # Both starts are mirror images of one curve.
                 self._add(follow2(loose, switch2(family, turn, between)[0], **few), edge)
             leading = [each for each in curve.points if np.abs(each.multipliers).max() < _ON_CIRCLE]
-            hard = [each for each in leading if (each.coefficient or 0.0) > 0.0]
-            if curve.kind is Kind.PITCHFORK and hard and not turns:
-                at = hard[len(hard) // 2]
-                p, q = at.values.tolist()
-                for fold in self._fold(edge, at, p, q, len(hard)):
+            subcritical = [each for each in leading if (each.coefficient or 0.0) > 0.0]
+            if curve.kind is Kind.PITCHFORK and subcritical and not turns:
+                middle = subcritical[len(subcritical) // 2]
+                p, q = middle.values.tolist()
+                for fold in self._fold(edge, middle, p, q, len(subcritical)):
                     self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
             self.lost += [0] * self.with_folds

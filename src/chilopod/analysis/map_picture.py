@@ -1,4 +1,7 @@
-"""Picture of a map: what becomes of a disturbance in colours, growth rates or frequencies, and the curves over it."""
+"""Picture of a map: what becomes of a disturbance in colours, growth rates or frequencies, and the curves over it.
+
+:func:`draw` makes the picture without a legend; :func:`keys` has the entries of one, so that pictures can share it.
+"""
 
 from __future__ import annotations
 
@@ -131,8 +134,8 @@ def _curve(axes: Axes, found: Any, curve: MapCurve) -> None:
     if not curve.line:
         axes.plot(x, y, "o", color=color, label=label)
         return
-    hard = np.nan_to_num(curve.coefficient, nan=-1.0) > 0.0
-    for style, chosen, name in (("-", ~hard, label), ("--", hard, f"{label}, subcritical")):
+    subcritical = np.nan_to_num(curve.coefficient, nan=-1.0) > 0.0
+    for style, chosen, name in (("-", ~subcritical, label), ("--", subcritical, f"{label}, subcritical")):
         if curve.kind is Kind.FOLD:
             style, name = ":", "fold of curved walks"
         # A piece between two points belongs to the side of its first one; at a turning point both sides meet.

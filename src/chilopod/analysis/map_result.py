@@ -1,4 +1,4 @@
-"""Result of a map of the straight walk over two numbers of a robot."""
+"""Result of a map of the straight walk over two numbers of a robot: a grid of growth rates, and curves."""
 
 from __future__ import annotations
 
@@ -45,10 +45,9 @@ class StabilityMap(Summary, ReadOnlyArrays):
         True where they were computed, shape (rows, columns).
     radius
         Radius of the curved walks, m, shape (rows, columns), NaN where there is none or it was not computed.
-    curves
-        Curves of bifurcations.
-    remarks, folds_lost
-        Sentences about what may be missing, and why robots are invalid; True if folds were searched in vain.
+    curves, remarks, folds_lost
+        Curves of bifurcations; sentences about what may be missing, and why robots are invalid; True if folds were
+        searched in vain.
     """
 
     robot: Robot
@@ -89,9 +88,9 @@ class StabilityMap(Summary, ReadOnlyArrays):
         axes = self.x_values, self.y_values
         for axis, rows in ((0, found), (1, found.T)):
             for row, value in zip(rows, axes[1 - axis].tolist(), strict=True):
-                folds, hard = (_crossed(self.curves, kind, axis, value) for kind in (Kind.FOLD, Kind.PITCHFORK))
-                for fold in folds if hard.size else ():
-                    low, high = np.sort([fold, hard[np.abs(hard - fold).argmin()]])
+                folds, forks = (_crossed(self.curves, kind, axis, value) for kind in (Kind.FOLD, Kind.PITCHFORK))
+                for fold in folds if forks.size else ():
+                    low, high = np.sort([fold, forks[np.abs(forks - fold).argmin()]])
                     row |= (axes[axis] >= low) & (axes[axis] <= high)
         return read_only(found & straight)
 

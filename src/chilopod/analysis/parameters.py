@@ -24,10 +24,6 @@ def stiffness(value: float) -> float:
     return units.parse(f"{float(value)!r} {PAPER_UNIT}", "N*m/rad")
 
 
-SEARCHED = (0.04, 1.6)
-"""Interval in which a critical spring is searched by default, in units of :func:`spring_scale`."""
-
-
 def spring_scale(robot: Robot) -> float:
     """Scale of a robot's springs, friction x speed x duty factor x module length, N*m/rad.
 
@@ -40,9 +36,9 @@ def spring_scale(robot: Robot) -> float:
 
 
 def searched_springs(robot: Robot) -> tuple[float, float]:
-    """Interval of :data:`SEARCHED`, N*m/rad."""
+    """Interval in which a critical spring is searched by default, N*m/rad: 0.04 to 1.6 of :func:`spring_scale`."""
     scale = spring_scale(robot)
-    return SEARCHED[0] * scale, SEARCHED[1] * scale
+    return 0.04 * scale, 1.6 * scale
 
 
 def numbers_read(robot: Robot) -> tuple[str, ...]:

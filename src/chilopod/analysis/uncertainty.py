@@ -31,12 +31,7 @@ from chilopod.robot import Robot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LEVEL = 0.95
-"""Level of the intervals of shares."""
-
-SPREAD = 0.9
-"""Level of the interval of the onset."""
-
+_LEVEL, _SPREAD = 0.95, 0.9  # levels of the intervals of shares, and of that of the onset
 _RESAMPLED = 1000
 _FEWEST, _MOST = 16, 65536  # samples from which shares are estimated, and that take hours
 _SHOWN = 64  # samples from one sign of progress to the next
@@ -58,7 +53,7 @@ def sobol_shares(f_a: Array, f_b: Array, f_ab: Array, rng: np.random.Generator) 
     """Sobol's shares from values of a function at samples A, B, and A with one column from B, shapes (samples,),
     (samples,) and (numbers, samples); NaN for failed samples."""
     found = np.full((6, len(f_ab)), np.nan)
-    ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
+    ends = [0.5 - 0.5 * _LEVEL, 0.5 + 0.5 * _LEVEL]
     for i, mixed in enumerate(f_ab):
         known = np.isfinite(f_a) & np.isfinite(f_b) & np.isfinite(mixed)
         count = int(known.sum())
@@ -114,7 +109,7 @@ class Uncertainty(Summary, ReadOnlyArrays):
         """Ends of the central 90 % of the samples, SI; NaN without samples."""
         if not self._known.size:
             return math.nan, math.nan
-        low, high = np.quantile(self._known, [0.5 - 0.5 * SPREAD, 0.5 + 0.5 * SPREAD]).tolist()
+        low, high = np.quantile(self._known, [0.5 - 0.5 * _SPREAD, 0.5 + 0.5 * _SPREAD]).tolist()
         return low, high
 
     @property
