@@ -79,10 +79,9 @@ class RobotComparison(Summary):
         robots, quantities = (self.first, self.second), {}
         for name, found in self.effects.items():
             parts = {"alone": found.alone, "last": found.last, "mean": found.mean, "error": found.error}
-            effects = {
-                path: {key: finite(values[at]) for key, values in parts.items()} for at, path in enumerate(self.paths)
-            }
-            quantities[name] = {"values_si": [finite(found.first), finite(found.second)], "effects_si": effects}
+            values = [finite(found.first), finite(found.second)]
+            effects = {path: {key: finite(x[at]) for key, x in parts.items()} for at, path in enumerate(self.paths)}
+            quantities[name] = {"values_si": values, "effects_si": effects}
         return {
             "robots": [robot.name for robot in robots],
             "parameter": self.onset.parameter,

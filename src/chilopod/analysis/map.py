@@ -1,5 +1,4 @@
-"""Maps of the straight walk over two numbers of a robot: where it holds, where it bends or undulates, and the curves
-between.
+"""Maps of the straight walk over two numbers of a robot: where it holds, bends or undulates, and the curves between.
 
 :func:`map` reads both axes into a plane of robots (:mod:`chilopod.analysis.map_axes`). It fills an adaptive grid of
 growth rates (:mod:`chilopod.analysis.map_grid`), which a file may keep, and searches the curves between its nodes
@@ -131,8 +130,7 @@ def _invalid(grid: Grid) -> list[str]:
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
-    """Say how long a map will take, if that is long, from the time of its corners; refuse one of many hours if its
-    growth rates are not kept."""
+    """Say how long a long map will take, from the time of its corners; refuse hours whose growth rates are not kept."""
     corners = grid.robots(grid.x[[0, -1]].tolist(), grid.y[[-1, 0]].tolist())
     robots = [robot for robot in corners if isinstance(robot, Robot)]
     growth_rates([grid.plane.robot.with_value("body.modules", 2)], 1)  # compiles
@@ -163,9 +161,8 @@ def _bending(plane: Plane) -> Onset:
 
 
 def _radii(grid: Grid, bending: Onset | None, progress: Progress) -> tuple[Array, list[str]]:
-    """Radius of the curved walk that leaves the straight one, m, shape (rows, columns): NaN if none is wanted, off a
-    coarse lattice, where the robot does not bend, and where no curved walk is found, with a sentence on how many these
-    are."""
+    """Radius of the curved walk that leaves the straight one, m, shape (rows, columns), with a sentence on how many are
+    not found. NaN for these, off a coarse lattice, where the robot does not bend, and everywhere if none is wanted."""
     bends = grid.values[FATE] == FATES.index(Fate.BENDS)
     found = np.full(bends.shape, np.nan)
     if bending is None:

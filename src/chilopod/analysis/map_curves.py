@@ -131,8 +131,7 @@ class Search:
         return found
 
     def _points(self) -> None:
-        """Points at every number of modules, one set for each kind, with the folds of the curved walks that begin
-        there."""
+        """Points at every number of modules, one set for each kind, with the folds that begin there."""
         by_kind: dict[Kind, list[tuple[Array, Array, float]]] = {}
         for edge in self._edges():
             if edge.across is not self.plane.y.whole:  # along it the number of modules changes
@@ -196,8 +195,7 @@ class Search:
             return []
 
     def _fold(self, edge: Edge, at: BifurcationPoint | Point2, p: float, q: float, n: int) -> list[BifurcationPoint]:
-        """Fold of the curved walks that leave one of n subcritical pitchforks, as the number along an edge changes, if
-        it is found on the map."""
+        """Fold, if it is on the map, of the curved walks that leave one of n subcritical pitchforks along an edge."""
 
         def family(value: float) -> PlanarModel:
             return FollowedModel(self.plane.at(*edge.ordered(value, q)), TOLERANCE)

@@ -83,8 +83,7 @@ def keys(found: Any, axes: Axes) -> list[Any]:
 
 
 def _field(axes: Axes, x: Array, y: Array, found: Any, show: str) -> None:
-    """Colours of growth rates, red where a disturbance grows, of the frequencies of oscillations or of radii; grey
-    elsewhere."""
+    """Colours of growth rates, red where a disturbance grows, of frequencies or of radii; grey where there is none."""
     from matplotlib.colors import LogNorm, TwoSlopeNorm
 
     axes.set_facecolor(_COLORS[Fate.INVALID])

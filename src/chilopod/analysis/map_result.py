@@ -39,15 +39,13 @@ class StabilityMap(Summary, ReadOnlyArrays):
         Values in SI units, shape (columns,) and (rows,).
     growth, frequency, error, unstable, fate
         Growth rate of the leading disturbance (1/s), its angular frequency (rad/s), and what becomes of it, as of
-        :class:`chilopod.analysis.growth.Growth`, shape (rows, columns). Within cells whose corners agree, growth and
-        frequency are interpolated.
+        :class:`chilopod.analysis.growth.Growth`, shape (rows, columns).
     computed
-        True where they were computed, shape (rows, columns).
+        True where they were computed, shape (rows, columns); elsewhere growth and frequency are interpolated.
     radius
         Radius of the curved walks, m, shape (rows, columns), NaN where there is none or it was not computed.
     curves, remarks, folds_lost
-        Curves of bifurcations; sentences about what may be missing, and why robots are invalid; True if folds were
-        searched in vain.
+        Curves of bifurcations; sentences about what may be missing or is invalid; True if folds were sought in vain.
     """
 
     robot: Robot

@@ -134,9 +134,7 @@ class Onset:
                 break
             if abs(step) <= _SETTLED * abs(k):
                 low, high = self.interval(robot)
-                if low <= k <= high:
-                    return float(k)
-                break
+                return float(k) if low <= k <= high else self.first(robot).point.value
             growth = leading_mode(robot.with_value(self.parameter, k)).growth
         return self.first(robot).point.value
 
@@ -226,8 +224,7 @@ class Measured:
         return (more - less) / (0.02 * value)
 
     def work(self, robot: Robot) -> float:
-        """Work of an actuator that stiffens the spring of the curved walk, at its mean angles, to the onset, J; 0 if
-        the straight walk is stable."""
+        """Work of an actuator that stiffens the curved walk's spring to the onset, at mean angles, J; 0 if straight."""
         if not self.number.parameter.startswith(ALL):
             raise AnalysisError("must be a spring that bends the robot", field="work", value=self.number.parameter)
         if self.growth(robot) <= 0.0:

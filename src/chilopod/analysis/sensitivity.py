@@ -47,8 +47,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
     paths, numbers
         Paths of the numbers, and their values, SI, shape (numbers,).
     quantities, values
-        Names of the quantities, of :data:`chilopod.analysis.quantities.QUANTITIES`, and their values, SI, shape
-        (quantities,).
+        Some of :data:`chilopod.analysis.quantities.QUANTITIES`, and their values, SI, shape (quantities,).
     derivatives, errors
         Derivatives and estimates of their errors, SI, shape (quantities, numbers); NaN where neighbouring robots lack
         the quantity.
@@ -216,8 +215,7 @@ class _Leading:
         self.slope = cache(self._slope)
 
     def _slope(self, path: str, symmetric: bool) -> tuple[complex, float]:
-        """Derivative of the exponent of the leading mode by a number, and its error, by the return map of half a period
-        or of a whole one."""
+        """Derivative of the exponent of the leading mode by a number, and its error; see :func:`leading_mode`."""
         mode: Mode = self.mode(symmetric)
         own = self._robot.get(path)
 

@@ -144,12 +144,10 @@ class Uncertainty(Summary, ReadOnlyArrays):
     def title(self) -> str:
         """Onset with its spread."""
         unit = self.robot.unit_of(self.onset.parameter)
-        value, deviation, propagated, *ends = (
-            f"{units.from_si(each, unit):.4g}" for each in (self.value, self.deviation, self.propagated, *self.interval)
-        )
-        spread = f"standard deviation {deviation} (to first order {propagated}), 90 % between {ends[0]} and {ends[1]}"
-        known = np.isfinite(self.sampled).any()
-        return f"{self.robot.name}: onset {value} {unit}, {spread if known else 'no sample has one'}"
+        numbers = self.value, self.deviation, self.propagated, *self.interval
+        value, deviation, propagated, low, high = (f"{units.from_si(each, unit):.4g}" for each in numbers)
+        spread = f"standard deviation {deviation} (to first order {propagated}), 90 % between {low} and {high}"
+        return f"{self.robot.name}: onset {value} {unit}, {spread if self._known.size else 'no sample has one'}"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         cells: list[Sequence[str]] = [("number", "within ±", "share alone", "with others")]

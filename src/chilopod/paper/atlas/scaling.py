@@ -85,8 +85,7 @@ def critical(robot: Robot) -> float:
 
 
 def predicted(robot: Robot, curves: xr.Dataset) -> float:
-    """Critical k1 by the law, in units of the scale, from the curve of the robot as built, see :func:`collapse`; NaN
-    where that ends."""
+    """Critical k1 by the law, in units of the scale: the curve as built of a :func:`collapse`; NaN beyond its ends."""
     rest = robot.springs.stiffness[1] / spring_scale(robot)
     return float(np.interp(rest, curves.rest, curves.curve.sel(robot=BUILT), left=np.nan, right=np.nan))
 

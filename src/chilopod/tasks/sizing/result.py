@@ -32,16 +32,13 @@ class Sizing(Summary, ReadOnlyArrays):
     robot, source
         The robot, with provenance that says what was computed and what was copied; name of that which it is made from.
     wishes, onset, values
-        Wishes, the number that bends the robot, and the values of the wished quantities, SI, shape (wishes,); NaN
-        without one.
+        Wishes, the number that bends the robot, and the wished quantities, SI, shape (wishes,), NaN without one.
     free, numbers, bound
-        Free numbers with their ranges, their values, SI, shape (numbers,), and the bound on the error of a root, NaN
-        for more than one number.
+        Ranges of the free numbers, their values, SI, shape (numbers,), and the bound on the error of a root, or NaN.
     outcome, reasons
         Outcome, and sentences about what stands in the way.
     front
-        Points of the Pareto front of two conflicting wishes: free numbers and then quantities, SI, shape (points,
-        numbers + wishes).
+        Pareto front of two conflicting wishes: free numbers, then quantities, SI, shape (points, numbers + wishes).
     walks
         Ends of a walk by the name of the engine, see :func:`chilopod.tasks.radius_law.end_of_walk`.
     evaluations

@@ -90,8 +90,7 @@ class Wish:
             return FAILED
 
     def missed(self, searched: float) -> float:
-        """Size of the deviation that :meth:`searched` measures; infinite for the radius of a robot that walks
-        straight."""
+        """Size of the deviation that :meth:`searched` measures; infinite for a radius if the robot walks straight."""
         if self.quantity != "radius":
             return abs(searched)
         return abs(1.0 / np.sqrt(1.0 - searched) - 1.0) if searched < 1.0 else np.inf
