@@ -108,6 +108,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
         rows = [row for row, sure in enumerate(known) if sure.any()]  # no frequency of a bend
         heads = [f"{name} ({f'{_changed(name)} per %'.strip()})" for name in (self.quantities[row] for row in rows)]
         cells: list[Sequence[str]] = [("number", "value", *heads)]
+        percents = {row: self._percent(row) for row in rows}
         below, without, lacks = [], [], []
         largest = np.abs(np.nan_to_num(self.derivatives[rows[:1]]) * self.numbers).sum(axis=0)
         for at in np.argsort(-largest, kind="stable").tolist():
@@ -118,7 +119,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
             elif self.numbers[at] == 0.0:
                 below += [f"{path} is 0: {self._slope_in_words(row, at)}" for row in rows if known[row, at]]
             else:
-                texts = {row: f"{self._percent(row)[at]:+.4g}" if known[row, at] else "0" for row in rows}
+                texts = {row: f"{percents[row][at]:+.4g}" if known[row, at] else "0" for row in rows}
                 changes = ("" if missing[row, at] else text for row, text in texts.items())
                 cells.append((path, units.format(self.robot.get(path), unit, digits=5), *changes))
         below += [f"no effect to first order: {', '.join(without)}"] * bool(without)
