@@ -78,14 +78,10 @@ class RobotComparison(Summary):
         """Differences and effects as plain numbers, SI; null where a robot has no such quantity."""
         robots, quantities = (self.first, self.second), {}
         for name, found in self.effects.items():
-            rows = zip(self.paths, np.array([found.alone, found.last, found.mean, found.error]).T.tolist(), strict=True)
-            quantities[name] = {
-                "values_si": [finite(found.first), finite(found.second)],
-                "effects_si": {
-                    path: dict(zip(("alone", "last", "mean", "error"), map(finite, row), strict=True))
-                    for path, row in rows
-                },
-            }
+            parts = {"alone": found.alone, "last": found.last, "mean": found.mean, "error": found.error}
+            values = [finite(found.first), finite(found.second)]
+            effects = {path: {key: finite(x[at]) for key, x in parts.items()} for at, path in enumerate(self.paths)}
+            quantities[name] = {"values_si": values, "effects_si": effects}
         return {
             "robots": [robot.name for robot in robots],
             "parameter": self.onset.parameter,
@@ -106,14 +102,14 @@ class RobotComparison(Summary):
         tail = [f"no effect on planar walks: {', '.join(self.others)}"] * bool(self.others)
         if not self.paths:
             return [], [], ["no number that the planar model reads differs", *tail]
-        named = {name: unit_of(name, self.first, self.onset) for name in self.effects}
-        heads = [f"{name} ({unit})".removesuffix(" ()") for name, unit in named.items()]
+        shown = {name: unit_of(name, self.first, self.onset) for name in self.effects}
+        heads = [f"{name} ({unit})".removesuffix(" ()") for name, unit in shown.items()]
         cells: list[Sequence[str]] = [("number", self.first.name, self.second.name, *heads)]
         first = next(iter(self.effects.values()))
         for at in np.argsort(-np.abs(np.nan_to_num(first.mean))).tolist():
             row = [self.paths[at], *(_text(robot, self.paths[at]) for robot in (self.first, self.second))]
             for name, found in self.effects.items():
-                mean, error = (units.from_si(float(x[at]), named[name]) for x in (found.mean, found.error))
+                mean, error = (units.from_si(float(x[at]), shown[name]) for x in (found.mean, found.error))
                 scatter = f" ± {error:.1g}" if error > 0.0 else ""
                 none = abs(found.mean[at]) <= _EXACT * max(abs(found.first), abs(found.second))
                 row.append(("0" if none else f"{mean:+.4g}{scatter}") if math.isfinite(mean) else "unknown")
@@ -206,9 +202,7 @@ def _number(robot: Robot, path: str) -> float | None:
 
 def _comparable(first: Robot, second: Robot) -> tuple[Robot, Robot]:
     """The robots, both with a yaw inertia of their own and without a twin if only one has either."""
-    if [each.twin is None for each in (first, second)].count(True) != 1 and (
-        (first.body.yaw_inertia is None) == (second.body.yaw_inertia is None)
-    ):
+    if len({(robot.twin is None, robot.body.yaw_inertia is None) for robot in (first, second)}) == 1:
         return first, second
 
     def plain(robot: Robot) -> Robot:
@@ -232,9 +226,9 @@ def _effects(
     rng: np.random.Generator,
     show: Progress,
 ) -> Effects:
+    """Effects of the numbers on a function of a robot; robots in between are computed once."""
     count, known = len(paths), dict[frozenset[int], float]()
-    most = min(2**count, _ORDERS * count) if count else 1
-    exact = most == 2**count
+    most = min(2**count, max(1, _ORDERS * count))
 
     def value(changed: frozenset[int]) -> float:
         """The quantity of the first robot with some numbers of the second; NaN where it has none."""
@@ -254,19 +248,19 @@ def _effects(
     ends = value(frozenset()), value(whole)
     alone = [value(frozenset([at])) - ends[0] for at in whole]
     last = [ends[1] - value(whole - {at}) for at in whole]
-    if exact:
-        means = np.zeros(count)
+    means, scatter = np.zeros(count), np.zeros(count)
+    if most == 2**count:
         for size in range(count):
             weight = 1.0 / (count * math.comb(count - 1, size))  # part of the orders in which these come first
             for earlier in map(frozenset, itertools.combinations(range(count), size)):
                 for at in whole - earlier:
                     means[at] += weight * (value(earlier | {at}) - value(earlier))
-        return Effects(*ends, np.array(alone), np.array(last), means, np.zeros(count))
-    parts = np.zeros((_ORDERS, count))
-    for row in parts:
-        so_far = frozenset[int]()
-        for at in rng.permutation(count).tolist():
-            row[at] = value(so_far | {at}) - value(so_far)
-            so_far |= {at}
-    scatter = parts.std(axis=0, ddof=1) / math.sqrt(_ORDERS)
-    return Effects(*ends, np.array(alone), np.array(last), parts.mean(axis=0), scatter)
+    else:
+        parts = np.zeros((_ORDERS, count))
+        for row in parts:
+            so_far = frozenset[int]()
+            for at in rng.permutation(count).tolist():
+                row[at] = value(so_far | {at}) - value(so_far)
+                so_far |= {at}
+        means, scatter = parts.mean(axis=0), parts.std(axis=0, ddof=1) / math.sqrt(_ORDERS)
+    return Effects(*ends, np.array(alone), np.array(last), means, scatter)

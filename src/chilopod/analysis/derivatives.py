@@ -14,13 +14,12 @@ import numpy as np
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Array
 
-LEVELS = 4
-"""Number of steps on each side."""
-
-_STEP = 1e-3  # largest step, relative to the size of the argument
-_SAFETY = 4.0  # factor on the last change of the extrapolation: switches within the steps slow its convergence
 ROUND_OFF = 8.0 * 2.0**-52
 """Error of a value, relative to the values."""
+
+_LEVELS = 4  # steps on each side
+_STEP = 1e-3  # largest step, relative to the size of the argument
+_SAFETY = 4.0  # factor on the last change of the extrapolation: switches within the steps slow its convergence
 
 
 def derivative(
@@ -32,26 +31,22 @@ def derivative(
     function raises a ParameterError on one side, as at the end of a range, the derivative is that towards the other
     side. AnalysisError if it cannot be evaluated on both sides.
     """
-    steps = _STEP * size * 0.5 ** np.arange(LEVELS)
+    steps = _STEP * size * 0.5 ** np.arange(_LEVELS)
     here = np.asarray(function(at), dtype=np.float64)
-    found: list[Array] = []
-    for side in (1.0, -1.0):
+    sides: list[Array] = []
+    for sign in (1.0, -1.0):
         try:
-            found.append(np.array([function(at + side * step) for step in steps.tolist()], dtype=np.float64))
+            sides.append(np.array([function(at + sign * step) for step in steps.tolist()], dtype=np.float64))
         except ParameterError:
-            found.append(np.empty(0))
+            sides.append(np.empty(0))
         except ChilopodError as failure:
             raise AnalysisError(f"has no derivative at {at:.6g}: {failure}", field="robot") from None
-    above, below = found
-    if not (above.size or below.size):
+    known = [values for values in sides if values.size]
+    if not known:
         raise AnalysisError(f"has no derivative at {at:.6g}: neighbouring values are out of range", field="robot")
-    widths = steps.reshape(-1, *[1] * here.ndim)
-    noise = round_off * np.maximum(np.abs(here), max(float(np.abs(each).max()) for each in found if each.size))
-    noise = noise * 2.0**LEVELS / steps[-1]
-    if above.size and below.size:
-        slopes = (above - below) / (2.0 * widths)
-    else:
-        slopes = (above - here) / widths if above.size else (here - below) / widths
-    for power in range(1, LEVELS):
+    above, below = (values if values.size else here for values in sides)
+    slopes = (above - below) / (len(known) * steps.reshape(-1, *[1] * here.ndim))
+    for power in range(1, _LEVELS):
         before, slopes = slopes, (2.0**power * slopes[1:] - slopes[:-1]) / (2.0**power - 1.0)
-    return slopes[0], _SAFETY * np.abs(slopes[0] - before[-1]) + noise
+    noise = round_off * np.maximum(np.abs(here), max(float(np.abs(values).max()) for values in known))
+    return slopes[0], _SAFETY * np.abs(slopes[0] - before[-1]) + noise * 2.0**_LEVELS / steps[-1]

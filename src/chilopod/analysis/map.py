@@ -1,12 +1,17 @@
-"""Maps of the straight walk over two numbers of a robot: where it holds, where it bends or undulates, and the curves
-between."""
+"""Maps of the straight walk over two numbers of a robot: where it holds, bends or undulates, and the curves between.
+
+:func:`map` reads both axes into a plane of robots (:mod:`chilopod.analysis.map_axes`). It fills an adaptive grid of
+growth rates (:mod:`chilopod.analysis.map_grid`), which a file may keep, and searches the curves between its nodes
+(:mod:`chilopod.analysis.map_curves`). The grid is refined along the curves, until no further one is found. Radii of the
+curved walks come last. The result is a :class:`chilopod.analysis.map_result.StabilityMap`.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,7 +21,7 @@ import xarray as xr
 from chilopod.analysis.growth import FATES, Fate, growth_rates
 from chilopod.analysis.map_axes import DERIVED, Given, Plane
 from chilopod.analysis.map_curves import Search
-from chilopod.analysis.map_grid import ERROR, FATE, FREQUENCY, GROWTH, UNSTABLE, Grid
+from chilopod.analysis.map_grid import FATE, Grid
 from chilopod.analysis.map_result import StabilityMap
 from chilopod.analysis.parameters import ALL
 from chilopod.analysis.quantities import Measured, Onset
@@ -27,12 +32,7 @@ from chilopod.output import write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 
-VERSION = 1
-"""Version of the file of growth rates, increased whenever their meaning or computation changes."""
-
-POINTS = 129
-"""Default number of values along an axis."""
-
+_VERSION = 1  # of the file of growth rates, increased whenever their meaning or computation changes
 _ALSO = ("folds", "radius")
 _MOST_POINTS = 4097
 _LONG = 600.0  # s: a map that takes longer is announced
@@ -47,7 +47,7 @@ def map(
     x: Given,
     y: Given,
     *,
-    points: int = POINTS,
+    points: int = 129,
     also: Collection[str] = (),
     kept: str | Path | None = None,
     replace: bool = False,
@@ -96,33 +96,28 @@ def map(
         known_names(also, _ALSO, "also", "must be a part of maps")
     bending = _bending(plane) if "radius" in also else None
     file = None if kept is None else Path(kept)
-    grid = Grid(plane, points, keep=(lambda grid: _keep(grid, file)) if file else (lambda grid: None))
-    if file is not None:
+    grid = Grid(plane, points, keep=lambda grid: _keep(grid, file) if file else None)
+    if file:
         _take(grid, file, replace)
     _announce(grid, remark, points, file is not None)
     wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
     grid.refine(wanted, part(progress, 0.0, 0.5))
-    search = Search(plane, grid, "folds" in also, part(progress, 0.5, 1.0))
+    rest = part(progress, 0.5, 1.0)
+    search = Search(plane, grid, "folds" in also, rest)
     search.run()
     while (search.cells() & ~wanted).any():
         wanted |= search.cells()
-        grid.refine(wanted, part(progress, 0.5, 1.0))
+        grid.refine(wanted, rest)
         search.run()
-    bent: Array = np.full(grid.computed.shape, np.nan)
-    lost: list[str] = []
-    if bending is not None:
-        bent, lost = _radii(grid, bending, part(progress, 0.5, 1.0))
+    radius, lost = _radii(grid, bending, rest)
     if sum(search.lost):
         lost.append(f"the pitchfork is subcritical at {sum(search.lost)} points, but its folds were not found")
-    return _result(grid, search, bent, [*dict.fromkeys(search.remarks), *_invalid(grid), *lost])
-
-
-def _result(grid: Grid, search: Search, radius: Array, remarks: Sequence[str]) -> StabilityMap:
-    plane, values = grid.plane, grid.values
-    whole = values[UNSTABLE].astype(np.int16), values[FATE].astype(np.int8)
-    columns = plane.x, plane.y, grid.x, grid.y, values[GROWTH], values[FREQUENCY], values[ERROR]
-    curves, lost = tuple(search.curves), bool(search.lost)
-    return StabilityMap(plane.robot, *columns, *whole, grid.computed, radius, curves, tuple(remarks), lost)
+    growth, frequency, error, unstable, fate = grid.values
+    return StabilityMap(
+        robot, plane.x, plane.y, grid.x, grid.y, growth, frequency, error, unstable.astype(np.int16),
+        fate.astype(np.int8), grid.computed, radius, curves=tuple(search.curves),
+        remarks=(*dict.fromkeys(search.remarks), *_invalid(grid), *lost), folds_lost=bool(search.lost),
+    )  # fmt: skip
 
 
 def _invalid(grid: Grid) -> list[str]:
@@ -135,8 +130,7 @@ def _invalid(grid: Grid) -> list[str]:
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
-    """Say how long a map will take, if that is long, from the time of its corners; refuse one of many hours if its
-    growth rates are not kept."""
+    """Say how long a long map will take, from the time of its corners; refuse hours whose growth rates are not kept."""
     corners = grid.robots(grid.x[[0, -1]].tolist(), grid.y[[-1, 0]].tolist())
     robots = [robot for robot in corners if isinstance(robot, Robot)]
     growth_rates([grid.plane.robot.with_value("body.modules", 2)], 1)  # compiles
@@ -157,24 +151,23 @@ def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool
         remark(f"the map takes about {said}: {each:.2g} s a growth rate; fewer points or modules take less")
 
 
-# -- radii of the curved walks
-# -------------------------------------------------------------------------------------------------------------------
-
-
 def _bending(plane: Plane) -> Onset:
     """Number of an axis along which a robot bends; ParameterError if there is none."""
     for axis in (plane.x, plane.y):
         if axis.path not in DERIVED and not axis.whole:
             return Onset(axis.path, None if axis.path.startswith(ALL) else (axis.low, axis.high))
-    said, allowed = "must be left out of this map", "maps with a number of the robot on an axis"
-    raise ParameterError(said, field="radius", allowed=allowed)
+    allowed = "maps with a number of the robot on an axis"
+    raise ParameterError("must be left out of this map", field="radius", allowed=allowed)
 
 
-def _radii(grid: Grid, bending: Onset, progress: Progress) -> tuple[Array, list[str]]:
-    """Radius of the curved walk that leaves the straight one, m, shape (rows, columns): NaN off a coarse lattice, where
-    the robot does not bend, and where no curved walk is found, with a sentence on how many these are."""
+def _radii(grid: Grid, bending: Onset | None, progress: Progress) -> tuple[Array, list[str]]:
+    """Radius of the curved walk that leaves the straight one, m, shape (rows, columns), with a sentence on how many are
+    not found. NaN for these, off a coarse lattice, where the robot does not bend, and everywhere if none is wanted."""
     bends = grid.values[FATE] == FATES.index(Fate.BENDS)
-    found, measured = np.full(bends.shape, np.nan), Measured(bending)
+    found = np.full(bends.shape, np.nan)
+    if bending is None:
+        return found, []
+    measured = Measured(bending)
     rows, columns = (np.unique(np.linspace(0, size - 1, min(size, _LATTICE)).astype(int)) for size in bends.shape)
     nodes = []
     for j in rows.tolist():
@@ -190,25 +183,16 @@ def _radii(grid: Grid, bending: Onset, progress: Progress) -> tuple[Array, list[
     return found, [f"{lost} of {len(nodes)} radii are not found"] if lost else []
 
 
-# -- growth rates that are kept
-# -------------------------------------------------------------------------------------------------------------------
-
-
 def _key(plane: Plane) -> str:
     axes = [(axis.path, axis.low, axis.high) for axis in (plane.x, plane.y)]
-    said = repr((VERSION, plane.robot.to_toml(), axes))
-    return hashlib.sha256(said.encode()).hexdigest()
+    return hashlib.sha256(repr((_VERSION, plane.robot.to_toml(), axes)).encode()).hexdigest()
 
 
 def _keep(grid: Grid, file: Path) -> None:
     rows, columns = np.nonzero(grid.computed)
-    found = {"x": grid.x[columns], "y": grid.y[rows]}
-    data = xr.Dataset(
-        {name: ("node", each) for name, each in found.items()}
-        | {"values": (("row", "node"), grid.values[:, rows, columns])}
-    )
-    data.attrs["key"] = _key(grid.plane)
-    write_atomic(file, sealed(netcdf(data)))
+    nodes = {"x": ("node", grid.x[columns]), "y": ("node", grid.y[rows])}
+    values = {"values": (("row", "node"), grid.values[:, rows, columns])}
+    write_atomic(file, sealed(netcdf(xr.Dataset(nodes | values, attrs={"key": _key(grid.plane)}))))
 
 
 def _take(grid: Grid, file: Path, replace: bool) -> None:
@@ -223,11 +207,10 @@ def _take(grid: Grid, file: Path, replace: bool) -> None:
         if replace:
             return
         raise OutputError(f"{error} (--force replaces it)", source=str(file)) from None
-    at = [
-        np.searchsorted(axis, data[name].values).clip(max=axis.size - 1)
-        for axis, name in ((grid.x, "x"), (grid.y, "y"))
-    ]
-    same = (grid.x[at[0]] == data.x.values) & (grid.y[at[1]] == data.y.values)
-    columns, rows = (each[same] for each in at)
+    # The grid of the file has the same ends, but may have other nodes between them.
+    x, y = data.x.values, data.y.values
+    columns, rows = np.searchsorted(grid.x, x), np.searchsorted(grid.y, y)
+    same = (grid.x[columns] == x) & (grid.y[rows] == y)
+    columns, rows = columns[same], rows[same]
     grid.values[:, rows, columns] = data["values"].values[:, same]
     grid.computed[rows, columns] = True

@@ -1,4 +1,9 @@
-"""Axes of maps: numbers of a robot, groups of them, and derived quantities, and the robots over two of them."""
+"""Axes of maps, and the robots over two of them.
+
+An :class:`Axis` is a number of a robot, a group of springs, or a derived quantity (speed, modules) that changes several
+numbers. :func:`axis` reads one from a path and its range. A :class:`Plane` has two, and gives the robot, or its planar
+model, at a value of each.
+"""
 
 from __future__ import annotations
 
@@ -105,16 +110,15 @@ def axis(robot: Robot, given: Given, field: str) -> Axis:
         raise
     try:
         low, high = (units.parse(end, si) if isinstance(end, str) else float(end) for end in ends)
+        # Axes and files are in the unit in which the range was given.
+        found = Axis(path, low, high, units.unit_in(str(ends[1])) or unit, si)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ParameterError("must rise from a lower to a higher value", value=" ".join(map(str, ends)))
+        if found.whole and not (low.is_integer() and high.is_integer()):
+            raise ParameterError("must be whole numbers of modules", value=" ".join(map(str, ends)))
     except ChilopodError as error:
         error.field = f"{field} {path}"
         raise
-    # Axes and files are in the unit in which the range was given.
-    unit = (units.unit_in(ends[1]) if isinstance(ends[1], str) else "") or unit
-    found, shown = Axis(path, low, high, unit, si), " ".join(map(str, ends))
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ParameterError("must rise from a lower to a higher value", field=f"{field} {path}", value=shown)
-    if found.whole and not (low.is_integer() and high.is_integer()):
-        raise ParameterError("must be whole numbers of modules", field=f"{field} {path}", value=shown)
     return found
 
 

@@ -1,5 +1,10 @@
-"""Curves of bifurcations of the straight walk through a map: found where neighbours on its grid differ in the number of
-unstable multipliers, and continued from there."""
+"""Curves of bifurcations of the straight walk through a map.
+
+Neighbours on the grid that differ in the number of unstable multipliers are an :class:`Edge`. The :class:`Search` takes
+an edge that no curve crosses yet, locates the bifurcation on it, continues that as a curve through the plane, and goes
+on with the edges that are left. Where a pitchfork turns subcritical, the folds of the curved walks begin, which are
+continued too if they are wanted. Along an axis of modules, which are whole, every edge has a point of its own.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +35,7 @@ _FOLD_TOLERANCE = 1e-12  # of the flow; a fold is known to about its square root
 _FOLD_POINTS = 100
 _PIECES, _PIECE = 12, 5  # parts in which a branch is followed to its fold, and points of each
 _ON_CIRCLE = 1.0 + 1e-6  # modulus of a critical multiplier, at most
-_ENDS = Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS
+_CUT_OFF = {Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +54,13 @@ class MapCurve(ReadOnlyArrays):
 
     Attributes
     ----------
-    kind
-        Kind of the bifurcation.
+    kind, special
+        Kind of the bifurcation, and points of codimension two on the curve.
     values, error_bound
         Values of both numbers in SI units, and bounds on their errors, shape (points, 2).
     coefficient
         Cubic coefficient of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
         supercritical, NaN where it is not known, shape (points,).
-    special
-        Points of codimension two on it.
     line
         True if the points follow each other on a curve, False if each belongs to a number of modules.
     """
@@ -128,14 +131,20 @@ class Search:
         return found
 
     def _points(self) -> None:
-        """Points at every number of modules, one set for each kind."""
+        """Points at every number of modules, one set for each kind, with the folds that begin there."""
         by_kind: dict[Kind, list[tuple[Array, Array, float]]] = {}
         for edge in self._edges():
-            if edge.across is self.plane.y.whole:  # along the other axis the number of modules changes
-                for point in self._located(edge):
-                    place = np.array(edge.ordered(point.value, self._beside(edge)))
-                    error = np.array(edge.ordered(point.error_bound, 0.0))
-                    by_kind.setdefault(point.kind, []).append((place, error, self._coefficient(point, place)))
+            if edge.across is not self.plane.y.whole:  # along it the number of modules changes
+                continue
+            points, beside = self._located(edge, normal_form=True), self._beside(edge)
+            stable = 0 in self.grid.unstable[edge.j : edge.j + 2 - edge.across, edge.i : edge.i + 1 + edge.across]
+            for point in [*points] if self.with_folds and stable else ():
+                if point.kind is Kind.PITCHFORK and (point.coefficient or 0.0) > 0.0:
+                    points += self._fold(edge, point, point.value, beside, 1)
+            for point in points:
+                place = np.array(edge.ordered(point.value, beside))
+                error = np.array(edge.ordered(point.error_bound, 0.0))
+                by_kind.setdefault(point.kind, []).append((place, error, self._coefficient(point, place)))
         for kind, found in by_kind.items():
             values, errors, coefficients = (np.array(column) for column in zip(*found, strict=True))
             self.curves.append(MapCurve(kind, values, errors, coefficients, line=False))
@@ -153,13 +162,13 @@ class Search:
         """Edges that no curve crosses, and that are not beside one that was tried in vain."""
         lines = [self._indices(curve.values) for curve in self.curves if curve.kind is not Kind.FOLD]
         tried = np.array([(edge.i, edge.j) for edge in self._tried]).reshape(-1, 2)
-        found = []
-        for edge in edges:
+
+        def nearest(edge: Edge) -> float:
             middle = np.array([edge.i + 0.5 * edge.across, edge.j + 0.5 * (not edge.across)])
-            near = [_distance(line, middle) for line in lines] + np.abs(tried - middle).max(axis=1).tolist()
-            if min(near, default=np.inf) > _COVERED:
-                found.append(edge)
-        return found
+            apart = [_distance(line, middle) for line in lines] + np.abs(tried - middle).max(axis=1).tolist()
+            return min(apart, default=np.inf)
+
+        return [edge for edge in edges if nearest(edge) > _COVERED]
 
     def _indices(self, values: Array) -> Array:
         """Columns and rows, in fractions, of SI values of both numbers."""
@@ -171,29 +180,22 @@ class Search:
         """Value of the number that does not change along an edge, SI."""
         return float(self.grid.y[edge.j] if edge.across else self.grid.x[edge.i])
 
-    def _located(self, edge: Edge) -> list[BifurcationPoint]:
-        """Bifurcations on an edge; at a number of modules the folds of the curved walks that begin there, too."""
+    def _located(self, edge: Edge, normal_form: bool = False) -> list[BifurcationPoint]:
+        """Bifurcations on an edge."""
         values, first = (self.grid.x, edge.i) if edge.across else (self.grid.y, edge.j)
-        beside, whole = self._beside(edge), self.plane.x.whole or self.plane.y.whole
+        beside, ends = self._beside(edge), (float(values[first]), float(values[first + 1]))
 
         def family(value: float) -> PlanarModel:
             return self.plane.model(*edge.ordered(value, beside))
 
         try:
-            ends = float(values[first]), float(values[first + 1])
-            points = list(stability.locate(family, ends, normal_form=whole))
+            return list(stability.locate(family, ends, normal_form=normal_form))
         except ChilopodError as error:
             self.remarks.append(f"a bifurcation between two neighbours is not located: {error}")
             return []
-        gives_way = 0 in self.grid.unstable[edge.j : edge.j + 2 - edge.across, edge.i : edge.i + 1 + edge.across]
-        for point in [*points] if whole and self.with_folds and gives_way else ():
-            if point.kind is Kind.PITCHFORK and (point.coefficient or 0.0) > 0.0:
-                points += self._fold(edge, point, point.value, beside, 1)
-        return points
 
     def _fold(self, edge: Edge, at: BifurcationPoint | Point2, p: float, q: float, n: int) -> list[BifurcationPoint]:
-        """Fold of the curved walks that leave one of n subcritical pitchforks, as the number along an edge changes, if
-        it is found on the map."""
+        """Fold, if it is on the map, of the curved walks that leave one of n subcritical pitchforks along an edge."""
 
         def family(value: float) -> PlanarModel:
             return FollowedModel(self.plane.at(*edge.ordered(value, q)), TOLERANCE)
@@ -213,7 +215,8 @@ class Search:
     def _follow(self, point: BifurcationPoint, edge: Edge) -> None:
         """Continue a curve through a located point, and the folds that begin on it."""
         between = edge.ordered(*self._box())
-        how: dict[str, Any] = {"between": between, "longest": _LONGEST, "progress": self._told}
+        how: dict[str, Any] = {"between": between, "longest": _LONGEST}
+        how["progress"] = lambda count, point: self.progress(0.5, f"curve {len(self.curves) + 1}, {count} points")
         few: dict[str, Any] = {**how, "points": _FOLD_POINTS, "coefficients": False}
 
         def family(p: float, q: float) -> PlanarModel:
@@ -226,15 +229,17 @@ class Search:
             curve = follow2(family, point, second=self._beside(edge), points=400, **how)
             self._add(curve, edge)
             turns = [each for each in curve.special if each.kind is CodimensionTwo.DEGENERATE_PITCHFORK]
-            for turn in turns if self.with_folds else ():
+            if not self.with_folds:
+                return
+            for turn in turns:
                 # Both starts are mirror images of one curve.
                 self._add(follow2(loose, switch2(family, turn, between)[0], **few), edge)
             leading = [each for each in curve.points if np.abs(each.multipliers).max() < _ON_CIRCLE]
-            hard = [each for each in leading if (each.coefficient or 0.0) > 0.0]
-            if self.with_folds and curve.kind is Kind.PITCHFORK and hard and not turns:
-                at = hard[len(hard) // 2]
-                p, q = at.values.tolist()
-                for fold in self._fold(edge, at, p, q, len(hard)):
+            subcritical = [each for each in leading if (each.coefficient or 0.0) > 0.0]
+            if curve.kind is Kind.PITCHFORK and subcritical and not turns:
+                middle = subcritical[len(subcritical) // 2]
+                p, q = middle.values.tolist()
+                for fold in self._fold(edge, middle, p, q, len(subcritical)):
                     self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
             self.lost += [0] * self.with_folds
@@ -247,16 +252,13 @@ class Search:
         coefficients = [self._coefficient(each, each.values[order]) for each in curve.points]
         errors = np.array([each.error_bound for each in curve.points])[:, order]
         self.curves.append(MapCurve(curve.kind, curve.values[:, order], errors, np.array(coefficients), special))
-        for ending in set(curve.endings) & set(_ENDS):
+        for ending in set(curve.endings) & _CUT_OFF:
             self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {ending.sentence}")
 
     def _coefficient(self, point: BifurcationPoint | Point2, place: Array) -> float:
         """Coefficient for an amplitude of joint angles, as of one robot; NaN if there is none."""
         found = coefficient_of(point, self.plane.at(*place.tolist()).body.modules)
         return np.nan if found is None else found
-
-    def _told(self, count: int, point: Point2) -> None:
-        self.progress(0.5, f"curve {len(self.curves) + 1}, {count} points")
 
     def _box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Part of the plane in which there are results."""

@@ -1,4 +1,9 @@
-"""Adaptive grid of growth rates over two numbers of a robot, fine where neighbours differ in their fate."""
+"""Adaptive grid of growth rates over two numbers of a robot, fine where neighbours differ in their fate.
+
+The nodes are those of the finest grid. Cells begin with the coarsest size. The corners of all cells are computed; those
+whose corners differ are split, and so on down to the finest ones. Between the corners of the others values are
+interpolated. A cell is a row and a column of its first corner; all cells at a time have one size.
+"""
 
 from __future__ import annotations
 
@@ -35,13 +40,12 @@ class Grid:
 
     def __init__(self, plane: Plane, points: int, keep: Callable[[Grid], None] = lambda grid: None) -> None:
         self.plane, self.keep = plane, keep
-        step = 2 ** max(0, int(np.log2(max(points - 1, 1) / _COARSE)))
+        step = 2 ** max(0, int(np.log2((points - 1) / _COARSE)))
         parts = -(-(points - 1) // step) * step
         self.x, self.y = plane.x.values(parts), plane.y.values(parts)
         self.step = tuple(1 if axis.whole else step for axis in (plane.y, plane.x))
         shape = self.y.size, self.x.size
         self.values, self.computed = np.full((5, *shape), np.nan), np.zeros(shape, dtype=bool)
-        self.leaves: list[tuple[Array, tuple[int, int]]] = []
 
     @property
     def unstable(self) -> Array:
@@ -73,47 +77,44 @@ class Grid:
         """Compute the corners of cells from coarse to fine, and split cells whose corners differ, and those that hold a
         finest cell that is wanted, shape (rows - 1, columns - 1)."""
         sy, sx = self.step
-        rows, columns = (
-            np.arange(0, size - 1, step) for size, step in zip(self.computed.shape, self.step, strict=True)
-        )
+        rows, columns = (np.arange(0, axis.size - 1, step) for axis, step in ((self.y, sy), (self.x, sx)))
         cells = np.stack(np.meshgrid(rows, columns, indexing="ij"), -1).reshape(-1, 2)
-        self.leaves = []
+        uniform: list[tuple[Array, int, int]] = []
         while cells.size:
-            corners = self._corners(cells, sy, sx)
+            corners = _corners(cells, sy, sx)
             nodes = np.zeros_like(self.computed)
             nodes[corners] = True
             self.compute(nodes, progress)
+            if max(sy, sx) == 1:
+                break
             there = self.values[:, *corners]
             # The leading multiplier changes where one is real and the other is not.
             there = np.stack([there[UNSTABLE], there[FATE], there[FREQUENCY] > 0.0])
             split = (there != there[:, :1]).any(axis=(0, 1))
             split |= [wanted[j : j + sy, i : i + sx].any() for j, i in cells]
-            split &= max(sy, sx) > 1
-            self.leaves.append((cells[~split], (sy, sx)))
+            uniform.append((cells[~split], sy, sx))
             half = max(1, sy // 2), max(1, sx // 2)
             parts = [(j, i) for j in range(0, sy, half[0]) for i in range(0, sx, half[1])]
             cells = (cells[split][:, None] + np.array(parts)).reshape(-1, 2)
             sy, sx = half
-        self._fill()
+        # Cells of other sizes share nodes, which are computed by now.
+        for cells, sy, sx in uniform:
+            self._interpolate(cells, sy, sx)
 
-    @staticmethod
-    def _corners(cells: Array, sy: int, sx: int) -> tuple[Array, Array]:
-        """Rows and columns of the corners, shape (4, cells) each."""
-        offsets = np.array([(0, 0), (0, sx), (sy, 0), (sy, sx)])
-        places = cells + offsets[:, None]
-        return places[..., 0], places[..., 1]
-
-    def _fill(self) -> None:
+    def _interpolate(self, cells: Array, sy: int, sx: int) -> None:
         """Interpolate within uniform cells between their corners."""
-        for cells, (sy, sx) in self.leaves:
-            if max(sy, sx) == 1 or not len(cells):
-                continue
-            v, u = np.meshgrid(np.arange(sy + 1) / sy, np.arange(sx + 1) / sx, indexing="ij")
-            weights = np.stack([(1 - v) * (1 - u), (1 - v) * u, v * (1 - u), v * u])
-            corners = self.values[:, *self._corners(cells, sy, sx)]
-            inside = np.einsum("kcn,cvu->nkvu", corners, weights)
-            inside[:, [UNSTABLE, FATE]] = corners[[UNSTABLE, FATE], 0].T[:, :, None, None]
-            inside[:, ERROR] = np.nan
-            for (j, i), block in zip(cells, inside, strict=True):
-                place = np.s_[j : j + sy + 1, i : i + sx + 1]
-                self.values[:, *place] = np.where(self.computed[place], self.values[:, *place], block)
+        v, u = np.meshgrid(np.arange(sy + 1) / sy, np.arange(sx + 1) / sx, indexing="ij")
+        weights = np.stack([(1 - v) * (1 - u), (1 - v) * u, v * (1 - u), v * u])
+        corners = self.values[:, *_corners(cells, sy, sx)]
+        inside = np.einsum("kcn,cvu->nkvu", corners, weights)
+        inside[:, [UNSTABLE, FATE]] = corners[[UNSTABLE, FATE], 0].T[:, :, None, None]
+        inside[:, ERROR] = np.nan
+        for (j, i), block in zip(cells, inside, strict=True):
+            place = np.s_[j : j + sy + 1, i : i + sx + 1]
+            self.values[:, *place] = np.where(self.computed[place], self.values[:, *place], block)
+
+
+def _corners(cells: Array, sy: int, sx: int) -> tuple[Array, Array]:
+    """Rows and columns of the corners of cells of one size, shape (4, cells) each."""
+    places = cells + np.array([(0, 0), (0, sx), (sy, 0), (sy, sx)])[:, None]
+    return places[..., 0], places[..., 1]

@@ -1,4 +1,7 @@
-"""Picture of a map: what becomes of a disturbance in colours, growth rates or frequencies, and the curves over it."""
+"""Picture of a map: what becomes of a disturbance in colours, growth rates or frequencies, and the curves over it.
+
+:func:`draw` makes the picture without a legend; :func:`keys` has the entries of one, so that pictures can share it.
+"""
 
 from __future__ import annotations
 
@@ -54,10 +57,11 @@ def draw(found: Any, axes: Axes | None, show: str) -> Axes:
             axes.contourf(x, y, found.folded, levels=[0.5, 1.5], colors="none", hatches=["////"])
     else:
         _field(axes, x, y, found, show)
-    for curve in found.curves if show != "criticality" else ():
-        _curve(axes, found, curve)
     if show == "criticality":
         _coefficients(axes, found)
+    else:
+        for curve in found.curves:
+            _curve(axes, found, curve)
     for point in found.special:
         at = (axis.shown(value) for axis, value in zip((found.x, found.y), point.values, strict=True))
         axes.plot(*at, "D", color=_MARK, markeredgecolor="white", markersize=7, zorder=6, label="codimension two")
@@ -79,14 +83,11 @@ def keys(found: Any, axes: Axes) -> list[Any]:
 
 
 def _field(axes: Axes, x: Array, y: Array, found: Any, show: str) -> None:
-    """Colours of growth rates, red where a disturbance grows, of the frequencies of oscillations or of radii; grey
-    elsewhere."""
+    """Colours of growth rates, red where a disturbance grows, of frequencies or of radii; grey where there is none."""
     from matplotlib.colors import LogNorm, TwoSlopeNorm
 
     axes.set_facecolor(_COLORS[Fate.INVALID])
-    values = {"growth": found.growth, "radius": found.radius}.get(
-        show, np.where(found.frequency > 0.0, found.frequency, np.nan)
-    )
+    values = np.where(found.frequency > 0.0, found.frequency, np.nan) if show == "frequency" else getattr(found, show)
     if show == "radius":
         rows, columns = (np.flatnonzero(np.isfinite(values).any(axis=axis)) for axis in (1, 0))
         x, y, values = x[columns], y[rows], values[np.ix_(rows, columns)]
@@ -132,8 +133,8 @@ def _curve(axes: Axes, found: Any, curve: MapCurve) -> None:
     if not curve.line:
         axes.plot(x, y, "o", color=color, label=label)
         return
-    hard = np.nan_to_num(curve.coefficient, nan=-1.0) > 0.0
-    for style, chosen, name in (("-", ~hard, label), ("--", hard, f"{label}, subcritical")):
+    subcritical = np.nan_to_num(curve.coefficient, nan=-1.0) > 0.0
+    for style, chosen, name in (("-", ~subcritical, label), ("--", subcritical, f"{label}, subcritical")):
         if curve.kind is Kind.FOLD:
             style, name = ":", "fold of curved walks"
         # A piece between two points belongs to the side of its first one; at a turning point both sides meet.

@@ -1,7 +1,8 @@
-"""Result of a map of the straight walk over two numbers of a robot."""
+"""Result of a map of the straight walk over two numbers of a robot: a grid of growth rates, and curves."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -38,16 +39,13 @@ class StabilityMap(Summary, ReadOnlyArrays):
         Values in SI units, shape (columns,) and (rows,).
     growth, frequency, error, unstable, fate
         Growth rate of the leading disturbance (1/s), its angular frequency (rad/s), and what becomes of it, as of
-        :class:`chilopod.analysis.growth.Growth`, shape (rows, columns). Within cells whose corners agree, growth and
-        frequency are interpolated.
+        :class:`chilopod.analysis.growth.Growth`, shape (rows, columns).
     computed
-        True where they were computed, shape (rows, columns).
+        True where they were computed, shape (rows, columns); elsewhere growth and frequency are interpolated.
     radius
         Radius of the curved walks, m, shape (rows, columns), NaN where there is none or it was not computed.
-    curves
-        Curves of bifurcations.
-    remarks, folds_lost
-        Sentences about what may be missing, and why robots are invalid; True if folds were searched in vain.
+    curves, remarks, folds_lost
+        Curves of bifurcations; sentences about what may be missing or is invalid; True if folds were sought in vain.
     """
 
     robot: Robot
@@ -86,14 +84,13 @@ class StabilityMap(Summary, ReadOnlyArrays):
         straight = self.fate == FATES.index(Fate.STRAIGHT)
         found = np.zeros_like(straight)
         axes = self.x_values, self.y_values
-        for axis, view, free in ((0, found, straight), (1, found.T, straight.T)):
-            for row, value in enumerate(axes[1 - axis].tolist()):
-                folds, hard = (_crossed(self.curves, kind, axis, value) for kind in (Kind.FOLD, Kind.PITCHFORK))
-                for fold in folds if hard.size else ():
-                    ends = np.sort([fold, hard[np.abs(hard - fold).argmin()]])
-                    within = (axes[axis] >= ends[0]) & (axes[axis] <= ends[1])
-                    view[row] |= within & free[row]
-        return read_only(found)
+        for axis, rows in ((0, found), (1, found.T)):
+            for row, value in zip(rows, axes[1 - axis].tolist(), strict=True):
+                folds, forks = (_crossed(self.curves, kind, axis, value) for kind in (Kind.FOLD, Kind.PITCHFORK))
+                for fold in folds if forks.size else ():
+                    low, high = np.sort([fold, forks[np.abs(forks - fold).argmin()]])
+                    row |= (axes[axis] >= low) & (axes[axis] <= high)
+        return read_only(found & straight)
 
     @property
     def shares(self) -> dict[Fate, float]:
@@ -112,9 +109,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         above = [f"{shares} of {columns} x {rows} values, {self.computed.sum()} of which were computed"]
         if self.folded.any():
             above.append(f"beside curved walks, straight ones hold at {100.0 * self.folded.mean():.3g} % of the values")
-        kinds = [curve.kind.label for curve in self.curves]
-        counts = [f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)]
-        above.append(f"curves: {', '.join(counts) or 'none'}")
+        kinds = Counter(curve.kind.label for curve in self.curves)
+        above.append(f"curves: {', '.join(f'{count} of {kind}' for kind, count in kinds.items()) or 'none'}")
         table: list[Sequence[str]] = [("on them", self.x.label, self.y.label)]
         for point in self.special:
             numbers = zip((self.x, self.y), np.column_stack([point.values, point.error_bound]), strict=True)
@@ -194,7 +190,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
         found["curve_kind"] = ("point", np.repeat(kinds, sizes))
         varied = f"{self.x.path}, {self.y.path}"
         attrs = {"robot": self.robot.name, "varied": varied, "robot_toml": self.robot.to_toml()}
-        return xr.Dataset(found, coords=coords, attrs=attrs)
+        return xr.Dataset(found, coords, attrs)
 
 
 def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) -> Array:

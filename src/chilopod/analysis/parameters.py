@@ -24,10 +24,6 @@ def stiffness(value: float) -> float:
     return units.parse(f"{float(value)!r} {PAPER_UNIT}", "N*m/rad")
 
 
-SEARCHED = (0.04, 1.6)
-"""Interval in which a critical spring is searched by default, in units of :func:`spring_scale`."""
-
-
 def spring_scale(robot: Robot) -> float:
     """Scale of a robot's springs, friction x speed x duty factor x module length, N*m/rad.
 
@@ -40,22 +36,17 @@ def spring_scale(robot: Robot) -> float:
 
 
 def searched_springs(robot: Robot) -> tuple[float, float]:
-    """Interval of :data:`SEARCHED`, N*m/rad."""
-    low, high = (each * spring_scale(robot) for each in SEARCHED)
-    return low, high
+    """Interval in which a critical spring is searched by default, N*m/rad: 0.04 to 1.6 of :func:`spring_scale`."""
+    scale = spring_scale(robot)
+    return 0.04 * scale, 1.6 * scale
 
 
 def numbers_read(robot: Robot) -> tuple[str, ...]:
     """Paths of all continuous numbers of a robot's file that the planar model reads, springs one by one."""
-    derived = robot.body.yaw_inertia is None
-    read = {*_READ, *_inertia_read(robot)} - ({"body.yaw_inertia"} if derived else set())
+    read = set(_read(robot))
+    if robot.body.yaw_inertia is None:
+        read.remove("body.yaw_inertia")  # it follows from other numbers
     return tuple(path for path in robot.parameters() if path.partition("[")[0] in read)
-
-
-def _inertia_read(robot: Robot) -> tuple[str, ...]:
-    """Numbers of the twin that set the yaw inertia of a module."""
-    sets = robot.twin is not None and robot.body.yaw_inertia is None
-    return tuple(f"twin.{name}" for name in _OF_INERTIA) if sets else ()
 
 
 def check_parameter(robot: Robot, parameter: str) -> None:
@@ -63,7 +54,7 @@ def check_parameter(robot: Robot, parameter: str) -> None:
 
     Numbers of the twin are read where they set the yaw inertia of a module.
     """
-    read = (*_READ, *_inertia_read(robot))
+    read = _read(robot)
     try:
         robot.unit_of(parameter)
     except ParameterError as error:
@@ -72,5 +63,11 @@ def check_parameter(robot: Robot, parameter: str) -> None:
     if parameter == "body.modules":
         raise ParameterError("must be a continuous parameter, not a whole number", field="parameter", value=parameter)
     if parameter.partition("[")[0] not in read:
-        problem, allowed = "must be a number that the planar model reads", ", ".join(read)
-        raise ParameterError(problem, field="parameter", value=parameter, allowed=allowed)
+        problem = "must be a number that the planar model reads"
+        raise ParameterError(problem, field="parameter", value=parameter, allowed=", ".join(read))
+
+
+def _read(robot: Robot) -> tuple[str, ...]:
+    """Paths of the numbers that the planar model reads, with those of the twin that set the yaw inertia of a module."""
+    sets_inertia = robot.twin is not None and robot.body.yaw_inertia is None
+    return (*_READ, *(f"twin.{name}" for name in _OF_INERTIA if sets_inertia))

@@ -10,7 +10,7 @@ neighbouring robots; the coefficient is that of their normal forms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
@@ -47,8 +47,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
     paths, numbers
         Paths of the numbers, and their values, SI, shape (numbers,).
     quantities, values
-        Names of the quantities, of :data:`chilopod.analysis.quantities.QUANTITIES`, and their values, SI, shape
-        (quantities,).
+        Some of :data:`chilopod.analysis.quantities.QUANTITIES`, and their values, SI, shape (quantities,).
     derivatives, errors
         Derivatives and estimates of their errors, SI, shape (quantities, numbers); NaN where neighbouring robots lack
         the quantity.
@@ -70,10 +69,11 @@ class Sensitivity(Summary, ReadOnlyArrays):
     def percent(self, quantity: str) -> dict[str, float]:
         """Change of one quantity by 1 % of each number, by its path: in % of onset and radius, else in the unit of the
         quantity; 0 for a number that is zero."""
-        row = self._row(quantity)
+        return dict(zip(self.paths, self._percent(self._row(quantity)).tolist(), strict=True))
+
+    def _percent(self, row: int) -> Array:
         changes = self.derivatives[row] * self.numbers
-        changes = changes / self.values[row] if quantity in _RELATIVE else 0.01 * changes
-        return dict(zip(self.paths, changes.tolist(), strict=True))
+        return changes / self.values[row] if self.quantities[row] in _RELATIVE else 0.01 * changes
 
     def _row(self, quantity: str) -> int:
         known_names([quantity], self.quantities, "quantity", "is not computed")
@@ -89,11 +89,11 @@ class Sensitivity(Summary, ReadOnlyArrays):
         found: dict[str, Any] = {"robot": self.robot.name, "parameter": self.onset.parameter, "at_si": at}
         found["numbers_si"] = numbers
         for row, name in enumerate(self.quantities):
+            found[name] = {"value_si": float(self.values[row])}
+            changes = "percent_per_percent" if name in _RELATIVE else "change_per_percent"
             errors = dict(zip(self.paths, self.errors[row].tolist(), strict=True))
-            tables = {"derivatives_si": self.of(name), "errors_si": errors}
-            tables["percent_per_percent" if name in _RELATIVE else "change_per_percent"] = self.percent(name)
-            known = {key: {path: finite(x) for path, x in table.items()} for key, table in tables.items()}
-            found[name] = {"value_si": float(self.values[row]), **known}
+            tables = {"derivatives_si": self.of(name), "errors_si": errors, changes: self.percent(name)}
+            found[name] |= {key: {path: finite(x) for path, x in table.items()} for key, table in tables.items()}
         return found
 
     @property
@@ -104,36 +104,32 @@ class Sensitivity(Summary, ReadOnlyArrays):
         return f"{self.robot.name}: {', '.join(said)}"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
-        known = np.abs(self.derivatives) > self.errors
-        names = [name for name, row in zip(self.quantities, known, strict=True) if row.any()]  # no frequency of a bend
-        rows = [self._row(name) for name in names]
-        heads = [f"{name} ({f'{_changed(name)} per %'.strip()})" for name in names]
-        columns = [self.percent(name) for name in names]
+        known, missing = np.abs(self.derivatives) > self.errors, np.isnan(self.derivatives)
+        rows = [row for row, sure in enumerate(known) if sure.any()]  # no frequency of a bend
+        heads = [f"{name} ({f'{_changed(name)} per %'.strip()})" for name in (self.quantities[row] for row in rows)]
         cells: list[Sequence[str]] = [("number", "value", *heads)]
+        percents = {row: self._percent(row) for row in rows}
         below, without, lacks = [], [], []
-        largest = (
-            -np.abs(np.nan_to_num(self.derivatives[rows[0]]) * self.numbers) if rows else np.zeros(len(self.paths))
-        )
-        for at in np.argsort(largest, kind="stable").tolist():
-            path = self.paths[at]
-            unit = self.robot.unit_of(path)
-            missing = np.isnan(self.derivatives[:, at])
-            lacks += [f"{name} by {path}" for name, no in zip(self.quantities, missing, strict=True) if no]
+        largest = np.abs(np.nan_to_num(self.derivatives[rows[:1]]) * self.numbers).sum(axis=0)
+        for at in np.argsort(-largest, kind="stable").tolist():
+            path, unit = self.paths[at], self.robot.unit_of(self.paths[at])
+            lacks += [f"{name} by {path}" for name, no in zip(self.quantities, missing[:, at], strict=True) if no]
             if not known[:, at].any():
-                without += [path] * (not missing.any())
+                without += [path] * (not missing[:, at].any())
             elif self.numbers[at] == 0.0:
-                for name, row in zip(names, rows, strict=True):
-                    slope = units.from_si(self.derivatives[row, at], self._unit(name)) / units.from_si(1.0, unit)
-                    said = f"changes by {f'{slope:+.4g} {self._unit(name)}'.strip()} for 1 {unit}"
-                    below += [f"{path} is 0: {name} {said}"] * bool(known[row, at])
+                below += [f"{path} is 0: {self._slope_in_words(row, at)}" for row in rows if known[row, at]]
             else:
-                value = units.format(self.robot.get(path), unit, digits=5)
-                shown = [f"{c[path]:+.4g}" if known[row, at] else "0" for row, c in zip(rows, columns, strict=True)]
-                changes = ["" if missing[row] else each for row, each in zip(rows, shown, strict=True)]
-                cells.append((path, value, *changes))
+                texts = {row: f"{percents[row][at]:+.4g}" if known[row, at] else "0" for row in rows}
+                changes = ("" if missing[row, at] else text for row, text in texts.items())
+                cells.append((path, units.format(self.robot.get(path), unit, digits=5), *changes))
         below += [f"no effect to first order: {', '.join(without)}"] * bool(without)
         below += [f"no derivative: {', '.join(lacks)}"] * bool(lacks)
         return [], cells, below
+
+    def _slope_in_words(self, row: int, at: int) -> str:
+        name, unit = self.quantities[row], self.robot.unit_of(self.paths[at])
+        slope = units.from_si(self.derivatives[row, at], self._unit(name)) / units.from_si(1.0, unit)
+        return f"{name} changes by {f'{slope:+.4g} {self._unit(name)}'.strip()} for 1 {unit}"
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the changes of the first quantity by 1 % of each number, largest on top."""
@@ -220,8 +216,7 @@ class _Leading:
         self.slope = cache(self._slope)
 
     def _slope(self, path: str, symmetric: bool) -> tuple[complex, float]:
-        """Derivative of the exponent of the leading mode by a number, and its error, by the return map of half a period
-        or of a whole one."""
+        """Derivative of the exponent of the leading mode by a number, and its error; see :func:`leading_mode`."""
         mode: Mode = self.mode(symmetric)
         own = self._robot.get(path)
 
@@ -243,35 +238,57 @@ def _keeps_symmetry(path: str) -> bool:
     return path != "gait.side_phase"
 
 
+def _by_each(
+    what: str, paths: Sequence[str], show: Progress, slope: Callable[[str], tuple[Any, Any]]
+) -> tuple[list[Any], list[Any]]:
+    """Derivatives by every number, and their errors."""
+    found = []
+    for done, path in enumerate(paths):
+        show(done / len(paths), f"{what} by {path}")
+        found.append(slope(path))
+    return [each for each, _ in found], [error for _, error in found]
+
+
 def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
     value = onset.first(robot).point.value
     of = _Leading(robot.with_value(onset.parameter, value))
-    slopes, errors = [], []
-    for done, path in enumerate(paths):
-        show(done / len(paths), f"onset by {path}")
-        slope, error = 0.0, 0.0
-        if onset.parameter not in (path, path.partition("[")[0]):  # else it is replaced
-            symmetric = _keeps_symmetry(path)
-            (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, symmetric), of.slope(path, symmetric)
-            slope = -by_path.real / by_onset.real
-            error = (off + abs(slope) * uncertain) / abs(by_onset.real)
-        slopes.append(slope)
-        errors.append(error)
-    return {"onset": (value, slopes, errors)}
+
+    def slope(path: str) -> tuple[float, float]:
+        if onset.parameter in (path, path.partition("[")[0]):
+            return 0.0, 0.0  # it is replaced
+        symmetric = _keeps_symmetry(path)
+        (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, symmetric), of.slope(path, symmetric)
+        found = -by_path.real / by_onset.real
+        return found, (off + abs(found) * uncertain) / abs(by_onset.real)
+
+    return {"onset": (value, *_by_each("onset", paths, show, slope))}
 
 
 def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
-    of = _Leading(onset.there(robot))
+    of = _Leading(robot)
     mode: Mode = of.mode(True)
-    found = []
-    for done, path in enumerate(paths):
-        show(done / len(paths), f"growth by {path}")
-        found.append(of.slope(path, _keeps_symmetry(path)))
-    errors, turns = [error for _, error in found], mode.frequency > 0.0
+    slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, _keeps_symmetry(path)))
+    turns = mode.frequency > 0.0
     return {
-        "growth": (mode.growth, [slope.real for slope, _ in found], errors),
-        "frequency": (mode.frequency, [turns * slope.imag for slope, _ in found], [turns * each for each in errors]),
+        "growth": (mode.growth, [slope.real for slope in slopes], errors),
+        "frequency": (mode.frequency, [turns * slope.imag for slope in slopes], [turns * error for error in errors]),
     }
+
+
+def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
+    function = getattr(Measured(onset), name)
+    value, round_off = function(robot), _round_off(name, robot, onset)
+
+    def slope(path: str) -> tuple[Any, Any]:
+        def at(number: float) -> Array:
+            return np.array(function(robot.with_value(path, number)))
+
+        try:
+            return derivative(at, robot.get(path), size_of(robot, path), round_off)
+        except AnalysisError:  # neighbours lack the quantity, as the coefficient without the symmetry of half a period
+            return np.nan, np.nan
+
+    return {name: (value, *_by_each(name, paths, show, slope))}
 
 
 def _round_off(name: str, robot: Robot, onset: Onset) -> float:
@@ -282,22 +299,6 @@ def _round_off(name: str, robot: Robot, onset: Onset) -> float:
     value = onset.first(robot).point.value
     of = _Leading(robot.with_value(onset.parameter, value))
     return 100.0 * ROUND_OFF / abs(of.slope(onset.parameter, True)[0].real * value * of.mode(True).duration)
-
-
-def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
-    function, found = getattr(Measured(onset), name), []
-    value, round_off = function(robot), _round_off(name, robot, onset)
-    for done, path in enumerate(paths):
-        show(done / len(paths), f"{name} by {path}")
-
-        def at(value: float, path: str = path) -> Array:
-            return np.array(function(robot.with_value(path, value)))
-
-        try:
-            found.append(derivative(at, robot.get(path), size_of(robot, path), round_off))
-        except AnalysisError:  # neighbours lack the quantity, as the coefficient without the symmetry of half a period
-            found.append((np.array(np.nan), np.array(np.nan)))
-    return {name: (value, [float(slope) for slope, _ in found], [float(error) for _, error in found])}
 
 
 _EXACT = {"onset": _onset, "growth": _growth, "frequency": _growth}

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -30,12 +31,7 @@ from chilopod.robot import Robot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LEVEL = 0.95
-"""Level of the intervals of shares."""
-
-SPREAD = 0.9
-"""Level of the interval of the onset."""
-
+_LEVEL, _SPREAD = 0.95, 0.9  # levels of the intervals of shares, and of that of the onset
 _RESAMPLED = 1000
 _FEWEST, _MOST = 16, 65536  # samples from which shares are estimated, and that take hours
 _SHOWN = 64  # samples from one sign of progress to the next
@@ -57,6 +53,7 @@ def sobol_shares(f_a: Array, f_b: Array, f_ab: Array, rng: np.random.Generator) 
     """Sobol's shares from values of a function at samples A, B, and A with one column from B, shapes (samples,),
     (samples,) and (numbers, samples); NaN for failed samples."""
     found = np.full((6, len(f_ab)), np.nan)
+    ends = [0.5 - 0.5 * _LEVEL, 0.5 + 0.5 * _LEVEL]
     for i, mixed in enumerate(f_ab):
         known = np.isfinite(f_a) & np.isfinite(f_b) & np.isfinite(mixed)
         count = int(known.sum())
@@ -69,7 +66,6 @@ def sobol_shares(f_a: Array, f_b: Array, f_ab: Array, rng: np.random.Generator) 
         with np.errstate(invalid="ignore", divide="ignore"):
             first = np.mean((b[picked] - middle) * (ab[picked] - a[picked]), axis=1) / variance
             total = 0.5 * np.mean((a[picked] - ab[picked]) ** 2, axis=1) / variance
-        ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
         found[:, i] = first[0], total[0], *np.quantile(first[1:], ends), *np.quantile(total[1:], ends)
     return Shares(found[0], found[1], found[2:4].T.copy(), found[4:].T.copy())
 
@@ -106,17 +102,19 @@ class Uncertainty(Summary, ReadOnlyArrays):
     @property
     def deviation(self) -> float:
         """Standard deviation of the samples, SI; NaN for fewer than two."""
-        known = self.sampled[np.isfinite(self.sampled)]
-        return float(known.std(ddof=1)) if known.size > 1 else math.nan
+        return float(self._known.std(ddof=1)) if self._known.size > 1 else math.nan
 
     @property
     def interval(self) -> tuple[float, float]:
         """Ends of the central 90 % of the samples, SI; NaN without samples."""
-        known = self.sampled[np.isfinite(self.sampled)]
-        if not known.size:
+        if not self._known.size:
             return math.nan, math.nan
-        low, high = np.quantile(known, [0.5 - 0.5 * SPREAD, 0.5 + 0.5 * SPREAD]).tolist()
+        low, high = np.quantile(self._known, [0.5 - 0.5 * _SPREAD, 0.5 + 0.5 * _SPREAD]).tolist()
         return low, high
+
+    @property
+    def _known(self) -> Array:
+        return self.sampled[np.isfinite(self.sampled)]
 
     def as_json(self) -> dict[str, Any]:
         """Spread and shares as plain numbers, SI; null where unknown."""
@@ -146,12 +144,10 @@ class Uncertainty(Summary, ReadOnlyArrays):
     def title(self) -> str:
         """Onset with its spread."""
         unit = self.robot.unit_of(self.onset.parameter)
-        value, deviation, propagated, *ends = (
-            f"{units.from_si(each, unit):.4g}" for each in (self.value, self.deviation, self.propagated, *self.interval)
-        )
-        spread = f"standard deviation {deviation} (to first order {propagated}), 90 % between {ends[0]} and {ends[1]}"
-        known = np.isfinite(self.sampled).any()
-        return f"{self.robot.name}: onset {value} {unit}, {spread if known else 'no sample has one'}"
+        numbers = self.value, self.deviation, self.propagated, *self.interval
+        value, deviation, propagated, low, high = (f"{units.from_si(each, unit):.4g}" for each in numbers)
+        spread = f"standard deviation {deviation} (to first order {propagated}), 90 % between {low} and {high}"
+        return f"{self.robot.name}: onset {value} {unit}, {spread if self._known.size else 'no sample has one'}"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         cells: list[Sequence[str]] = [("number", "within ±", "share alone", "with others")]
@@ -209,6 +205,32 @@ def uncertainty(
     ParameterError
         If a number with its tolerance is out of range, such as a negative mass.
     """
+    _check(robot, tolerances, onset, samples)
+    paths, widths = tuple(tolerances), np.array([*tolerances.values()], dtype=np.float64)
+    local = sensitivity(robot, onset, ("onset",), paths, part(progress, 0.0, 0.1))
+    value = float(local.values[0])
+    propagated = float(np.linalg.norm(local.derivatives[0] * widths)) / math.sqrt(3.0)
+    rng = np.random.default_rng(seed)
+    points = Sobol(2 * widths.size, rng=rng).random(samples)
+    deviations = widths * (2.0 * points.reshape(samples, 2, -1) - 1.0)
+    centre = np.array([robot.get(path) for path in paths])
+    first, second = (centre + deviations[:, half] for half in range(2))
+    blocks = [first, second, *(np.where(np.arange(widths.size) == i, second, first) for i in range(widths.size))]
+    found = np.full((len(blocks), samples), np.nan)
+    for at, numbers in enumerate(np.concatenate(blocks).tolist()):
+        if at % samples % _SHOWN == 0:
+            progress(0.1 + 0.9 * at / found.size, f"{at} of {found.size} robots")
+        with suppress(ChilopodError):  # a robot that is not possible, or has no onset
+            sample = robot
+            for path, number in zip(paths, numbers, strict=True):
+                sample = sample.with_value(path, number)
+            found.flat[at] = onset.beside(sample, value)
+    shares, failed = sobol_shares(found[0], found[1], found[2:], rng), int(np.isnan(found).sum())
+    return Uncertainty(robot, onset, value, paths, widths, propagated, found[:2].ravel(), shares, failed, found.size)
+
+
+def _check(robot: Robot, tolerances: Mapping[str, float], onset: Onset, samples: int) -> None:
+    """Refuse what :func:`uncertainty` cannot take, with a ParameterError."""
     if not _FEWEST <= samples <= _MOST or samples & (samples - 1):
         allowed = f"a power of two from {_FEWEST} to {_MOST}"
         raise ParameterError("must be a power of two", field="samples", value=samples, allowed=allowed)
@@ -227,34 +249,3 @@ def uncertainty(
             raise ParameterError(said, field="tolerances", value=path)
     if not tolerances:
         raise ParameterError("must name a number", field="tolerances", value="nothing")
-    local = sensitivity(robot, onset, ("onset",), tuple(tolerances), part(progress, 0.0, 0.1))
-    value, widths = float(local.values[0]), np.array([*tolerances.values()], dtype=np.float64)
-    centre = np.array([robot.get(path) for path in tolerances])
-    rng = np.random.default_rng(seed)
-    points = Sobol(2 * widths.size, rng=rng).random(samples)
-    deviations = widths * (2.0 * points.reshape(samples, 2, -1) - 1.0)
-    first, second = (centre + deviations[:, half] for half in range(2))
-    blocks = [first, second, *(np.where(np.arange(widths.size) == i, second, first) for i in range(widths.size))]
-    found = np.full((len(blocks), samples), np.nan)
-    for done, (block, row) in enumerate(zip(blocks, found, strict=True)):
-        for at, numbers in enumerate(block.tolist()):
-            if at % _SHOWN == 0:
-                finished = done * samples + at
-                progress(0.1 + 0.9 * finished / found.size, f"{finished} of {found.size} robots")
-            row[at] = _onset_of(robot, tuple(tolerances), numbers, onset, value)
-    shares = sobol_shares(found[0], found[1], found[2:], rng)
-    propagated = float(np.linalg.norm(local.derivatives[0] * widths)) / math.sqrt(3.0)
-    failed = int(np.isnan(found).sum())
-    return Uncertainty(
-        robot, onset, value, tuple(tolerances), widths, propagated, found[:2].ravel(), shares, failed, found.size
-    )
-
-
-def _onset_of(robot: Robot, paths: Sequence[str], numbers: Sequence[float], onset: Onset, near: float) -> float:
-    """Onset of a robot with other numbers; NaN if the robot is not possible or has none."""
-    try:
-        for path, number in zip(paths, numbers, strict=True):
-            robot = robot.with_value(path, number)
-        return onset.beside(robot, near)
-    except ChilopodError:
-        return math.nan

@@ -64,8 +64,7 @@ def sensitivity(
 
     if tolerances:
         options.study(
-            "uncertainty",
-            lambda progress: analysis.uncertainty(described, tolerances, onset, samples, seed, progress),
+            "uncertainty", lambda progress: analysis.uncertainty(described, tolerances, onset, samples, seed, progress)
         )
     else:
         names = show.split(",") if show else DEFAULT
@@ -115,21 +114,22 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
         path, equals, tolerance = (each.strip() for each in text.partition("="))
         with reading("uncertain"):
             share = _share(tolerance if equals else path)
-            if share is None and not equals:
-                said = "must be a share, or a number with its tolerance"
-                raise ParameterError(said, value=text, allowed="10%, body.mass=0.3 kg")
             if share is not None and not 0.0 < share < 1.0:
                 raise ParameterError("must be a share above 0 % and below 100 %", value=text)
             if equals:
                 check_parameter(robot, path)
-                if path in named or path == parameter:
-                    said = "must not be the number whose critical value is searched"
-                    raise ParameterError("must be given once" if path in named else said, value=text)
+                if path in named:
+                    raise ParameterError("must be given once", value=text)
+                if path == parameter:
+                    raise ParameterError("must not be the number whose critical value is searched", value=text)
                 named.add(path)
                 stem, joints = path.partition("[")[0], place_of(path).joints(robot.body.modules - 1)
                 paths = [each for each in others if each in [f"{stem}[{i}]" for i in joints]] or [path]
-            else:
+            elif share is not None:
                 paths = [each for each in others if robot.get(each) and each not in found]
+            else:
+                said = "must be a share, or a number with its tolerance"
+                raise ParameterError(said, value=text, allowed="10%, body.mass=0.3 kg")
             for each in paths:
                 if share is None:
                     found[each] = units.parse(tolerance, robot.si_unit_of(each))
@@ -144,9 +144,7 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
 
 def _share(text: str) -> float | None:
     """Number before a percent sign, as a share; None without one."""
-    if not text.endswith("%"):
-        return None
     try:
-        return 0.01 * float(text[:-1])
+        return 0.01 * float(text.removesuffix("%")) if text.endswith("%") else None
     except ValueError:
         return None

@@ -1,4 +1,8 @@
-"""Eight maps of the straight walk that a designer wants, with the critical springs that the scaling law predicts."""
+"""Eight maps of the straight walk that a designer wants, with the critical springs that the scaling law predicts.
+
+A :class:`Chart` says what a map shows. :func:`atlas` computes the maps of all :data:`CHARTS`, and :func:`panel` draws
+them side by side. The sentences below them take their numbers from the curves of the maps.
+"""
 
 from __future__ import annotations
 
@@ -26,67 +30,61 @@ from chilopod.show.words import number
 
 @dataclass(frozen=True)
 class Chart:
-    """A map of the atlas: its axes, sentences with places for the critical values at the lower and upper end of y and
-    for the least and largest of them, k1 if that is on no axis (text with a unit), and True if all robots of the map
-    have one shape, so that the scaling law holds."""
+    """A map of the atlas: its vertical axis, sentences with places for the critical values at the lower and upper end
+    of that axis and for the least and largest of them, its horizontal axis, k1 if that is on no axis (text with a
+    unit), and True if all robots of the map have one shape, so that the scaling law holds."""
 
-    x: Given
     y: Given
     words: str
+    x: Given = (K1, "1 N*mm/deg", "30 N*mm/deg")
     k1: str | None = None
     scaled: bool = False
 
 
-_SOFT = (K1, "1 N*mm/deg", "30 N*mm/deg")
 CHARTS = {
     "A": Chart(
-        (K1, "1 N*mm/deg", "14 N*mm/deg"),
         ("springs.stiffness[1:]", "2 N*mm/deg", "45 N*mm/deg"),
         "The stiffer the other springs are, the stiffer is the first spring at which the robot bends. Where they are "
         "soft, the body undulates, whatever the first spring is.",
+        x=(K1, "1 N*mm/deg", "14 N*mm/deg"),
         scaled=True,
     ),
     "B": Chart(
-        _SOFT,
         ("gait.stride", "10 mm", "60 mm"),
         "Longer strides at the same rhythm bend the robot with stiffer springs: {low} N·mm/deg at 10 mm, {high} at "
         "60 mm. Short strides make the onset sudden.",
         scaled=True,
     ),
     "C": Chart(
-        _SOFT,
         ("gait.module_phase", "60 deg", "180 deg"),
         "The phase between modules hardly moves the onset, from {least} to {most} N·mm/deg. It decides whether the "
         "onset is gentle or sudden.",
     ),
     "D": Chart(
-        _SOFT,
         ("modules", 3, 16),
         "From six modules on, more of the same modules hardly change the onset, as the front bends: {high} N·mm/deg at "
         "sixteen. Four modules bend with stiffer springs, three with softer ones ({low}).",
     ),
     "E": Chart(
-        _SOFT,
         ("legs.forward_offset", "0 mm", "80 mm"),
         "Feet further ahead bend the robot with stiffer springs: {low} N·mm/deg at 0 mm, {high} at 80 mm. Feet near "
         "the middle of their modules make the onset sudden.",
     ),
     "F": Chart(
-        ("springs.stiffness", "1 N*mm/deg", "30 N*mm/deg"),
         ("legs.forward_offset", "0 mm", "80 mm"),
         "With all springs alike the robot undulates before it bends. Feet further ahead make it undulate with stiffer "
         "springs: {high} N·mm/deg at 80 mm.",
+        x=("springs.stiffness", "1 N*mm/deg", "30 N*mm/deg"),
     ),
     "G": Chart(
-        ("ground.friction", "20 N*s/m", "500 N*s/m"),
         ("body.mass", "1 kg", "100 kg"),
         "With k1 = 12 N·mm/deg the robot bends on a floor of more friction than {low} N·s/m if it weighs 1 kg, and "
         "than {high} if it weighs 100. So a hundred times the mass changes that by a third.",
-        "12 N*mm/deg",
+        x=("ground.friction", "20 N*s/m", "500 N*s/m"),
+        k1="12 N*mm/deg",
         scaled=True,
     ),
     "H": Chart(
-        _SOFT,
         ("speed", "0.02 m/s", "0.3 m/s"),
         "A spring that is safe at a slow walk bends a fast robot. The onset is at {low} N·mm/deg at 0.02 m/s and at "
         "{high} at 0.3 m/s.",
@@ -101,7 +99,7 @@ _ROW, _ONE = 3.9, 3.6  # inches, height of a row of two maps, and of one
 
 def atlas(context: Context, progress: Progress) -> dict[str, StabilityMap]:
     """The maps of :data:`CHARTS` by their letters; two of them if the report is tiny."""
-    found, points, letters = {}, context.size.of(97, 49, 5), context.size.cut("ABCDEFGH", "BG")
+    found, points, letters = {}, context.size.of(97, 49, 5), context.size.cut("".join(CHARTS), "BG")
     for row, letter in enumerate(letters):
         chart = CHARTS[letter]
         robot = context.robot if chart.k1 is None else context.robot.override(K1, chart.k1)

@@ -11,6 +11,7 @@ a module, over the period. This is exact. The law is that F hardly depends on ei
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -40,10 +41,7 @@ ROBOTS = {
 }
 """Robots by what differs from the robot as built: factors of :func:`scaled`."""
 
-REST = (0.25, 8.0)
-"""Other springs of the critical curves, in units of :func:`spring_scale`: softer ones let the robot undulate first."""
-
-_LAYOUTS = (style.Layout("AB;CC", 7.2), style.Layout("A;B;C", 10.6))
+_REST = (0.25, 8.0)  # other springs, in units of the scale; softer ones let the robot undulate first
 _COLORS = (style.BLACK, *style.CURVES)
 _MARKERS = "oDs^vP"
 
@@ -87,8 +85,7 @@ def critical(robot: Robot) -> float:
 
 
 def predicted(robot: Robot, curves: xr.Dataset) -> float:
-    """Critical k1 by the law, in units of the scale, from the curve of the robot as built, see :func:`collapse`; NaN
-    where that ends."""
+    """Critical k1 by the law, in units of the scale: the curve as built of a :func:`collapse`; NaN beyond its ends."""
     rest = robot.springs.stiffness[1] / spring_scale(robot)
     return float(np.interp(rest, curves.rest, curves.curve.sel(robot=BUILT), left=np.nan, right=np.nan))
 
@@ -102,18 +99,16 @@ def collapse(context: Context, progress: Progress = silent) -> xr.Dataset:
     ``inertia`` over mass.
     """
     size, robot = context.size, context.robot
-    rest = np.geomspace(*REST, size.of(17, 9, 2))
+    rest = np.geomspace(*_REST, size.of(17, 9, 2))
     masses = np.geomspace(0.1, 1000.0, size.of(17, 9, 2))
-    strides, steps = (0.5, 1.0, 2.0), 0.0
+    strides = 0.5, 1.0, 2.0
+    steps = itertools.count(1)
     total = len(ROBOTS) * rest.size + len(strides) * masses.size
 
     def at(springs: float, **factors: float) -> float:
-        nonlocal steps
         found = scaled(robot, **factors)
-        for joint in range(1, len(robot.springs.stiffness)):
-            found = found.with_value(f"{ALL}[{joint}]", springs * spring_scale(found))
-        steps += 1.0
-        progress(steps / total, "critical springs of scaled robots")
+        found = found.with_value(f"{ALL}[1:]", springs * spring_scale(found))
+        progress(next(steps) / total, "critical springs of scaled robots")
         return critical(found)
 
     built = robot.springs.stiffness[1] / spring_scale(robot)
@@ -144,8 +139,8 @@ def panel(data: xr.Dataset) -> Panel:
         f"the same in units of friction, speed, duty factor and module length, where they agree to {spread}.",
         text=(
             "A shows the front spring at which the straight walk is lost, over the springs behind it, for robots that "
-            f"differ in mass, size, speed and floor. B shows the same curves in units of {_SCALE}. They agree to "
-            f"{spread}.",
+            "differ in mass, size, speed and floor. B shows the same curves in units of friction × speed × duty factor "
+            f"× module length. They agree to {spread}.",
             "C shows where the law ends, at the springs behind as built. A module that its feet cannot stop within a "
             f"step bends with a stiffer spring. The robot as built has an inertia of {number(own, 2)}: mass of a "
             "module / (2 × duty factor × friction × period).",
@@ -154,11 +149,8 @@ def panel(data: xr.Dataset) -> Panel:
     )
 
 
-_SCALE = "friction × speed × duty factor × module length"
-
-
 def _draw(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_LAYOUTS, narrow)
+    figure, axes = style.figure(style.Layout("AB;CC", 7.2), style.Layout("A;B;C", 10.6), narrow)
     for row, (color, marker) in enumerate(zip(_COLORS, _MARKERS, strict=False)):
         each = data.isel(robot=row)
         look: dict[str, Any] = {"color": color, "marker": marker, "markersize": 4.0, "label": str(each.robot.values)}
@@ -177,11 +169,5 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
 
 
 SCALING: Section[xr.Dataset] = Section(
-    "scaling",
-    CHAPTER,
-    "the scaling law of critical springs",
-    collapse,
-    panels=panel,
-    beyond=True,
-    headline=True,
+    "scaling", CHAPTER, "the scaling law of critical springs", collapse, panels=panel, beyond=True, headline=True
 )

@@ -1,4 +1,9 @@
-"""Sizing: values of free numbers at which a robot does what is wished, checked in walks."""
+"""Sizing: values of free numbers at which a robot does what is wished, checked in walks.
+
+:func:`size` reads wishes and ranges, lets a :class:`chilopod.tasks.sizing.search.Search` find the nearest robot, and
+asks it what stands in the way. The robot then walks from a bent start. A walk that does something else than what was
+computed changes the outcome. The result is a :class:`chilopod.tasks.sizing.result.Sizing`.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +23,7 @@ from chilopod.tasks.sizing.result import Sizing
 from chilopod.tasks.sizing.search import Outcome, Search, Wish, parsed_wish
 from chilopod.trials import run
 
-WALKED = 0.02
-"""Largest relative deviation of the radius and the speed of a planar walk from those computed."""
-
+_AS_COMPUTED = 0.02  # largest relative deviation of radius and speed of a planar walk from those computed
 _SETTLED = 15.0  # settling times of a walk
 _LONGEST = 900.0  # s, of a walk
 
@@ -60,9 +63,8 @@ def size(
     ParameterError
         If a wish or a range is not one, or two of the ranges change the same number.
     """
-    given = tuple(
-        parsed_wish(robot, onset, name, wishes[name]) for name in known_names([*wishes], QUANTITIES, "wishes")
-    )
+    names = known_names([*wishes], QUANTITIES, "wishes")
+    given = tuple(parsed_wish(robot, onset, name, wishes[name]) for name in names)
     axes = _axes(robot, free)
     if twin and robot.twin is None:
         raise ParameterError("needs a table [twin], which this robot lacks", field="twin", value=robot.name)
@@ -71,12 +73,10 @@ def size(
     search = Search(robot, given, axes, onset, budget, seed, progress)
     outcome = search.run()
     reasons, front = search.reasons(outcome)
-    found = search.at(search.best)
-    again = search.again
+    found, again = search.at(search.best), search.again
     values = np.array([wish.of(again, found) for wish in given])
-    single = len(axes) == len(given) == 1 and not given[0].sense
-    bound = search.bound() if outcome is Outcome.MET and single else np.nan
-    search.progress(1.0, "walks")
+    bound = search.bound() if outcome is Outcome.MET and search.is_root else np.nan
+    progress(1.0, "walks")
     engines = ("planar", "twin")[: 1 + twin]
     records = {name: run([bent(found, name, _duration(found, again))])[0] for name in engines}
     walks = {name: end_of_walk(record, found) for name, record in records.items()}
@@ -128,7 +128,7 @@ def _as_computed(end: xr.Dataset, robot: Robot, measured: Measured) -> bool:
         pairs = (end.axis_radius, measured.radius(robot)), (end.speed, measured.speed(robot))
     except ChilopodError:
         return not np.isfinite(end.axis_radius.item())
-    near = all(abs(float(walked) / computed - 1.0) <= WALKED for walked, computed in pairs)
+    near = all(abs(float(walked) / computed - 1.0) <= _AS_COMPUTED for walked, computed in pairs)
     return bool(is_curved(end)) and near
 
 

@@ -32,16 +32,13 @@ class Sizing(Summary, ReadOnlyArrays):
     robot, source
         The robot, with provenance that says what was computed and what was copied; name of that which it is made from.
     wishes, onset, values
-        Wishes, the number that bends the robot, and the values of the wished quantities, SI, shape (wishes,); NaN
-        without one.
+        Wishes, the number that bends the robot, and the wished quantities, SI, shape (wishes,), NaN without one.
     free, numbers, bound
-        Free numbers with their ranges, their values, SI, shape (numbers,), and the bound on the error of a root, NaN
-        for more than one number.
+        Ranges of the free numbers, their values, SI, shape (numbers,), and the bound on the error of a root, or NaN.
     outcome, reasons
         Outcome, and sentences about what stands in the way.
     front
-        Points of the Pareto front of two conflicting wishes: free numbers and then quantities, SI, shape (points,
-        numbers + wishes).
+        Pareto front of two conflicting wishes: free numbers, then quantities, SI, shape (points, numbers + wishes).
     walks
         Ends of a walk by the name of the engine, see :func:`chilopod.tasks.radius_law.end_of_walk`.
     evaluations
@@ -82,8 +79,7 @@ class Sizing(Summary, ReadOnlyArrays):
                 for wish, value in zip(self.wishes, self.values.tolist(), strict=True)
             ],
             "walks": {
-                name: {"status": str(end.status.item()), "direction": str(end.direction.item())}
-                for name, end in self.walks.items()
+                name: {key: str(end[key].item()) for key in ("status", "direction")} for name, end in self.walks.items()
             },
             "reasons": list(self.reasons),
             "front_si": [
@@ -104,12 +100,12 @@ class Sizing(Summary, ReadOnlyArrays):
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         cells: list[Sequence[str]] = [("", "range or wish", "found", *(f"{name} walk" for name in self.walks))]
-        none = [""] * len(self.walks)
         for each, value in zip(self.free, self.numbers.tolist(), strict=True):
-            low, high = (units.format(end, each.unit, digits=6) for end in (each.low, each.high))
-            found, error = units.format(value, each.unit, digits=6), units.from_si(self.bound, each.unit)
-            found = f"{bounded(units.from_si(value, each.unit), error)} {each.unit}" if np.isfinite(error) else found
-            cells.append((each.path, f"{low} to {high}", found, *none))
+            low, high, found = (units.format(number, each.unit, digits=6) for number in (each.low, each.high, value))
+            if np.isfinite(self.bound):
+                shown, error = (units.from_si(number, each.unit) for number in (value, self.bound))
+                found = f"{bounded(shown, error)} {each.unit}"
+            cells.append((each.path, f"{low} to {high}", found, *[""] * len(self.walks)))
         for wish, value in zip(self.wishes, self.values.tolist(), strict=True):
             wished = {0: "", -1: "at most ", 1: "at least "}[wish.sense] + self._shown(wish, wish.value)
             walked = (self._shown(wish, self._walked(wish, name)) for name in self.walks)
@@ -126,12 +122,13 @@ class Sizing(Summary, ReadOnlyArrays):
         """Draw the free numbers within their ranges; where wishes conflict, their Pareto front."""
         axes = axes_for(axes)
         if len(self.front):
-            pair = [len(self.free) + i for i in np.argsort(-np.ptp(self.front[:, len(self.free) :], axis=0))[:2]]
-            shown = [self.wishes[i - len(self.free)] for i in pair]
-            axes.plot(*self.front[:, pair].T, "o-")
-            axes.plot(*(wish.value for wish in shown), "x", color="C3", label="wish")
-            labels = [f"{w.quantity} ({QUANTITIES[w.quantity] or 'SI'})" for w in shown]
-            axes.set(xlabel=labels[0], ylabel=labels[1])
+            values = self.front[:, len(self.free) :]
+            pair = np.argsort(-np.ptp(values, axis=0))[:2]  # the two that conflict
+            wishes = [self.wishes[i] for i in pair]
+            axes.plot(*values[:, pair].T, "o-")
+            axes.plot(*(wish.value for wish in wishes), "x", color="C3", label="wish")
+            x, y = (f"{wish.quantity} ({QUANTITIES[wish.quantity] or 'SI'})" for wish in wishes)
+            axes.set(xlabel=x, ylabel=y)
             axes.legend()
         else:
             low, high = (np.array([getattr(each, name) for each in self.free]) for name in ("low", "high"))

@@ -1,5 +1,8 @@
 """Search for the free numbers at which a robot does what is wished.
 
+A place is a point of the unit cube of the free numbers. A robot's deviations there, one for each :class:`Wish`, are
+what all methods of the :class:`Search` ask for; it counts them and keeps the best place.
+
 One wish on one free number is a root, bracketed on a scan of the range and solved by Brent's method. More are a problem
 of least squares within the ranges (scipy's trust region), from the robot itself and from scattered starts. Robots that
 lack a quantity, as those that walk straight have no radius, stop these at a cliff; there the covariance matrix adapts
@@ -15,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from cmaes import CMA
@@ -86,8 +90,7 @@ class Wish:
             return FAILED
 
     def missed(self, searched: float) -> float:
-        """Size of the deviation that :meth:`searched` measures; infinite for the radius of a robot that walks
-        straight."""
+        """Size of the deviation that :meth:`searched` measures; infinite for a radius if the robot walks straight."""
         if self.quantity != "radius":
             return abs(searched)
         return abs(1.0 / np.sqrt(1.0 - searched) - 1.0) if searched < 1.0 else np.inf
@@ -131,12 +134,13 @@ class Search:
         self._measured, self._budget, self._limit, self._robots = Measured(onset), budget, budget, 0
         self.again = Measured(onset, similar=False)  # for the best place alone
         scattered = Sobol(len(axes), rng=np.random.default_rng(seed)).random(_STARTS)
-        own = [self._place(each) for each in axes]
+        own = [self._part(each) for each in axes]
         # The robot itself is the first start, so that of many answers one near it is found.
         self._starts = [np.clip(own, 0.01, 0.99), *scattered]
         self.best: Array = self._starts[0]
         self._least = np.full(len(wishes), np.inf)
         self._seen: list[Array] = []
+        self.is_root = len(axes) == len(wishes) == 1 and not wishes[0].sense
         self._changed = True  # by one number, if it alone is free
 
     @property
@@ -158,7 +162,8 @@ class Search:
             robot = each.change(robot, float(np.clip(value, each.low, each.high)))
         return robot
 
-    def _place(self, each: Axis) -> float:
+    def _part(self, each: Axis) -> float:
+        """Part of the range below the robot's own number."""
         own = self.robot.gait.speed if each.path == "speed" else self.robot.get(sorted(each.numbers(self.robot))[0])
         if each.low > 0.0:
             return float(np.log(max(own, each.low) / each.low) / np.log(each.high / each.low))
@@ -191,7 +196,7 @@ class Search:
     def run(self) -> Outcome:
         """Find the best place; what meets the wishes is computed anew without its neighbours, in ``again``."""
         outcome = self._searched()
-        if outcome is Outcome.MET and not self._met(self._found(self.best, self.again)):
+        if outcome is Outcome.MET and not _met(self._found(self.best, self.again)):
             # Onsets of neighbours have led to another bifurcation of the robot than its first.
             branches, self._measured = self._measured.branches, Measured(self._measured.number, similar=False)
             self._measured.branches, self._limit = branches, self.evaluations + self._budget
@@ -203,34 +208,27 @@ class Search:
         limit, unmet = self._limit, Outcome.BUDGET
         self._limit -= int(_EVOLVED * self._budget) if len(self.axes) > 1 else 0
         with suppress(_SpentError):
-            if len(self.axes) == len(self.wishes) == 1 and not self.wishes[0].sense:
+            if self.is_root:
                 self._root()
             for start in self._starts:
-                if not self._met(self._least):
+                if not _met(self._least):
                     self._fit(start)
             unmet = Outcome.UNMET
         self._limit = limit
-        if len(self.axes) > 1 and not self._met(self._least) and not np.isfinite(self._lengths()).all():
+        cliff = any(FAILED in found or not np.isfinite(self._missed(found)).all() for found in self._seen)
+        if len(self.axes) > 1 and not _met(self._least) and cliff:
             with suppress(_SpentError):
                 self._evolve()
-        return Outcome.MET if self._met(self._least) else unmet
-
-    def _lengths(self) -> Array:
-        """Sizes of the deviations of all robots so far, shape (robots,); infinite for those without a quantity."""
-        return np.array([np.inf if FAILED in found else float(norm(self._missed(found))) for found in self._seen])
+        return Outcome.MET if _met(self._least) else unmet
 
     def _evolve(self) -> None:
         """Search round the best place by evolution, which no cliff stops."""
         ends = np.tile([0.0, 1.0], (len(self.axes), 1))
         found = CMA(np.clip(self.best, _AT_END, 1.0 - _AT_END), _ROUND, bounds=ends, seed=self._seed)
-        while not (found.should_stop() or self._met(self._least)):
+        while not (found.should_stop() or _met(self._least)):
             places = [found.ask() for _ in range(found.population_size)]
             missed = [float(norm(self._missed(self.deviations(place)))) for place in places]
             found.tell([(place, min(each, _FAR)) for place, each in zip(places, missed, strict=True)])
-
-    @staticmethod
-    def _met(deviations: Array) -> bool:
-        return bool(np.abs(deviations).max(initial=0.0) <= _MET)
 
     def _root(self) -> None:
         """Root of one deviation over one number, that which is nearest to the robot's own value."""
@@ -251,7 +249,7 @@ class Search:
 
         for i in sorted(brackets, key=lambda i: abs(grid[i : i + 2].mean() - own)):
             brentq(deviation, float(grid[i]), float(grid[i + 1]), xtol=1e-15, rtol=1e-15)
-            if self._met(self._least):
+            if _met(self._least):
                 return
         self._starts.insert(0, np.clip(self.best, _AT_END, 1.0 - _AT_END))
 
@@ -287,8 +285,24 @@ class Search:
         if outcome is Outcome.MET:
             return [] if self._changed else [_unchanged(self.wishes[0])], []
         self._limit = self.evaluations + self._budget
-        said, best, least = [], self.best, self._least
-        for each, part, value in zip(self.axes, best.tolist(), self.numbers(best).tolist(), strict=True):
+        said, best, least = self._obstacles(), self.best, self._least
+        front: list[Array] = []
+        try:
+            if len(self.wishes) > 1:
+                left_out = [self._left_out(i, best) for i in range(len(self.wishes))]
+                alone = [i for i, (_, found) in enumerate(left_out) if _met(np.delete(found, i))]
+                said += [f"without the wish for {self.wishes[i].quantity} the others are met" for i in alone]
+                ranked = np.argsort(-self._missed(least), kind="stable").tolist()
+                front = self._front([*dict.fromkeys([*alone, *ranked])][:2], left_out, best)
+        except _SpentError:
+            said.append("the evaluations were spent before it was known which wishes conflict")
+        self.best, self._least = best, least
+        return said or ["no end of a range and no other wish stands in the way: the search saw none nearer"], front
+
+    def _obstacles(self) -> list[str]:
+        """Sentences about ends of ranges at the best place, and about wishes that nothing changes."""
+        said = []
+        for each, part, value in zip(self.axes, self.best.tolist(), self.numbers(self.best).tolist(), strict=True):
             if min(part, 1.0 - part) < _AT_END:
                 end = "lower" if part < 0.5 else "upper"
                 said.append(f"{each.path} is at the {end} end of its range, {units.format(value, each.unit, digits=6)}")
@@ -297,19 +311,8 @@ class Search:
             if values.size and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
                 said.append(_unchanged(wish))
             if wish.quantity == "radius":
-                said += self._without_walks(self.at(best))
-        front: list[Array] = []
-        try:
-            if len(self.wishes) > 1:
-                left_out = [self._left_out(i, best) for i in range(len(self.wishes))]
-                alone = [i for i, (_, found) in enumerate(left_out) if self._met(np.delete(found, i))]
-                said += [f"without the wish for {self.wishes[i].quantity} the others are met" for i in alone]
-                ranked = np.argsort(-self._missed(least), kind="stable").tolist()
-                front = self._front([*dict.fromkeys([*alone, *ranked])][:2], left_out, best)
-        except _SpentError:
-            said.append("the evaluations were spent before it was known which wishes conflict")
-        self.best, self._least = best, least
-        return said or ["no end of a range and no other wish stands in the way: the search saw none nearer"], front
+                said += self._without_walks(self.at(self.best))
+        return said
 
     def _without_walks(self, robot: Robot) -> list[str]:
         """A sentence if no curved walk is searched at a robot because of the kind of its onset."""
@@ -337,14 +340,18 @@ class Search:
             weights[pair] = np.sqrt([1.0 - share, share]) / largest
             found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights))
         missed = [self._missed(deviations) for _, deviations in found]
-        kept = [
-            place
-            for (place, _), own in zip(found, missed, strict=True)
-            if (own < _FAR).all() and not any((other[pair] < own[pair] - _MET).all() for other in missed)
-        ]
+
+        def surpassed(own: Array) -> bool:
+            return any((other[pair] < own[pair] - _MET).all() for other in missed)
+
+        kept = [f[0] for f, own in zip(found, missed, strict=True) if (own < _FAR).all() and not surpassed(own)]
         ordered = sorted(kept, key=lambda place: tuple(place.tolist()))
-        pairs = zip([None, *ordered], ordered, strict=False)
-        return [place for last, place in pairs if last is None or np.abs(place - last).max() > _AT_END]
+        # No place twice.
+        return ordered[:1] + [place for last, place in pairwise(ordered) if np.abs(place - last).max() > _AT_END]
+
+
+def _met(deviations: Array) -> bool:
+    return bool(np.abs(deviations).max(initial=0.0) <= _MET)
 
 
 def _unchanged(wish: Wish) -> str:
