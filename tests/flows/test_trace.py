@@ -220,6 +220,32 @@ def test_a_family_is_traced_once():
     assert evaluate(again.tape, again.tape.slopes, 0.0, np.array([1.0, 0.0]), again.params).tolist() == [0.0, 1.0]
 
 
+def test_whole_powers_are_smooth_at_zero_whatever_gives_the_exponent():
+    def hill(t, x, n, b):
+        return [b / (1.0 + x[0] ** n) + x[0] ** (n - 1)]
+
+    for n, b in ((4.0, 2.0), (4.0, 3.0), (2.5, 3.0), (np.float64(4.0), 2.0)):
+        traced = trace(hill, 1, (n, b))
+        value, slope = evaluate_jacobian(traced.tape, 0.0, np.array([1.5]), traced.params)
+        assert value[0] == pytest.approx(b / (1.0 + 1.5**n) + 1.5 ** (n - 1), rel=1e-14)
+        assert slope[0, 0] == pytest.approx((n - 1) * 1.5 ** (n - 2) - b * n * 1.5 ** (n - 1) / (1 + 1.5**n) ** 2)
+    assert trace(hill, 1, (4.0, 3.0)).tape is trace(hill, 1, (4.0, 2.0)).tape  # once for all other numbers
+    assert trace(hill, 1, (2.5, 3.0)).tape is not traced.tape
+    value, slope = evaluate_jacobian(traced.tape, 0.0, np.zeros(1), traced.params)
+    assert (value[0], slope[0, 0]) == (2.0, 0.0)
+
+
+@pytest.mark.parametrize("kind", [float, np.float64, "float64"])
+def test_arrays_of_floats_are_made_by_any_name_of_their_type(kind):
+    def rhs(t, x):
+        out = np.array([0, 1], dtype=kind)
+        out[0] += x[0]
+        return out + np.zeros(2, kind) + np.asarray(x, dtype=kind) + np.zeros_like(x, dtype=kind)
+
+    traced = trace(rhs, 2)
+    assert evaluate(traced.tape, traced.tape.slopes, 0.0, np.array([3.0, 5.0]), traced.params).tolist() == [6.0, 6.0]
+
+
 def test_changed_globals_and_whole_numbers_are_seen():
     box = {"k": 1.0, "n": 2}
     code = compile("def rhs(t, x): return [-k * x[0] ** n]", "<test>", "exec")

@@ -252,7 +252,7 @@ class Search:
         coefficients = [self._coefficient(each, each.values[order]) for each in curve.points]
         errors = np.array([each.error_bound for each in curve.points])[:, order]
         self.curves.append(MapCurve(curve.kind, curve.values[:, order], errors, np.array(coefficients), special))
-        for ending in set(curve.endings) & _CUT_OFF:
+        for ending in dict.fromkeys(each for each in curve.endings if each in _CUT_OFF):
             self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {ending.sentence}")
 
     def _coefficient(self, point: BifurcationPoint | Point2, place: Array) -> float:

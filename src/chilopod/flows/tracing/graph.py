@@ -46,6 +46,14 @@ FUNCTIONS = {
 LEAVES = {ops.STATE: ops.MOVING, ops.TIME: ops.TIMED, ops.PARAMETER: ops.CONSTANT, ops.NUMBER: ops.CONSTANT}
 
 
+class NeedsValues(Exception):
+    """The operations depend on the values of some parameters, whose numbers are given."""
+
+    def __init__(self, parameters: set[int]) -> None:
+        super().__init__()
+        self.parameters = parameters
+
+
 class Graph:
     """Operations under construction; nodes are numbered in order of creation."""
 
@@ -158,8 +166,10 @@ class Graph:
         """a to the power of another node."""
         number = self.value(exponent)
         if number is None:
-            if self.depends[exponent] == ops.CONSTANT:
+            if self.depends[exponent] == self.depends[a] == ops.CONSTANT:
                 return self._general_power(a, exponent)
+            if self.depends[exponent] == ops.CONSTANT:  # a whole power is smooth at zero, others are not
+                raise NeedsValues(self._parameters_of(exponent))
             return self.function(ops.EXP, self.multiply(exponent, self.function(ops.LOG, a)))
         if number == 0.0:
             return self.number(1.0)
@@ -178,6 +188,13 @@ class Graph:
                 a = self.multiply(a, a)
         assert result is not None
         return result
+
+    def _parameters_of(self, node: int) -> set[int]:
+        """Numbers of the parameters that a constant depends on."""
+        code, operands = self.nodes[node]
+        if code == ops.PARAMETER:
+            return {operands[0]}
+        return set() if code in LEAVES else set().union(*map(self._parameters_of, operands))
 
     def _general_power(self, a: int, exponent: int) -> int:
         va, ve = self.value(a), self.value(exponent)

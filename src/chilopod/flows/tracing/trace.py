@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import as_real
-from chilopod.flows.tracing.graph import Graph
+from chilopod.flows.tracing.graph import Graph, NeedsValues
 from chilopod.flows.tracing.ordering import ordered
 from chilopod.flows.tracing.tape import FLOOR, GUARD, Integers, Tape
 from chilopod.flows.tracing.traced import Traced, Untraceable, as_traced, node_of, stand_in, states
@@ -51,7 +51,11 @@ class Trace:
     derived: dict[Any, Any]  # cache of results that depend on the tape alone
 
 
-_KEPT: weakref.WeakKeyDictionary[types.CodeType, dict[Any, tuple[Tape, dict[Any, Any]]]] = weakref.WeakKeyDictionary()
+_Fixed = tuple[int, ...]
+"""Numbers of the floats whose values the operations depend on."""
+_Tapes = dict[tuple[float, ...], tuple[Tape, dict[Any, Any]]]
+"""Tapes of a description by the values of these floats, and results derived from each."""
+_KEPT: weakref.WeakKeyDictionary[types.CodeType, dict[Any, tuple[_Fixed, _Tapes]]] = weakref.WeakKeyDictionary()
 
 
 def trace(
@@ -66,8 +70,9 @@ def trace(
     """Record the operations of a right-hand side, once for all values of its floats.
 
     Floats in ``args``, alone or in arrays, tuples and lists, are parameters of the tape, or numbers if the function
-    needs their values, as in a branch. ``events`` are pairs of a guard and a reset or None; the tape is compared with
-    the function around a state ``base``. Raises Untraceable if it is no fixed sequence of known operations.
+    needs their values, as in a branch or for an exponent. ``events`` are pairs of a guard and a reset or None; the tape
+    is compared with the function around a state ``base``. Raises Untraceable if it is no fixed sequence of known
+    operations.
     """
     functions = (rhs, *(part for event in events for part in event))
     floats: list[float] = []
@@ -76,28 +81,45 @@ def trace(
     try:
         key: Any = (dimension, describe(functions, floats, seen), describe(args, floats, seen))
         kept = {} if code is None else _KEPT.setdefault(code, {})
-        known = kept.get(key) or kept.get((key, *floats))
+        fixed, tapes = kept.get(key, ((), {}))
     except (Opaque, TypeError, ValueError):  # not hashable, an empty cell
-        key, floats, kept, known = None, [], {}, None
+        key, floats, kept, fixed, tapes = None, [], {}, (), {}
+    known = tapes.get(tuple([floats[i] for i in fixed]))
     if known is None:
-        try:
-            tape = _traced(functions, dimension, args, len(floats))
-        except Untraceable:
-            if not floats:
-                raise
-            tape = _traced(functions, dimension, args, 0)
+        tape, fixed = _traced(functions, dimension, args, floats, fixed)
         _verify(tape, np.array(floats[: tape.parameters]), functions, args, times, base)
-        if len(kept) >= _MOST_KEPT:
-            kept.clear()
-        known = kept[key if tape.parameters else (key, *floats)] = tape, {}
+        for full in (kept, tapes):
+            if len(full) >= _MOST_KEPT:
+                full.clear()
+        kept[key] = fixed, tapes
+        known = tapes[tuple([floats[i] for i in fixed])] = tape, {}
     tape, derived = known
     return Trace(tape, np.array(floats[: tape.parameters]), derived)
 
 
-def _traced(functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], floats: int) -> Tape:
-    """The tape, with a number of floats as parameters, or none."""
-    graph = Graph(dimension, floats)
-    source = iter([Traced(graph, node) for node in graph.parameters]) if floats else None
+def _traced(
+    functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], floats: list[float], fixed: _Fixed
+) -> tuple[Tape, _Fixed]:
+    """The tape, with some floats fixed to their values, and the rest as parameters; more are fixed where needed."""
+    every = tuple(range(len(floats)))
+    while True:
+        try:
+            return _recorded(functions, dimension, args, floats, fixed), fixed
+        except NeedsValues as needed:
+            fixed = tuple(sorted({*fixed, *needed.parameters}))
+        except Untraceable:
+            if fixed == every:
+                raise
+            fixed = every
+
+
+def _recorded(
+    functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], floats: list[float], fixed: _Fixed
+) -> Tape:
+    graph = Graph(dimension, 0 if len(fixed) == len(floats) else len(floats))
+    source = None
+    if graph.parameters:
+        source = iter([floats[i] if i in fixed else Traced(graph, node) for i, node in enumerate(graph.parameters)])
     try:
         seen: dict[int, Any] = {}
         rhs, *event_functions = rebuild(functions, source, seen)
@@ -106,7 +128,7 @@ def _traced(functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], f
         guards = [results(guard, None)[0] for guard in event_functions[::2]]
         resets = [graph.states if reset is None else results(reset, dimension) for reset in event_functions[1::2]]
         return ordered(graph, slopes, guards, resets)
-    except Untraceable:
+    except (NeedsValues, Untraceable):
         raise
     except RecursionError:
         raise Untraceable("it is too deeply nested") from None

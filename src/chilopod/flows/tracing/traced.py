@@ -263,12 +263,14 @@ def _array(value: Any, *args: Any, **options: Any) -> Any:
     """Traced copies of float arrays, which may be written into later; arrays of whole numbers are indices."""
     if _has_traced(value):
         return as_traced(value).copy()
-    result = np.array(value, *args, **{key: part for key, part in options.items() if key != "like"})
+    args, options = _typed(args, {key: part for key, part in options.items() if key != "like"})
+    result = np.array(value, *args, **options)
     return as_traced(result) if result.dtype.kind == "f" and result.ndim == 1 else result
 
 
 def _blank(make: Callable[..., Any]) -> Callable[..., Any]:
     def shaped(*args: Any, **options: Any) -> Any:
+        args, options = _typed(args, options)
         if any(_has_traced(value) for value in args[1:]) or _has_traced(options.get("fill_value")):
             shape, value = args[0], options.get("fill_value", args[1] if len(args) > 1 else 0.0)
             result = np.empty(np.shape(shape) if make is np.full_like else shape, dtype=object)
@@ -280,6 +282,23 @@ def _blank(make: Callable[..., Any]) -> Callable[..., Any]:
         return as_traced(result) if result.dtype.kind == "f" else result
 
     return shaped
+
+
+def _typed(args: tuple[Any, ...], options: dict[str, Any]) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Arguments with the type of floats in place of its stand-ins."""
+
+    def real(value: Any) -> Any:
+        return builtins.float if value is _float or value is _float64 else value
+
+    return tuple(map(real, args)), {key: real(value) for key, value in options.items()}
+
+
+def _float(value: Any = 0.0) -> Any:
+    return value if isinstance(value, Traced) else float(value)
+
+
+def _float64(value: Any = 0.0) -> Any:
+    return value if _has_traced(value) else np.float64(value)
 
 
 def _means_object(value: Any) -> bool:
@@ -344,8 +363,8 @@ def _instead() -> dict[int, Any]:
         (np.full, _blank(np.full)),
         (np.eye, lambda *a, **o: as_traced(np.eye(*a, **o))),
         (np.identity, lambda *a, **o: as_traced(np.identity(*a, **o))),
-        (np.float64, lambda value=0.0: value if _has_traced(value) else np.float64(value)),
-        (builtins.float, lambda value=0.0: value if isinstance(value, Traced) else float(value)),
+        (np.float64, _float64),
+        (builtins.float, _float),
         (builtins.max, _most(builtins.max, np.maximum)),
         (builtins.min, _most(builtins.min, np.minimum)),
         (math.fsum, lambda values: sum(values)),

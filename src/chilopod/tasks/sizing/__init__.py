@@ -144,5 +144,5 @@ def _documented(
     for each in axes:
         low, high = (units.format(end, each.unit, digits=6) for end in (each.low, each.high))
         origin = f"computed: chilopod size, {', '.join(said)}, {each.path} within {low} to {high}; {outcome.label}"
-        texts |= dict.fromkeys(each.numbers(robot), origin)
+        texts |= dict.fromkeys(sorted(each.numbers(robot)), origin)
     return found.with_(name="sized", provenance=texts)
