@@ -39,6 +39,8 @@ class Fate(Labelled):
 
 
 FATES = tuple(Fate)
+NEAR = "bound where a multiplier lies within 1e-4 of the unit circle; elsewhere NaN, and the sign is certain"
+"""Meaning of the error of a growth rate."""
 _FAILED = np.array([np.nan, np.nan, np.nan, -1, FATES.index(Fate.FAILED)])  # column of a computation that failed
 
 

@@ -130,9 +130,11 @@ def _invalid(grid: Grid) -> list[str]:
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
-    """Say how long a long map will take, from the time of its corners; refuse hours whose growth rates are not kept."""
-    corners = grid.robots(grid.x[[0, -1]].tolist(), grid.y[[-1, 0]].tolist())
-    robots = [robot for robot in corners if isinstance(robot, Robot)]
+    """Say how long a long map will take, from robots in the middles of nine equal parts; refuse hours whose growth rates
+    are not kept."""
+    y, x = (values[np.array([1, 3, 5]) * values.size // 6] for values in (grid.y, grid.x))
+    places = grid.robots(np.tile(x, 3).tolist(), np.repeat(y, 3).tolist())
+    robots = [robot for robot in places if isinstance(robot, Robot)]
     growth_rates([grid.plane.robot.with_value("body.modules", 2)], 1)  # compiles
     for _ in range(2):  # the first call prepares what all others share
         begun = time.perf_counter()
@@ -141,7 +143,8 @@ def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool
         if each > 1.0:
             break
     rows, columns = (size // step for size, step in zip(grid.computed.shape, grid.step, strict=True))
-    rates = rows * columns + 10 * sum(grid.computed.shape) + 2 * _CURVE_RATES - grid.computed.sum()
+    curves = 0 if grid.plane.x.whole or grid.plane.y.whole else 2
+    rates = rows * columns + 10 * sum(grid.computed.shape) + curves * _CURVE_RATES - grid.computed.sum()
     if each * rates > _LONG:
         hours = each * rates / 3600.0
         said = f"{hours:.2g} hours" if hours > 1.0 else f"{60.0 * hours:.2g} minutes"

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod.analysis.growth import FATES, Fate
+from chilopod.analysis.growth import FATES, NEAR, Fate
 from chilopod.analysis.map_axes import Axis
 from chilopod.analysis.map_curves import MapCurve, MapPoint
 from chilopod.frozen import Array, ReadOnlyArrays, read_only
@@ -38,7 +38,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
     x_values, y_values
         Values in SI units, shape (columns,) and (rows,).
     growth, frequency, error, unstable, fate
-        Growth rate of the leading disturbance (1/s), its angular frequency (rad/s), and what becomes of it, as of
+        Growth rate of the leading disturbance (1/s), its angular frequency (rad/s), the bound on the error of a growth
+        rate near zero (1/s, else NaN), the number of unstable multipliers, and what becomes of the disturbance, as of
         :class:`chilopod.analysis.growth.Growth`, shape (rows, columns).
     computed
         True where they were computed, shape (rows, columns); elsewhere growth and frequency are interpolated.
@@ -166,7 +167,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
         found: dict[str, Any] = {
             "growth": (grid, self.growth, {"units": "1/s"}),
             "frequency": (grid, self.frequency, {"units": "rad/s"}),
-            "growth_error": (grid, self.error, {"units": "1/s"}),
+            "growth_error": (grid, self.error, {"units": "1/s", "meaning": NEAR}),
             "unstable": (grid, self.unstable),
             "fate": (grid, self.fate, {"meaning": meanings}),
             "computed": (grid, self.computed),
