@@ -146,6 +146,8 @@ def test_what_is_not_known_is_refused():
         sensitivity(ROBOT, Onset(between=(stiffness(20.0), stiffness(75.0))))
     with pytest.raises(AnalysisError, match="unstable at both ends"):
         sensitivity(ROBOT, Onset(between=(stiffness(2.0), stiffness(9.0))))
+    with pytest.raises(AnalysisError, match="more than a right angle"):  # engines end that walk
+        sensitivity(ROBOT, Onset(at=stiffness(3.0)), ("radius",), ["body.mass"])
     for wrong in ((), "onset"):
         with pytest.raises(ParameterError, match="must be names"):
             sensitivity(ROBOT, quantities=wrong)

@@ -130,8 +130,8 @@ def _invalid(grid: Grid) -> list[str]:
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
-    """Say how long a long map will take, from robots in the middles of nine equal parts; refuse hours whose growth rates
-    are not kept."""
+    """Say how long a long map will take, from robots in the middles of nine equal parts; refuse one of many hours whose
+    growth rates are not kept."""
     y, x = (values[np.array([1, 3, 5]) * values.size // 6] for values in (grid.y, grid.x))
     places = grid.robots(np.tile(x, 3).tolist(), np.repeat(y, 3).tolist())
     robots = [robot for robot in places if isinstance(robot, Robot)]
@@ -181,9 +181,10 @@ def _radii(grid: Grid, bending: Onset | None, progress: Progress) -> tuple[Array
         progress(done / len(nodes), f"{done} radii")
         with suppress(ChilopodError):
             if measured.branches < _BRANCHES:
-                found[j, i] = measured.radius(grid.plane.at(float(grid.x[i]), float(grid.y[j])))
+                found[j, i] = measured.walked("radius", grid.plane.at(float(grid.x[i]), float(grid.y[j])))
     lost = len(nodes) - int(np.isfinite(found).sum())
-    return found, [f"{lost} of {len(nodes)} radii are not found"] if lost else []
+    said = f"{lost} of {len(nodes)} radii are not found, or of walks that bend a joint by more than a right angle"
+    return found, [said] if lost else []
 
 
 def _key(plane: Plane) -> str:

@@ -23,6 +23,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Array, ComplexArray
 from chilopod.planar import PlanarModel
 from chilopod.planar.along import WalkMeans, walk_means
+from chilopod.planar.stretch import MOST_BENT
 from chilopod.robot import Robot
 from chilopod.robot.parameters import place_of
 from chilopod.stability import find_orbit
@@ -42,6 +43,8 @@ QUANTITIES = {
     "settling": "s", "margin": "", "friction": "", "work": "J",
 }  # fmt: skip
 """Units by the name of the quantity, a method of :class:`Measured`; that of the onset is that of its number."""
+
+_OF_WALKS = {"radius", "speed", "settling", "work"}  # curved ones
 
 
 class Mode(NamedTuple):
@@ -165,7 +168,14 @@ class Measured:
 
     def function(self, name: str) -> Callable[[Robot], float]:
         """A quantity as a function of a robot, at the value of the number at which walks are studied."""
-        return lambda robot: float(getattr(self, name)(self.number.there(robot)))
+        return lambda robot: self.walked(name, self.number.there(robot))
+
+    def walked(self, name: str, robot: Robot) -> float:
+        """A quantity of a robot; AnalysisError also where it is one of a curved walk at which engines end."""
+        value = float(getattr(self, name)(robot))
+        if name in _OF_WALKS and self.growth(robot) > 0.0 and self.most_bent(robot) > MOST_BENT:
+            raise AnalysisError("the curved walk bends a joint by more than a right angle", field=name)
+        return value
 
     def onset(self, robot: Robot) -> float:
         """Critical value of the number."""

@@ -276,7 +276,7 @@ def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) ->
 
 
 def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
-    function = getattr(Measured(onset), name)
+    function = partial(Measured(onset).walked, name)
     value, round_off = function(robot), _round_off(name, robot, onset)
 
     def slope(path: str) -> tuple[Any, Any]:

@@ -57,7 +57,7 @@ def test_a_radius_at_which_the_robot_folds_up_is_left_out(found, monkeypatch):
     monkeypatch.setattr("chilopod.analysis.quantities.Measured.most_bent", lambda self, robot: 1.6)
     ranked = next_measurements(found, chosen)
     assert not ranked.rows
-    assert "must not fold up" in ranked.left_out[chosen[0].name]
+    assert "more than a right angle" in ranked.left_out[chosen[0].name]
 
 
 def test_measurements_of_known_effect(found):

@@ -202,12 +202,5 @@ def _rate(spring: float, robot: Robot) -> Array:
 
 
 def _radius(spring: float, above: float) -> Callable[[Robot], Array]:
-    measured = Measured(Onset(K1, (spring, above), spring))
-    radius, most_bent = measured.function("radius"), measured.function("most_bent")
-
-    def of(robot: Robot) -> Array:
-        if most_bent(robot) > 0.5 * np.pi:
-            raise AnalysisError("the robot must not fold up: a joint bends by more than 90 deg")
-        return np.array([radius(robot)])
-
-    return of
+    radius = Measured(Onset(K1, (spring, above), spring)).function("radius")
+    return lambda robot: np.array([radius(robot)])
