@@ -58,6 +58,8 @@ def test_locate_finds_it(name, start, end):
     assert found.complete
     (point,) = found
     is_fold(point, -fold)
+    assert found.ending == f"the orbit ends in a fold at {point.value:.9g}"
+    assert found.ending not in found.remarks
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -68,7 +70,7 @@ def test_there_is_none_just_before_it(name):
             lambda minus: family(-minus), (-fold - 1.0, -fold - end), orbit=orbit(fold + 1.0), normal_form=False
         )
         assert found.complete
-        assert len(found) == 0
+        assert (len(found), found.ending) == (0, "")
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -78,6 +80,7 @@ def test_an_orbit_that_begins_in_it(name):
     assert found.complete
     (point,) = found
     is_fold(point, fold)
+    assert found.ending == ""
 
 
 @pytest.mark.parametrize(("name", "start", "end"), CASES)

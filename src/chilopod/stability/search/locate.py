@@ -69,7 +69,7 @@ class Located(Result, Sequence[BifurcationPoint]):
         Number of orbits computed.
     searched, spacing, ending
         Interval in which the orbit was followed and searched, largest distance of neighbouring orbits in it, and the
-        reason for an early end, also the first remark. Between two orbits the multipliers are interpolated: what they
+        reason for an early end: a fold, or the first remark. Between two orbits the multipliers are interpolated: what they
         do within less than the spacing alone may be missed.
     dimension
         Number of states.
@@ -190,7 +190,7 @@ def locate(
     except (SpentError, AnalysisError) as error:
         ending = f"{error.problem} before the orbit was followed beyond {at:.9g}"
         status = SearchStatus.BUDGET if isinstance(error, SpentError) else SearchStatus.INCOMPLETE
-        rest = replace(found, points=(), status=status, evaluations=0, ending=ending)
+        rest = replace(found, points=(), status=status, evaluations=0, ending=ending, remarks=(ending,))
     return joined([found, replace(rest, remarks=(MOVED.format(at), *rest.remarks))])
 
 
@@ -202,9 +202,10 @@ def joined(pieces: Sequence[Located]) -> Located:
         apart = [[b.value - a.value > min(near, a.error_bound + b.error_bound) for a in points] for b in each]
         points += itertools.compress(each, map(all, apart))
     status = SearchStatus.COMPLETE.worst(*(each.status for each in pieces))
-    remarks = [pieces[-1].ending] + [remark for each in pieces for remark in each.remarks]
+    last = [remark for remark in pieces[-1].remarks if remark == pieces[-1].ending]
+    remarks = last + [remark for each in pieces for remark in each.remarks]
     about = searched, max(each.spacing for each in pieces), pieces[-1].ending, pieces[-1].dimension
-    shown, evaluations = tuple(dict.fromkeys(filter(None, remarks))), sum(each.evaluations for each in pieces)
+    shown, evaluations = tuple(dict.fromkeys(remarks)), sum(each.evaluations for each in pieces)
     return Located(tuple(points), status, shown, evaluations, *about)
 
 
@@ -251,7 +252,10 @@ def located(
     remarks += [each for each in results if isinstance(each, str)] + samples.family.remarks
     searched_part = here.start, max(here.start, here.end)
     spacing = float(np.diff([here.start, *samples.within(*searched_part), searched_part[1]]).max())
-    about = searched_part, spacing, here.ending, samples.family.dimension
+    ending = here.ending
+    if not ending and here.folds and here.folds[-1].value >= here.end:
+        ending = f"the orbit ends in a fold at {here.folds[-1].value:.9g}"
+    about = searched_part, spacing, ending, samples.family.dimension
     return Located(tuple(points), status, tuple(dict.fromkeys(remarks)), samples.count, *about)
 
 
