@@ -222,9 +222,9 @@ def from_rhs(
         if len(_STATED) >= _MOST_STATED:
             _STATED.clear()
         _STATED[key] = stated
-    slopes, members = stated.given.flows(rhs, args)
+    slopes, members = stated.given.flows(rhs, args, stated.claims[0])
     if period is None:
-        members["velocity"] = lambda x: slopes(np.zeros(1), x[:, None])[:, 0]
+        members.setdefault("velocity", lambda x: slopes(np.zeros(1), x[:, None])[:, 0])
     found, first = slopes(stated.times, stated.states), 0
     try:
         for claim in stated.claims:
