@@ -190,11 +190,12 @@ def from_rhs(
     rhs
         Function ``rhs(t, x, *args)`` -> dx/dt, shape (n,); T-periodic in t.
     dimension, period
-        Number of states n, and T; None if ``rhs`` does not depend on t and the period belongs to the orbit.
+        Number of states n, and T; None if nothing depends on t and the period belongs to the orbit.
     args
         Parameters of the right-hand side.
     events
-        Events at which the state jumps, or ``rhs`` switches, on reaching a surface, of functions that can be traced.
+        Events at which the state jumps, or ``rhs`` switches, on reaching a surface, of T-periodic functions that can be
+        traced.
     switch_times
         Times in [0, T) at which ``rhs`` jumps or has a kink. A traced function needs none; others are evaluated
         strictly inside each interval, and undeclared jumps cost time and digits.
