@@ -113,3 +113,42 @@ def test_a_guard_that_jumps_through_zero_is_refused(guard, direction):
     system = from_rhs(lambda t, x: [x[1], -0.1 * x[1] - x[0] + np.cos(2.0 * t + 1.0)], 2, np.pi, events=[event])
     with pytest.raises(AnalysisError, match=r"a guard jumps through zero at t = .*allowed: guards that pass zero cont"):
         system.flow(np.array([-0.79, 2.97]), 0.0, np.pi)
+
+
+def raised(x):
+    return [x[0] + 1.0]
+
+
+@pytest.mark.parametrize(
+    ("period", "guard", "reset", "direction", "said"),
+    [
+        (1.0, lambda t, x: np.sin(math.pi * (t - 0.3) / 1.5), lambda t, x: raised(x), 1, "period = 1.0: .*guard"),
+        (1.0, lambda t, x: np.sin(math.pi * t), None, 1, "period = 1.0: .*guard"),  # rises every other period
+        (1.0, lambda t, x: x[0] - 1.0 + 0.1 * np.sin(t), None, 0, "period = 1.0: .*guard"),
+        (1.0, lambda t, x: t - 0.3, None, 0, "period = 1.0: .*guard"),
+        (1.0, lambda t, x: x[0] - 0.1, lambda t, x: [1.0 + 0.2 * np.sin(math.pi * t)], -1, "period = 1.0: .*reset"),
+        (None, lambda t, x: x[0] - 0.1 + 0.1 * np.sin(t), lambda t, x: [1.0], 0, r"given; .*\[0\].guard depends on t"),
+        (None, lambda t, x: np.exp(-t) * (x[0] - 0.1), lambda t, x: [1.0], -1, r"given; .*\[0\].guard depends on t"),
+        (None, lambda t, x: x[0] - 0.1, lambda t, x: [1.0 + 0.1 * t], -1, r"given; .*\[0\].reset depends on t"),
+    ],
+)
+def test_events_without_the_period_are_refused(period, guard, reset, direction, said):
+    """Orbits that do not repeat came out as stable."""
+    with pytest.raises(ParameterError, match=said):
+        from_rhs(lambda t, x: [-x[0]], 1, period, events=[Event(guard, reset, direction)], guess_period=1.0)
+
+
+@pytest.mark.parametrize(
+    ("guard", "direction"),
+    [
+        (lambda t, x: np.cos(2.0 * math.pi * t), 1),
+        (lambda t, x: np.cos(math.pi * t), 0),  # passes zero once a period, in turn rising and falling
+        (lambda t, x: np.exp(-t) * (x[0] - 1.0), 1),
+        (lambda t, x: np.cos(math.pi * t) * (x[0] - np.sin(2.0 * math.pi * t)), 0),
+        (lambda t, x: t % 1.0 - 0.3, 1),
+    ],
+)
+def test_guards_up_to_a_factor(guard, direction):
+    """A factor leaves the events as they are, a negative one if both directions count."""
+    event = Event(guard, lambda t, x: raised(x), direction)
+    assert from_rhs(lambda t, x: [-x[0]], 1, 1.0, events=[event]).dimension == 1

@@ -1,5 +1,6 @@
 """Hybrid systems with known answers: impacts, contacts, walking, and motions that cannot go on."""
 
+import itertools
 import math
 
 import numpy as np
@@ -368,6 +369,30 @@ def test_stick_and_slip():
     excess = static - kinetic
     assert found.period == pytest.approx(math.pi + 2.0 * math.atan(belt / excess) + 2.0 * excess / belt, rel=1e-13)
     assert np.abs(found.values).max() <= max(found.error_bound, 1e-15) < 1e-9
+
+
+# A neuron with a refractory clock, x[1], that is started at a spike and then stays at zero
+
+
+def refractory(t, x):
+    return [np.where(x[1] > 0.0, 0.0, 1.2 - x[0]), np.where(x[1] > 0.0, -1.0, 0.0)]
+
+
+@pytest.mark.parametrize("guess", [[0.2, 0.0], [0.5, 0.0], [0.0, 0.4]])
+def test_an_orbit_along_a_switching_surface(guess):
+    """The velocity on the surface is that with which the motion goes on; a spike forgets the state."""
+    spike = Event(lambda t, x: x[0] - 1.0, lambda t, x: [0.0, 0.5], 1)
+    found = multipliers(from_rhs(refractory, 2, None, events=[spike], guess_period=2.2), guess)
+    assert found.period == pytest.approx(math.log(6.0) + 0.5, rel=1e-13)
+    assert_multipliers(found, [0.0])
+    assert found.stable
+
+
+def test_a_state_at_rest_on_a_switching_surface_is_no_orbit():
+    """Without spikes the neuron comes to rest at 1.2."""
+    for guess_period, state in itertools.product((2.3, 0.1), ([0.3, 0.0], [1.2, 0.0], [1.2, 1e-15])):
+        said = refusal(refractory, 2, None, guess_period=guess_period, state=np.array(state))
+        assert "equilibrium" in said or "does not come back" in said
 
 
 def refusal(*arguments, state, **options):

@@ -140,7 +140,7 @@ Slopes = Callable[[Array, Array], Array]
 
 
 _CLAIMS = {
-    "timeless": ("must be given", "T: the right-hand side depends on t"),
+    "timeless": ("must be given", "T: {} depends on t"),
     "period": ("period", "T with f(t + T, x) = f(t, x); a function of one period takes t % T"),
     "symmetry": ("symmetry", "S with S f(t + T/k, x) = f(t, S x), of order k"),
     "spatial_symmetry": ("symmetry", "P with P f(t, x) = f(t, P x)"),
@@ -160,8 +160,23 @@ class Claim:
         self.states = np.concatenate([x, matrix @ x], axis=1)
         self._alike = base.size, times.size, len(SIZES), -1  # the largest among samples of the same size
 
-    def check(self, slopes: Array) -> None:
-        """Check the claim by the slopes at its times and states: a wrong one gives wrong multipliers."""
+    def check_event(self, name: str, guard: Array, direction: int, reset: Array | None) -> None:
+        """Check the claim for an event: its guard at the times and states, shape (1, samples), and its reset.
+
+        A guard gives the same events if it is multiplied by a constant, positive unless both directions count.
+        """
+        here, there = np.split(np.where(np.isfinite(guard), guard, 0.0), 2, axis=1)
+        largest = np.argmax(np.abs(here))
+        factor = there.flat[largest] / (here.flat[largest] or 1.0)
+        if self.field == "period" and (factor > 0.0 or (factor < 0.0 and direction == 0)):
+            guard = np.hstack([guard[:, : here.size], guard[:, here.size :] / factor])
+        self.check(np.broadcast_to(guard, self.states.shape), f"{name}.guard", 0.0)
+        if reset is not None:
+            self.check(reset, f"{name}.reset", _NEGLIGIBLE)
+
+    def check(self, slopes: Array, of: str = "the right-hand side", negligible: float | None = None) -> None:
+        """Check the claim by the values of a function, at its times and states: a wrong one gives wrong multipliers.
+        Changes below a part of the states are ``negligible``, by default as that of a state within the shift."""
         half = self.times.size // 2
         here, there = slopes[:, :half], slopes[:, half:]
         with np.errstate(invalid="ignore"):  # values beyond double precision
@@ -172,14 +187,15 @@ class Claim:
         largest = np.where(np.isfinite(terms), terms, 0.0).reshape(self._alike).max(axis=(1, 3), keepdims=True)
         wrong = (off.reshape(self._alike) > _SAME * largest).reshape(off.shape)
         if self.shift > 0.0:  # a right-hand side may be round-off of terms that cancel
-            wrong &= off > _NEGLIGIBLE / self.shift * np.abs(self.states[:, :half]).max(axis=0)
+            least = _NEGLIGIBLE / self.shift if negligible is None else negligible
+            wrong &= off > least * np.abs(self.states[:, :half]).max(axis=0)
         if not wrong.any():
             return
         what, allowed = _CLAIMS[self.field]
         if self.field == "timeless":
-            raise ParameterError(what, field="period", value=None, allowed=allowed)
+            raise ParameterError(what, field="period", value=None, allowed=allowed.format(of))
         failed = float(self.times[:half][wrong.any(axis=0)][0])
-        said = f"must be a {what} of the right-hand side, but fails at t = {failed:g}"
+        said = f"must be a {what} of {of}, but fails at t = {failed:g}"
         value = self.shift if self.field == "period" else None
         raise ParameterError(said, field=self.field, value=value, allowed=allowed)
 

@@ -12,11 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import LARGEST, SIZES, Slopes, check_shape, checked_count, finite_array, numbers, sampled
+from chilopod.flows.arguments import (
+    LARGEST,
+    SIZES,
+    Claim,
+    Slopes,
+    check_shape,
+    checked_count,
+    finite_array,
+    numbers,
+    sampled,
+)
 from chilopod.flows.called import CalledFlow, warn_of_jumps
 from chilopod.flows.carrying import ZERO_BY_ZERO, TooManySteps, fast_parts
 from chilopod.flows.implicit.flow import ImplicitFlow, can_be_implicit
 from chilopod.flows.taylor.flow import TaylorFlow
+from chilopod.flows.tracing.tape import GUARD
 from chilopod.flows.tracing.trace import Trace, evaluate, evaluate_series, trace
 from chilopod.flows.tracing.traced import Untraceable
 from chilopod.frozen import Array
@@ -109,6 +120,7 @@ TOLERANCE, _COARSEST = 1e-14, 1e-3
 _FLOOR = 0.01  # truncation of a Taylor step relative to the tolerance: a small one costs almost nothing
 _ESTIMATED = 100.0
 """Error estimate of an implicit step relative to the tolerance: the estimate is far larger than the error."""
+_AT_ONCE = 1e-13  # time, relative to the duration, within which a switch counts as passed
 _PATIENCE = 256  # taylor steps after which the implicit method takes over a motion that would exceed the budget
 
 Method = Literal["automatic", "taylor", "implicit"]
@@ -154,8 +166,9 @@ class RightHandSide:
         self.start = None if self.orbit is None else finite_array(self.orbit, (self.dimension,), "orbit")
         self.base = np.zeros(self.dimension) if self.start is None else self.start
 
-    def flows(self, rhs: Callable[..., ArrayLike], args: tuple[Any, ...]) -> tuple[Slopes, Members]:
-        """A right-hand side at many times and states, and its flows: traced if possible, else from calls."""
+    def flows(self, rhs: Callable[..., ArrayLike], args: tuple[Any, ...], claim: Claim) -> tuple[Slopes, Members]:
+        """A right-hand side at many times and states, and its flows: traced if possible, else from calls. The claim of
+        its period is checked for the events."""
         if not callable(rhs):
             raise ParameterError("must be a function", field="rhs", value=rhs, allowed="rhs(t, x, *args)")
         if not isinstance(args, tuple):
@@ -171,6 +184,13 @@ class RightHandSide:
             fast = fast_parts(slopes, self.base, self.edges)
             called = CalledFlow(rhs, args, self.edges, fast, self.times, str(reason), self.tolerance)
             return slopes, {name: getattr(called, name) for name in _FLOWS}
+        tape = traced.tape
+        for kind, node, i in tape.switches.T.tolist():
+            if kind == GUARD:
+                event, nodes = self.events[i], np.append(node, tape.resets[i])
+                values = evaluate(tape, nodes, claim.times, claim.states, traced.params)
+                reset = None if event.reset is None else values[1:]
+                claim.check_event(f"events[{i}]", values[:1], event.direction, reset)
         return self._traced(traced)
 
     def _refuse_calls(self, rhs: Callable[..., ArrayLike], args: tuple[Any, ...], reason: Untraceable) -> None:
@@ -210,8 +230,17 @@ class RightHandSide:
             if taylor.patience:
                 members = members | _either(members, implicit)
         if self.autonomous:
+            if (tape.switches[0] != GUARD).any():
+                members["velocity"] = lambda x: self._velocity(traced, x)
             members["velocity_series"] = lambda curves: evaluate_series(tape, curves, params)
         return slopes, members
+
+    def _velocity(self, traced: Trace, x: Array) -> Array:
+        """dx/dt at a state; on a switching surface that with which the motion goes on."""
+        from chilopod.flows.taylor.switching import departure  # numba takes half a second to import
+
+        params, state = np.array(traced.params), np.array(x, dtype=np.float64)  # compiled code takes no read-only ones
+        return np.asarray(departure(traced.tape, params, state, _AT_ONCE * self.duration))
 
     def _taylor(self, traced: Trace) -> TaylorFlow:
         """The flow by Taylor series, one for all values of the parameters."""

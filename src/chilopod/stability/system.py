@@ -190,11 +190,12 @@ def from_rhs(
     rhs
         Function ``rhs(t, x, *args)`` -> dx/dt, shape (n,); T-periodic in t.
     dimension, period
-        Number of states n, and T; None if ``rhs`` does not depend on t and the period belongs to the orbit.
+        Number of states n, and T; None if nothing depends on t and the period belongs to the orbit.
     args
         Parameters of the right-hand side.
     events
-        Events at which the state jumps, or ``rhs`` switches, on reaching a surface, of functions that can be traced.
+        Events at which the state jumps, or ``rhs`` switches, on reaching a surface, of T-periodic functions that can be
+        traced.
     switch_times
         Times in [0, T) at which ``rhs`` jumps or has a kink. A traced function needs none; others are evaluated
         strictly inside each interval, and undeclared jumps cost time and digits.
@@ -222,9 +223,9 @@ def from_rhs(
         if len(_STATED) >= _MOST_STATED:
             _STATED.clear()
         _STATED[key] = stated
-    slopes, members = stated.given.flows(rhs, args)
+    slopes, members = stated.given.flows(rhs, args, stated.claims[0])
     if period is None:
-        members["velocity"] = lambda x: slopes(np.zeros(1), x[:, None])[:, 0]
+        members.setdefault("velocity", lambda x: slopes(np.zeros(1), x[:, None])[:, 0])
     found, first = slopes(stated.times, stated.states), 0
     try:
         for claim in stated.claims:

@@ -15,7 +15,7 @@ import numpy as np
 from chilopod.compiled import fused_njit
 from chilopod.flows.carrying import DONE, GRAZES, JUMPS, SLIDES
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.series import Series, branch_at, choose, expand, expand_values, values_between
+from chilopod.flows.tracing.series import Series, branch_at, choose, expand, expand_values, loaded, values_between
 
 _ZERO = 1e-13  # size of a switching function, relative to its earlier values, that counts as zero
 
@@ -78,6 +78,22 @@ def enlarge_scales(tape: Any, motion: Any, order: int, h: float) -> None:
         for k in range(order + 1):
             motion.scales[s] = max(motion.scales[s], abs(motion.series.values[tape.switches[1, s], k]) * power)
             power *= h
+
+
+@fused_njit(error_model="numpy")
+def departure(tape: Any, params: Any, x: Any, soon: float) -> Any:
+    """dx/dt at a state at time 0, on the branches that the motion has once it passed the surfaces that it meets within
+    a time ``soon``."""
+    switches = tape.switches
+    series = loaded(tape, params, 2, 0, np.zeros(switches.shape[1]))
+    motion = Motion(x, np.empty((x.size, 0)), series, np.zeros(switches.shape[1]))
+    start(tape, motion, 0.0)
+    choose(tape, series)
+    expand_values(tape, 1, tape.layout[4], 1.0, series)
+    for s in range(switches.shape[1]):
+        motion.scales[s] = soon * abs(series.values[switches[1, s], 1]) / _ZERO
+    settle(tape, motion, 1.0)
+    return series.values[: x.size, 1].copy()
 
 
 @fused_njit(error_model="numpy")

@@ -69,8 +69,8 @@ class Located(Result, Sequence[BifurcationPoint]):
         Number of orbits computed.
     searched, spacing, ending
         Interval in which the orbit was followed and searched, largest distance of neighbouring orbits in it, and the
-        reason for an early end: a fold, or the first remark. Between two orbits the multipliers are interpolated: what they
-        do within less than the spacing alone may be missed.
+        reason for an early end: a fold, or the first remark. Between two orbits the multipliers are interpolated: what
+        they do within less than the spacing alone may be missed.
     dimension
         Number of states.
     """
