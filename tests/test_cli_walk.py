@@ -69,6 +69,17 @@ def test_walk_prints_a_line_a_walk(capsys):
     assert all(angle > 10.0 for angle in angles)
 
 
+def test_the_end_that_is_printed_is_the_end_at_any_rate(capsys):
+    arguments = ["walk", ROBOT, *SOFT, "--seed", "1", "--duration", "1.9 s"]
+    (fine,), (coarse,) = (printed(*arguments, "--rate", rate, "--json")["walks"] for rate in ("100", "0.1"))
+    np.testing.assert_allclose([coarse["x_m"], coarse["y_m"]], [fine["x_m"], fine["y_m"]], atol=1e-4)
+    assert coarse["mean_joint_angles_rad"] == [None] * 5
+    assert coarse["axis_radius_m"] is None
+    for rate, there in (("100", "mean of the last 1.9 s"), ("0.1", "too few samples for means")):
+        assert main([*arguments, "--rate", rate]) == 0
+        assert there in capsys.readouterr().out
+
+
 def test_a_walk_that_leaves_the_range_says_so(capsys):
     arguments = ["walk", ROBOT, "--set", "springs.stiffness[0]=2 N*mm/deg", "--initial-joints", "10,0,0,0,0 deg"]
     assert main(arguments) == 0

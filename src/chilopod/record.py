@@ -53,7 +53,7 @@ QUANTITIES = MOTION | {
     "foot_load": ((*_MOVING, "module", "side"), "N", "forces"),
     "pose": ((*_MOVING, "coordinate"), "m, 1, rad: MuJoCo's qpos", "poses"),
     "event": (("event",), "s", "commands"),
-    "within": (("event",), "", "commands"),
+    "within": (("event",), "s", "commands"),
     "command": ((*_TOLD, "side"), "rad", "commands"),
     "command_stiffness": ((*_TOLD, "joint"), "N*m/rad", "commands"),
     "command_torque": ((*_TOLD, "joint"), "N*m", "commands"),

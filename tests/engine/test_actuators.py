@@ -90,6 +90,7 @@ def test_what_is_asked_for_and_what_is_done_are_both_known_afterwards():
     np.testing.assert_allclose(
         data.stiffness.values[:, 0, 0], [START, START, 0.5 * (START + 1.0), 1.0, 1.0], rtol=1e-12
     )
+    assert data.within.attrs == {"units": "s"}
 
 
 @pytest.mark.parametrize(
@@ -103,7 +104,9 @@ def test_what_is_asked_for_and_what_is_done_are_both_known_afterwards():
         (Command(stiffness=[-1.0, START, START, START, START]), "command.stiffness"),
         (Command(stiffness=[0.0, START, START, START, START]), "command.stiffness"),
         (Command(stiffness=[np.inf, START, START, START, START]), "command.stiffness"),
+        (Command(stiffness=[1e300, START, START, START, START]), "command.stiffness"),
         (Command(joint_torque=[np.nan] * 5), "command.joint_torque"),
+        (Command(joint_torque=[-1e101] * 5), "command.joint_torque"),
         (Command(within=-1.0), "command.within"),
         (Command(within=np.nan), "command.within"),
         (np.zeros(2), "command"),

@@ -38,7 +38,9 @@ def test_a_target_that_is_told_at_time_0_is_there_from_the_start(engine, robot):
     assert told.to_dataset().equals(began.to_dataset())
 
 
-@pytest.mark.parametrize("wrong", [None, "there", 1.0, [1.0], [[1.0, 0.0]], [1.0, np.inf], [1.0, np.nan], [[[1, 2]]]])
+@pytest.mark.parametrize(
+    "wrong", [None, "there", 1.0, [1.0], [[1.0, 0.0]], [1.0, np.inf], [1.0, np.nan], [1e200, 0.0], [[[1, 2]]]]
+)
 def test_what_is_no_place_is_refused_and_changes_nothing(wrong):
     targets = Targets(2)
     with pytest.raises(ParameterError) as caught:

@@ -363,6 +363,7 @@ def test_controllers_that_are_none_are_named(engine, robot):
         (Asked(window=np.nan), "window.*0 s or more"),
         (Asked(answer=3), "Asked.command"),
         (Asked(answer=Command(leg_yaw=[np.nan, 0.0])), "Asked.command.leg_yaw"),
+        (Asked(answer=Command(stiffness=[1e300] * 5)), "Asked.command.stiffness: must be finite"),
         (Asked(error=ZeroDivisionError("by\nnothing")), "ZeroDivisionError: by nothing"),
     ):
         with pytest.raises((ParameterError, AnalysisError), match=words) as caught:

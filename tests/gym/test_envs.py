@@ -258,11 +258,12 @@ def test_seeds_may_be_one_each_and_numpy_s():
     np.testing.assert_array_equal(first, batch.reset(seed=np.array(3))[0])
     alone = gymnasium.make(TURN).unwrapped
     np.testing.assert_array_equal(first[0], alone.reset(seed=np.array(3))[0])
-    wrong = [(batch, [3]), (batch, "ab"), (batch, [-1, 2])]
+    wrong = [(batch, [3]), (batch, "ab"), (batch, b"ab"), (batch, "a"), (batch, [-1, 2])]
     for env, seed in [*wrong, *((each, one) for each in (batch, alone) for one in (1.5, -1, "a", {}))]:
         with pytest.raises(ParameterError, match="seed") as caught:
             env.reset(seed=seed)
         assert "\n" not in str(caught.value)
+        assert not str(caught.value).startswith("seed = 1:")
 
 
 def test_wrappers_of_gymnasium_go_with_both():

@@ -6,15 +6,32 @@ import threading
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from chilopod import load_robot, twin
+from chilopod import load_robot, planar, twin
+from chilopod.engine import Command, Event
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.steering import LegYawController, Target
-from chilopod.trials import NONE, Disturbance, Trial, batch, batches, run, together, walked
+from chilopod.steering import Course, Goal, LegYawController, Target
+from chilopod.trials import NONE, Disturbance, Trial, batch, batches, run, straight, summaries, together, walked
 
 ROBOT = load_robot("aoi2022-planar")
+FREE = ROBOT.override("springs.adjustable[0]", True)
 WHOLE = load_robot("aoi2022")
 BASE = Trial(ROBOT, 2.0, seed=3, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class YawAt:
+    """The same leg yaw, at a phase of the gait cycle."""
+
+    phase: float
+    yaw: float
+
+    def events(self, gait):
+        return [Event("now", self.phase, 0.1)]
+
+    def act(self, event, seen):
+        return Command(leg_yaw=[self.yaw, self.yaw])
 
 
 def test_everything_that_makes_a_trial_is_in_its_name():
@@ -51,6 +68,67 @@ def test_batches_change_nothing():
     many = together(run(trials))
     (one,) = run([trials[37]])
     np.testing.assert_array_equal(one.position.values[:, 0], many.position.values[:, 37])
+
+
+def short_course(place):
+    course = Course((Goal(*place, relative=True),), 4.0)
+    return Trial(FREE, course.duration, 0, (), course, YawAt(0.0, 0.0), rate=10.0)
+
+
+@pytest.mark.parametrize(
+    "trials",
+    [
+        # The first ends just behind an event, by rounding, the second at one.
+        [short_course((0.15 + 0.0967 * (end - 0.05), 0.0)) for end in (1.8, 3.0, 3.5)],
+        [short_course((3.0, 0.0)), short_course((0.3, 0.0))],
+        [short_course((0.3, 0.32)), short_course((0.2, 0.0))],
+    ],
+    ids=["at an event", "none in reach", "out of time"],
+)
+def test_a_course_has_the_same_record_alone_and_among_others(trials):
+    for trial, record in zip(trials, walked(trials), strict=True):
+        (alone,) = walked([trial])
+        xr.testing.assert_identical(alone, record)
+
+
+def test_robots_with_and_without_actuators_have_the_same_records_alone_and_together():
+    trials = [Trial(robot, 0.1, disturbance=NONE) for robot in (ROBOT, FREE)]
+    for trial, record in zip(trials, run(trials), strict=True):
+        (alone,) = run([trial])
+        xr.testing.assert_identical(alone, record)
+
+
+@pytest.mark.parametrize("engine", ["planar", "twin"])
+def test_a_record_has_the_end_of_a_walk_that_no_sample_is_of(engine):
+    robot, start = (ROBOT, (0.1,)) if engine == "planar" else (WHOLE, (0.1,))
+    coarse, fine, whole = (
+        run([Trial(robot, 0.32, 0, start, disturbance=NONE, rate=rate, engine=engine)])[0] for rate in (7.0, 3.0, 50.0)
+    )
+    assert "end_position" not in whole
+    end = whole.isel(time=-1)
+    for record in (coarse, fine):
+        np.testing.assert_allclose(record.end_position.values, end.position.values, atol=1e-5)
+        np.testing.assert_allclose(record.end_joint_angle.values, end.joint_angle.values, atol=1e-5)
+        (summary,) = summaries(robot, record)
+        assert (summary.x, summary.y) == tuple(record.end_position.values[0])
+    simulated = {"planar": planar, "twin": twin}[engine].simulate(robot, 0.32, rate=7.0)
+    assert simulated.end_position.sizes == {"robot": 1, "axis": 2}
+
+
+def test_a_mean_needs_samples_of_more_than_half_of_the_gait_cycle():
+    def of(duration, rate):
+        return summaries(ROBOT, run([Trial(ROBOT, duration, 0, (0.05,), disturbance=NONE, rate=rate)])[0])[0]
+
+    assert np.isnan(of(6.5, 0.2).joint_angles).all()  # one sample
+    assert np.isnan(of(6.5, 1.0 / ROBOT.gait.period).joint_angles).all()  # always of the same phase
+    np.testing.assert_allclose(of(6.5, 2.0).joint_angles, of(6.5, 100.0).joint_angles, atol=0.01)
+    assert np.isfinite(of(0.05, 100.0).joint_angles).all()
+
+
+def test_a_robot_that_bends_after_its_last_sample_is_not_straight():
+    (record,) = run([Trial(ROBOT, 0.8, 0, controller=YawAt(0.9, 0.2), disturbance=NONE, rate=2.0)])
+    assert not record.joint_angle.values.any()
+    assert not straight(record)
 
 
 def test_disturbances_are_as_large_as_they_say():

@@ -23,7 +23,7 @@ from chilopod.engine.ramps import Ramps
 from chilopod.engine.saved import part
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
-from chilopod.record import LONGEST
+from chilopod.record import LARGEST, LONGEST
 from chilopod.robot import Robot
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ class Actuators:
             return
         data.coords["event"] = ("event", self._logged("event"), {"units": "s"})
         found: dict[str, Any] = {
-            "within": ("event", self._logged("within")),
+            "within": ("event", self._logged("within"), {"units": "s"}),
             "command": (("event", "robot", "side"), self._logged("command"), {"units": "rad"}),
         }
         if self.adjustable:
@@ -220,10 +220,9 @@ class Actuators:
             raise ParameterError("has the wrong shape", field=f"command.{name}", value=array.shape, allowed=str(shape))
         rows = np.empty(shape)
         rows[:] = array
-        if not (np.isfinite(rows) | ~walking[:, None]).all():
-            raise ParameterError(
-                "must be finite", field=f"command.{name}", allowed="finite numbers for every robot that still walks"
-            )
+        if not ((np.abs(rows) <= LARGEST) | ~walking[:, None]).all():
+            allowed = f"numbers up to {LARGEST:g} for every robot that still walks"
+            raise ParameterError("must be finite", field=f"command.{name}", allowed=allowed)
         return rows
 
     def _check(self, stiffness: Array, walking: NDArray[np.bool_]) -> None:

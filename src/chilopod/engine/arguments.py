@@ -156,7 +156,7 @@ def rows_of(
     count = max(counts.values())
     for name, each in counts.items():
         if each not in (1, count):
-            raise ParameterError("has the wrong length", field=name, value=each, allowed=f"1 or {count}")
+            raise ParameterError(f"has the wrong length {each}", field=name, allowed=f"1 or {count}")
     for name, rows in arrays.items():
         if rows is not None:
             arrays[name] = np.array(np.broadcast_to(rows, (count, *rows.shape[1:])), order="C")
@@ -198,12 +198,13 @@ def rows_anew(
         raise ParameterError("must be the end of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
     count, own = int(marked.sum()), as_seeds(seeds)
     if own is not None and len(own) != count:
-        raise ParameterError("has the wrong length", field="seeds", value=len(own), allowed=str(count))
+        raise ParameterError(f"has the wrong length {len(own)}", field="seeds", allowed=str(count))
     if count == 0:
         return marked, dict.fromkeys(arguments)
     found, rows = rows_of(robots[:count], arguments)
     if found != count:
-        raise ParameterError("has the wrong length", field="initial, friction", value=found, allowed=f"1 or {count}")
+        problem = f"has the wrong length {found}"
+        raise ParameterError(problem, field="initial, friction", allowed=f"1 or {count}")
     return marked, rows
 
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _Kind = TypeVar("_Kind", bound="BatchWalk")
 
+_SAME_INSTANT = 1e-9  # s
+
 
 class Beginning(NamedTuple):
     """Beginning of a batch of walks: robots, states, shape (walks, n), factors on the friction of every foot, shape
@@ -71,6 +73,14 @@ def resumed(traits: Traits, saved: bytes, make: Callable[[Beginning, Recording |
         walk = make(begun, record, as_number("tolerance", settings["tolerance"]))
         walk.restore(settings, arrays)
     return walk
+
+
+def with_end(data: xr.Dataset, walk: Walk, record: Recording) -> xr.Dataset:
+    """Record of a walk, changed in place: where its end is no sample, with the position and the joint angles there."""
+    if walk.time - record.samples(walk.time)[-1] > _SAME_INSTANT:
+        data["end_position"] = (("robot", "axis"), walk.pose()[:, :2], {"units": "m"})
+        data["end_joint_angle"] = (("robot", "joint"), walk.observe().joint_angles, {"units": "rad"})
+    return data
 
 
 class BatchWalk(Walk):

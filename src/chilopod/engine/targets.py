@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.engine.arguments import as_array
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
+from chilopod.record import LARGEST
 
 
 class Targets:
@@ -55,10 +56,9 @@ class Targets:
         if given.shape not in (shape, (2,)):
             raise ParameterError("has the wrong shape", field="target", value=given.shape, allowed=f"(2,) or {shape}")
         none = np.isnan(given)
-        if np.isinf(given).any() or (none[..., 0] != none[..., 1]).any():
-            raise ParameterError(
-                "must be a finite position", field="target", allowed="x and y in m, or NaN for both without a target"
-            )
+        if (np.abs(given) > LARGEST).any() or (none[..., 0] != none[..., 1]).any():
+            allowed = f"x and y in m, up to {LARGEST:g}, or NaN for both without a target"
+            raise ParameterError("must be a finite position", field="target", allowed=allowed)
         if ((given == self.present) | (none & np.isnan(self.present))).all():
             return
         places = np.empty(shape)

@@ -183,10 +183,10 @@ def _spaces(episodes: Episodes) -> tuple[Space[Row], Space[Row]]:
 def _seeds(seed: Any, count: int) -> list[int | None]:
     if seed is None:
         return [None] * count
-    if not isinstance(seed, Sequence | np.ndarray) or not getattr(seed, "ndim", 1):
+    if isinstance(seed, str | bytes) or not isinstance(seed, Sequence | np.ndarray) or not getattr(seed, "ndim", 1):
         return [_whole(seed) + number for number in range(count)]
     if len(seed) != count:
-        raise ParameterError("has the wrong length", field="seed", value=len(seed), allowed=str(count))
+        raise ParameterError(f"has the wrong length {len(seed)}", field="seed", allowed=str(count))
     return [None if each is None else _whole(each) for each in seed]
 
 

@@ -8,6 +8,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from chilopod.engine import Controller, steer
+from chilopod.engine.batch import with_end
 from chilopod.planar.walk import TOLERANCE, start
 from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, RATE, Recording, in_range
@@ -56,7 +57,8 @@ def simulate(
     ``stiffness`` (over time if any spring is adjustable), ``status``; with a target, ``target``, ``distance`` and
     ``bearing``; with a controller, ``command`` (commanded leg yaw) over (event, robot, side), ``command_stiffness``
     (NaN where none was commanded) and ``command_torque``, reached ``within`` (event) s; with ``forces``, ``foot_force``
-    on the robot over (time, robot, module, side, axis), on the floor's axes. After the failure of a walk all is NaN,
+    on the robot over (time, robot, module, side, axis), on the floor's axes; where the end of the walks is no sample,
+    ``end_position`` and ``end_joint_angle``. After the failure of a walk all is NaN,
     and ``status`` gives the reason. Attributes hold the units.
 
     Raises
@@ -65,14 +67,15 @@ def simulate(
         If an argument has the wrong shape or is out of range, or the robots differ in gait or number of modules.
     """
     in_range("duration", duration, LONGEST, "s")
+    recording = Recording(rate, forces)
     walk = start(
         robots,
         initial=initial,
         friction=friction,
         target=target,
-        record=Recording(rate, forces),
+        record=recording,
         tolerance=tolerance,
         expected=duration,
     )
     steer(walk, duration, controller, bearing_noise=bearing_noise, progress=progress)
-    return walk.to_dataset(copy=False)
+    return with_end(walk.to_dataset(copy=False), walk, recording)

@@ -19,9 +19,11 @@ _UNITS = {"path": "m", "effort": "rad^2*s", "spring_work": "J", "drive_work": "J
 
 def lengths(data: xr.Dataset) -> dict[str, NDArray[np.intp]]:
     """Numbers of samples, ``time``, and commands, ``event``, to the end of each robot's course, shape (robots,)."""
-    last = np.nanmax(data.goal_end.values, axis=1) + _SAME_INSTANT
+    last = np.nanmax(data.goal_end.values, axis=1)
     commands = data.event.values if "event" in data.dims else _NONE
-    return {"time": np.searchsorted(data.time.values, last, "right"), "event": np.searchsorted(commands, last)}
+    # A look that ends a course precedes an event at its instant, which belongs to those who walk on.
+    samples = np.searchsorted(data.time.values, last + _SAME_INSTANT, "right")
+    return {"time": samples, "event": np.searchsorted(commands, last)}
 
 
 def add_measures(data: xr.Dataset, period: float) -> None:

@@ -202,6 +202,8 @@ class CourseReferee:
             found[f"seen_{name}"] = (("event", "robot", *dims), np.array(shown), {"units": unit})
         data.coords["goal"] = np.arange(1, self._places.shape[1] + 1)
         data.update(found)
+        if "target" in data and "time" not in data.target.dims:  # as among robots whose targets moved
+            data["target"] = data.target.expand_dims(time=data.sizes["time"])
 
     def _judge(self, which: NDArray[np.bool_], now: float, verdict: Verdict) -> None:
         if not which.any():

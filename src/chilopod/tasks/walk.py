@@ -18,7 +18,7 @@ from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
-from chilopod.trials import NONE, Trial, WalkSummary, as_now, run, run_each, straight, summaries, together
+from chilopod.trials import AVERAGED, NONE, Trial, WalkSummary, as_now, run, run_each, straight, summaries, together
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -179,18 +179,22 @@ class Ends(Runs):
         }
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
-        rows: list[Sequence[str]] = [
-            ("seed", "x (m)", "y (m)", "radius (m)", "joint angles, mean of the last 5 s (deg)")
-        ]
+        last = f"joint angles, mean of the last {min(AVERAGED, self.first.duration):g} s (deg)"
+        rows: list[Sequence[str]] = [("seed", "x (m)", "y (m)", "radius (m)", last)]
+        below = []
         for label, end in zip(self.labels, self.summaries, strict=True):
             if end.failed:
                 rows.append((label, "-", "-", "-", end.sentence))
+                continue
+            if np.isnan(end.axis_radius):
+                rows.append((label, f"{end.x:.3f}", f"{end.y:.3f}", "-", "-"))
+                below = ["too few samples for means over the gait cycle: walk with a higher rate"]
                 continue
             bends = "  ".join(f"{angle:+7.2f}" for angle in end.joint_angles_deg)
             shown = np.abs(end.joint_angles_deg).max() >= _SHOWN and np.isfinite(end.axis_radius)
             radius = f"{end.axis_radius:.4g}" if shown else "straight"
             rows.append((label, f"{end.x:.3f}", f"{end.y:.3f}", radius, bends))
-        return [], rows, []
+        return [], rows, below
 
     def _picture(self) -> str:
         return ""

@@ -17,6 +17,7 @@ import xarray as xr
 
 from chilopod.cores import cores
 from chilopod.engine import Walk, engine_named, event_times, steer
+from chilopod.engine.batch import with_end
 from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.steering import CourseReferee, Target, add_measures
@@ -47,7 +48,8 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
         sight = (course.patience, course.view, course.range, course.tightest) if course else trial.target is None
         asked = trial.duration, trial.recording, trial.brief, sight
         noisy = trial.disturbance.bearing > 0.0  # reported once for a batch
-        alike = walks, asked, noisy, json.dumps(trial.steering, sort_keys=True), trial.code
+        springs = any(trial.robot.springs.adjustable or ())  # over time in the records of all, if any is adjustable
+        alike = walks, asked, noisy, springs, json.dumps(trial.steering, sort_keys=True), trial.code
         groups.setdefault(alike, []).append(trial)
     split = []
     for group in groups.values():
@@ -103,7 +105,9 @@ def _walked(trials: Sequence[Trial], progress: Progress = silent) -> list[xr.Dat
     if not doubts and _is_own(first) and first.as_now().code != first.code:
         doubts = _KNOWN[_who(first)] = _CHANGES
     data = check_record(walk.to_dataset(), walk, trials, drawn)
-    if referee is not None:
+    if referee is None:
+        with_end(data, walk, first.recording)
+    else:
         referee.add_to(data, walk)
         add_measures(data, first.robot.gait.period)
     return _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)
@@ -173,6 +177,10 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
     for index, trial in enumerate(trials):
         own = {"robot": slice(index, index + 1), **{name: slice(count[index]) for name, count in counts.items()}}
         record = data.isel(own, missing_dims="ignore")
+        if counts and not record.sizes.get("event", 1):
+            record = record.drop_dims("event")  # alone it was asked for no command
+        if counts and "target" in record and np.isnan(record.target.values).all():
+            record = record.drop_vars(["target", "distance", "bearing"])
         # Numbers that lie otherwise in memory are added up in another order: sums have the same bits whether a walk was
         # one of many, alone, or read.
         for each in map(record.variables.__getitem__, record.data_vars):

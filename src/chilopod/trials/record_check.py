@@ -51,8 +51,9 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     off = 0.5 * first.robot.twin.timestep if first.robot.twin else 0.0
     if not np.all(np.abs(times - wanted) <= off + _SAME_INSTANT):
         return f"samples at other times than every {1.0 / first.rate:g} s"
-    asked = event_times(first.controller, first.robot.gait, walk.time) if first.controller else ()
-    events = np.array([time for time, _ in asked])
+    # As counted when it walked: three periods of 0.6 s are less than 1.8 s by rounding.
+    asked = event_times(first.controller, first.robot.gait, first.duration) if first.controller else ()
+    events = np.array([time for time, _ in asked if time < walk.time])
     coords = {"robot": np.arange(robots), "joint": np.arange(1, modules)}
     coords |= {"side": np.array(["left", "right"]), "axis": np.array(["x", "y"])}
     if first.forces:

@@ -27,8 +27,9 @@ class WalkSummary:
     status
         Label of :class:`chilopod.engine.Status`.
     joint_angles, axis_radius
-        Means over the last :data:`AVERAGED` s, rad, shape (N-1,), NaN if the walk failed; and radius from these angles,
-        see :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
+        Means over the last :data:`AVERAGED` s, or a shorter walk, rad, shape (N-1,), NaN if the walk failed, or if its
+        samples there leave more than half of the gait cycle out; and radius from these angles, see
+        :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
     x, y
         Position of the centre of module 1 at the end, m.
     """
@@ -77,15 +78,29 @@ def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: flo
 def straight(record: xr.Dataset) -> bool:
     """True if no joint ever bends, to the last bit: without a difference between left and right a straight walk stays
     straight even where it is unstable."""
-    return not record.joint_angle.values.any()
+    ends = record.end_joint_angle.values if "end_joint_angle" in record else np.zeros(1)
+    return not (record.joint_angle.values.any() or ends.any())
 
 
 def summaries(robot: Robot, record: xr.Dataset) -> Sequence[WalkSummary]:
     """Summary of every walk of a record."""
-    angles = mean_joint_angles(record).transpose("robot", "joint").values
+    times, end, place = record.time.values, float(record.time[-1]), record.position.isel(time=-1)
+    if "end_position" in record:  # the walk goes on behind the last sample
+        end, place = record.attrs["duration"], record.end_position
+    if _shows_cycle(times[times > end - AVERAGED + 1e-9], min(AVERAGED, end), robot.gait.period):
+        angles = mean_joint_angles(record, before=times[-1] - end).transpose("robot", "joint").values
+    else:
+        angles = np.full((record.sizes["robot"], record.sizes["joint"]), np.nan)
     radii = robot.axis_radius(angles)
-    ends = record.position.isel(time=-1).transpose("robot", "axis").values
+    places = place.transpose("robot", "axis").values
     return [
-        WalkSummary(str(status), angle, float(radius), float(end[0]), float(end[1]))
-        for status, angle, radius, end in zip(record.status.values, angles, radii, ends, strict=True)
+        WalkSummary(str(status), angle, float(radius), float(x), float(y))
+        for status, angle, radius, (x, y) in zip(record.status.values, angles, radii, places, strict=True)
     ]
+
+
+def _shows_cycle(times: Array, duration: float, period: float) -> bool:
+    """True if samples within a duration leave no more than half of the gait cycle, or of a shorter walk, out."""
+    cycle = min(duration, period)
+    phases = np.sort(times % cycle) if len(times) > 1 else np.zeros(1)
+    return bool(np.diff(phases, append=phases[0] + cycle).max() <= 0.5 * cycle + 1e-9)

@@ -8,6 +8,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from chilopod.engine import Controller, steer
+from chilopod.engine.batch import with_end
 from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
@@ -53,16 +54,17 @@ def simulate(
     controller, NaN where the pole was out of view; with ``poses``, ``pose`` over (time, robot, coordinate).
     """
     in_range("duration", duration, LONGEST, "s")
+    recording = Recording(rate, forces, poses)
     walk = start(
         robots,
         initial=initial,
         friction=friction,
         target=target,
         seeds=seeds,
-        record=Recording(rate, forces, poses),
+        record=recording,
         threads=threads,
         tolerance=tolerance,
         expected=duration,
     )
     steer(walk, duration, controller, progress=progress)
-    return walk.to_dataset(copy=False)
+    return with_end(walk.to_dataset(copy=False), walk, recording)
