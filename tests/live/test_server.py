@@ -46,7 +46,7 @@ class Nobody:
     def __init__(self, engine):
         pass
 
-    def ask(self, robot, what="theory"):
+    def ask(self, robot, springs=None):
         pass
 
     def answers(self):

@@ -10,14 +10,15 @@ import pytest
 from chilopod.analysis.parameters import stiffness
 from chilopod.engine import Status
 from chilopod.live import Session, wishes
-from chilopod.live.theory import Growth, Theory
+from chilopod.live.theory import Growth, Stretch, Theory
 from chilopod.live.words import sentences
 from chilopod.robot import load_robot
 from chilopod.steering import RadiusLaw
 
 PLANAR = load_robot("aoi2022-planar")
 LAW = RadiusLaw(stiffness(1.0) * np.array([6.0, 8.0, 10.0, 12.0]), np.array([0.25, 0.32, 0.5, np.inf]), "N*mm/deg")
-THEORY = Theory(PLANAR, LAW.pitchfork, LAW.values[::-1], LAW.radii[::-1], np.ones(4, dtype=bool), LAW)
+STRAIGHT = (Stretch(0.0, LAW.pitchfork, False), Stretch(LAW.pitchfork, stiffness(61.5), True, "pitchfork"))
+THEORY = Theory(PLANAR, LAW.pitchfork, LAW.values[::-1], LAW.radii[::-1], np.ones(4, dtype=bool), LAW, STRAIGHT)
 
 
 @pytest.fixture
@@ -43,6 +44,9 @@ def test_every_state_has_its_sentence(begun):
         "Straight and stable: its first spring, 41 N·mm/deg, is stiffer than the pitchfork at"
     )
     assert "fades by 18 % a second" in said(begun, rate=-0.2)
+    unjudged = said(begun, replace(THEORY, straight=()))
+    assert unjudged.startswith("It walks straight on: its first spring, 41 N·mm/deg, is stiffer")
+    assert "stable" not in unjudged
     assert "The curve of 0.40 m straightens" in said(begun, **curve(0.4), turning=-0.1)
     assert "The curve of 0.40 m will straighten" in said(begun, **curve(0.4), turning=0.1)
     begun.box.put(wishes.Spring(0, stiffness(8.0)))

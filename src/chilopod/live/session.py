@@ -14,7 +14,7 @@ from chilopod.engine import Command, Controller, Status, Walk, engine_named, ste
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.live import wishes
-from chilopod.live.sliders import sliders_of
+from chilopod.live.sliders import Slider, sliders_of
 from chilopod.live.state import Seen, Settings, as_finite, as_seed, as_within, but_springs
 from chilopod.record import Recording
 from chilopod.robot import Robot
@@ -264,8 +264,8 @@ class Session:
 
     def _obey(self, wish: wishes.Wish) -> None:
         match wish:
-            case wishes.Set(slider, value):
-                self._set(slider, value)
+            case wishes.Set():
+                self._set(wish)
             case wishes.Target(place, by_hand):
                 self._aim(place, by_hand)
             case wishes.Steering(strategy):
@@ -289,12 +289,16 @@ class Session:
             case wishes.Record():
                 self.stop_recording()
 
-    def _set(self, name: str, value: object) -> None:
-        slider = self.sliders.get(name)
+    def checked(self, wish: wishes.Set) -> tuple[Slider, float]:
+        """Slider of a wish and its value; a ParameterError if there is none, or the value is out of range."""
+        slider = self.sliders.get(wish.slider)
         if slider is None:
-            near, allowed = nearest_name(name, self.sliders), ", ".join(self.sliders)
-            raise ParameterError("must be a slider", field="slider", value=name, allowed=allowed, nearest=near)
-        number, before = as_within(name, value, slider.limits, slider.si), self.settings.robot
+            near, allowed = nearest_name(wish.slider, self.sliders), ", ".join(self.sliders)
+            raise ParameterError("must be a slider", field="slider", value=wish.slider, allowed=allowed, nearest=near)
+        return slider, as_within(slider.name, wish.value, slider.limits, slider.si)
+
+    def _set(self, wish: wishes.Set) -> None:
+        (slider, number), before = self.checked(wish), self.settings.robot
         settings = slider.apply(self.settings, number)
         self._engine.common(settings.robot)
         self.settings = settings

@@ -72,6 +72,8 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
         stiff = f"its first spring, {spring_text(k1)}, is stiffer than {fork}"
         if growth and growth.rate > 0.0:
             return f"It walks {arc}. Though {stiff}, the straight walk is unstable: {_grows(growth)}."
+        if not theory.verdict(k1) and not (growth and growth.rate < 0.0):
+            return f"It walks {arc}: {stiff}."
         if bent:
             now = "straightens" if seen.turning < 0.0 else "will straighten"
             return f"The curve of {radius:.2f} m {now}: {stiff}."
