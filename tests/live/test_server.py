@@ -292,6 +292,20 @@ def test_a_flood_of_messages_is_slowed_down(page):
     assert time.monotonic() - begun > 90 / gate._RATE  # all but those that may come at once
 
 
+@pytest.mark.parametrize(
+    ("asked", "part"),
+    [
+        (wishes.Set("frictoin", 1.0), "did you mean 'friction'"),
+        (wishes.Spring(9, 0.5), r"slider = 'springs.stiffness\[9\]': must be a slider"),
+        (wishes.Spring(0, -1.0), r"springs.stiffness\[0\] = -1.0: is out of range"),
+        (wishes.Spring(0, float("nan")), "must be a finite number"),
+    ],
+)
+def test_a_slider_that_cannot_be_set_is_an_error_in_python(page, asked, part):
+    with pytest.raises(ParameterError, match=part):
+        page.wish(asked)
+
+
 def test_the_largest_seed_reaches_later_browsers(page):
     """One that no message can hold ended every connection that was made after it."""
     for seed in (2**64 - 1, 1e30, 10**400, wishes.LARGEST_SEED):
