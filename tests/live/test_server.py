@@ -281,6 +281,27 @@ def test_another_preset_is_another_robot(page):
         time.sleep(0.05)
 
 
+def test_a_browser_that_nobody_knows_yet_moves_no_slider(page):
+    """Before its first word about its camera viser would move it in all browsers, and the robot would not follow."""
+    port, refused = port_of(page), page.gate.refused
+    slider = page._controls._sliders["friction"]
+    uuid, before = slider._impl.uuid, slider.value
+    at = {"origin": f"http://localhost:{port}", "subprotocols": [PROTOCOL]}
+    move = msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": 0.5}})
+    with connect(f"ws://localhost:{port}", **at, compression=None, max_size=None, close_timeout=0.1) as client:
+        client.send(move)
+        end = time.monotonic() + 10.0
+        while page.gate.refused == refused and time.monotonic() < end:
+            time.sleep(0.01)
+        assert (page.gate.refused, slider.value) == (refused + 1, before)
+        client.send(msgspec.msgpack.encode(live_clients._CAMERA))
+        client.send(move)
+        while slider.value != 0.5:
+            assert time.monotonic() < end, (page.gate.refused - refused, page.server.get_clients())
+            time.sleep(0.01)
+    page.wish(wishes.Set("friction", before))
+
+
 def test_a_flood_of_messages_is_slowed_down(page):
     port, before, begun = port_of(page), page.gate.refused, time.monotonic()
     at = {"origin": f"http://localhost:{port}", "subprotocols": [PROTOCOL]}

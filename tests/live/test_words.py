@@ -10,7 +10,7 @@ import pytest
 from chilopod.analysis.parameters import stiffness
 from chilopod.engine import Status
 from chilopod.live import Session, wishes
-from chilopod.live.theory import Growth, Stretch, Theory
+from chilopod.live.theory import Growth, Stretch, Theory, growth_of
 from chilopod.live.words import sentences
 from chilopod.robot import load_robot
 from chilopod.steering import RadiusLaw
@@ -63,6 +63,35 @@ def test_every_state_has_its_sentence(begun):
     assert pulled == "Joint 2 is pulled aside, and it walks a curve of 0.90 m to the left as long as that lasts."
     assert said(begun, pulled=np.array([0.0, 0.1, 0.0, 0.0, -0.1])).startswith("Joints 2, 5 are pulled aside")
     assert "It has stopped: a yaw joint bent" in said(begun, status=Status.OUT_OF_RANGE)
+
+
+def test_an_undulating_robot_walks_no_curve():
+    """Its bend changes sides."""
+    session, known = Session(PLANAR), Theory(remark="it sways")
+    for wish in (wishes.Spring(None, stiffness(3.0)), wishes.Spring(0, stiffness(20.0))):
+        session.box.put(wish)
+        session.obey()
+    growth, bent, swaying = growth_of(session.settings.robot), 0, 0
+    for _ in range(60):
+        session.walk_on(1.0)
+        seen = session.seen()
+        bent += seen.bend > 0.3
+        told = " ".join(sentences(seen, session.settings, known, growth))
+        assert "curve" not in told
+        swaying += "It walks on, swaying from side to side." in told
+        assert "a sway from side to side grows by 12 % a second" in told
+    assert bent > 20
+    assert swaying > 20
+
+
+def test_a_bend_that_stays_on_its_side_after_undulations_is_a_curve(begun):
+    begun._left.clear()
+    told = []
+    for each in [*np.repeat([True, False, True, False], 10), *np.ones(21, dtype=bool)]:
+        begun._left.append(each)
+        told.append(begun.seen().undulates)
+    assert told == [False] * 30 + [True] * 30 + [False]
+    assert "swaying from side to side" in said(begun, replace(THEORY, straight=()), **curve(0.4), undulates=True)
 
 
 @pytest.mark.parametrize(
