@@ -22,6 +22,13 @@ def test_a_loss_of_another_kind_is_said():
         first_loss(ROBOT, ALL, (stiffness(2.0), stiffness(75.0)), Kind.PITCHFORK)
 
 
+def test_a_pitchfork_of_a_walk_that_is_unstable_anyway_is_no_loss():
+    """With soft springs an oscillation grows on both sides of it."""
+    soft = ROBOT.with_value(ALL, stiffness(3.0))
+    with pytest.raises(AnalysisError, match="the straight walk above the pitchfork is unstable"):
+        first_loss(soft, K1, (stiffness(0.5), stiffness(9.0)), Kind.PITCHFORK, normal_form=False)
+
+
 def test_coefficients_are_those_of_the_joint_angles():
     (point,) = bifurcations(ROBOT, K1, (stiffness(11.0), stiffness(13.0)))
     share = np.linalg.norm(point.point.mode[3:8])

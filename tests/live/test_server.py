@@ -46,7 +46,7 @@ class Nobody:
     def __init__(self, engine):
         pass
 
-    def ask(self, robot, what="theory"):
+    def ask(self, robot, springs=None):
         pass
 
     def answers(self):
@@ -281,6 +281,27 @@ def test_another_preset_is_another_robot(page):
         time.sleep(0.05)
 
 
+def test_a_browser_that_nobody_knows_yet_moves_no_slider(page):
+    """Before its first word about its camera viser would move it in all browsers, and the robot would not follow."""
+    port, refused = port_of(page), page.gate.refused
+    slider = page._controls._sliders["friction"]
+    uuid, before = slider._impl.uuid, slider.value
+    at = {"origin": f"http://localhost:{port}", "subprotocols": [PROTOCOL]}
+    move = msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": 0.5}})
+    with connect(f"ws://localhost:{port}", **at, compression=None, max_size=None, close_timeout=0.1) as client:
+        client.send(move)
+        end = time.monotonic() + 10.0
+        while page.gate.refused == refused and time.monotonic() < end:
+            time.sleep(0.01)
+        assert (page.gate.refused, slider.value) == (refused + 1, before)
+        client.send(msgspec.msgpack.encode(live_clients._CAMERA))
+        client.send(move)
+        while slider.value != 0.5:
+            assert time.monotonic() < end, (page.gate.refused - refused, page.server.get_clients())
+            time.sleep(0.01)
+    page.wish(wishes.Set("friction", before))
+
+
 def test_a_flood_of_messages_is_slowed_down(page):
     port, before, begun = port_of(page), page.gate.refused, time.monotonic()
     at = {"origin": f"http://localhost:{port}", "subprotocols": [PROTOCOL]}
@@ -290,6 +311,20 @@ def test_a_flood_of_messages_is_slowed_down(page):
         while page.gate.refused < before + 300:
             time.sleep(0.01)
     assert time.monotonic() - begun > 90 / gate._RATE  # all but those that may come at once
+
+
+@pytest.mark.parametrize(
+    ("asked", "part"),
+    [
+        (wishes.Set("frictoin", 1.0), "did you mean 'friction'"),
+        (wishes.Spring(9, 0.5), r"slider = 'springs.stiffness\[9\]': must be a slider"),
+        (wishes.Spring(0, -1.0), r"springs.stiffness\[0\] = -1.0: is out of range"),
+        (wishes.Spring(0, float("nan")), "must be a finite number"),
+    ],
+)
+def test_a_slider_that_cannot_be_set_is_an_error_in_python(page, asked, part):
+    with pytest.raises(ParameterError, match=part):
+        page.wish(asked)
 
 
 def test_the_largest_seed_reaches_later_browsers(page):

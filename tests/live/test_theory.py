@@ -1,15 +1,19 @@
 """What is computed beside the walk."""
 
+import re
 import time
+from itertools import combinations
 
 import pytest
 
 from chilopod.analysis import radius_laws
-from chilopod.analysis.parameters import stiffness
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.live.plots import STABLE, UNSTABLE, drawn
 from chilopod.live.theory import Beside, Growth, Theory, growth_of, theory_of
 from chilopod.robot import load_robot
 
 PLANAR = load_robot("aoi2022-planar")
+SPRINGS = stiffness(2.05), stiffness(61.5)
 
 
 def test_the_law_is_that_of_everybody_else(told):
@@ -38,9 +42,47 @@ def test_growth_changes_its_sign_at_the_pitchfork(told):
     assert below > 0.0 > above
 
 
+@pytest.mark.parametrize(
+    ("spring", "stretches"),
+    [(3.0, [False, False, False]), (6.0, [False, False, True])],
+    ids=["sways everywhere", "sways when soft"],
+)
+def test_a_straight_walk_that_sways_is_not_drawn_as_a_stable_one(spring, stretches):
+    """A pitchfork alone does not say whether it is stable above."""
+    robot, pieces = PLANAR.with_value("springs.stiffness", stiffness(spring)), []
+    theory_of(robot, "planar", SPRINGS, pieces.append)
+    known = pieces[-1]
+    assert known.pitchfork is None
+    assert [each.stable for each in known.straight] == stretches
+    assert [each.begins for each in known.straight] == ["", "pitchfork", "sway"]
+    assert known.straight[-1].high >= SPRINGS[1]
+    for k1 in (5.0, 8.0, 20.0, 60.0):
+        assert known.verdict(stiffness(k1)) is (growth_of(robot.with_value(K1, stiffness(k1))).rate < 0.0)
+    picture = drawn(known, SPRINGS[1], [(stiffness(20.0), 0.0)])
+    assert picture.count(STABLE) == sum(stretches)
+    assert picture.count(UNSTABLE) == 3 - sum(stretches)
+    assert ("sway 10.3" in picture) == any(stretches)
+
+
+def test_the_words_in_the_picture_keep_apart():
+    """Of a remark beside a branch no line reaches over the axis, or another line."""
+    remark = "the curved walks beside the pitchfork must be stable and tighten for a radius law"
+    picture = drawn(Theory(PLANAR, stiffness(12.0), remark=remark), SPRINGS[1], [])
+    texts = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="(\w+)">([^<]+)', picture)
+    boxes = []
+    for x, y, anchor, text in texts:
+        width = 6.0 * len(text)
+        left = float(x) - width * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
+        boxes.append((left, left + width, float(y) - 9.0, float(y) + 2.0))
+    for one, other in combinations(boxes, 2):
+        assert one[1] <= other[0] or other[1] <= one[0] or one[3] <= other[2] or other[3] <= one[2]
+    assert "tighten for a" in picture
+    assert STABLE not in picture  # nobody has judged the straight walk
+
+
 def test_what_cannot_be_known_is_said():
     pieces = []
-    theory_of(PLANAR.with_value("gait.side_phase", 0.0), "planar", pieces.append)
+    theory_of(PLANAR.with_value("gait.side_phase", 0.0), "planar", SPRINGS, pieces.append)
     last = pieces[-1]
     assert last.law is None
     assert last.remark == "no pitchfork in the interval"
@@ -50,9 +92,9 @@ def test_only_the_last_question_is_answered_and_a_short_one_in_between():
     beside = Beside("planar")
     try:
         wide = PLANAR.with_value("gait.stride", 0.029)
+        beside.ask(PLANAR, SPRINGS)
+        beside.ask(wide, SPRINGS)
         beside.ask(PLANAR)
-        beside.ask(wide)
-        beside.ask(PLANAR, "growth")
         found, end = [], time.monotonic() + 120.0
         while time.monotonic() < end:
             found += beside.answers()
@@ -63,5 +105,5 @@ def test_only_the_last_question_is_answered_and_a_short_one_in_between():
         assert [each.rate for each in found if isinstance(each, Growth)] == [growth_of(PLANAR).rate]
     finally:
         beside.close()
-    beside.ask(PLANAR)  # to nobody
+    beside.ask(PLANAR, SPRINGS)  # to nobody
     assert beside.answers() == []

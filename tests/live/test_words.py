@@ -10,14 +10,15 @@ import pytest
 from chilopod.analysis.parameters import stiffness
 from chilopod.engine import Status
 from chilopod.live import Session, wishes
-from chilopod.live.theory import Growth, Theory
+from chilopod.live.theory import Growth, Stretch, Theory, growth_of
 from chilopod.live.words import sentences
 from chilopod.robot import load_robot
 from chilopod.steering import RadiusLaw
 
 PLANAR = load_robot("aoi2022-planar")
 LAW = RadiusLaw(stiffness(1.0) * np.array([6.0, 8.0, 10.0, 12.0]), np.array([0.25, 0.32, 0.5, np.inf]), "N*mm/deg")
-THEORY = Theory(PLANAR, LAW.pitchfork, LAW.values[::-1], LAW.radii[::-1], np.ones(4, dtype=bool), LAW)
+STRAIGHT = (Stretch(0.0, LAW.pitchfork, False), Stretch(LAW.pitchfork, stiffness(61.5), True, "pitchfork"))
+THEORY = Theory(PLANAR, LAW.pitchfork, LAW.values[::-1], LAW.radii[::-1], np.ones(4, dtype=bool), LAW, STRAIGHT)
 
 
 @pytest.fixture
@@ -43,6 +44,9 @@ def test_every_state_has_its_sentence(begun):
         "Straight and stable: its first spring, 41 N·mm/deg, is stiffer than the pitchfork at"
     )
     assert "fades by 18 % a second" in said(begun, rate=-0.2)
+    unjudged = said(begun, replace(THEORY, straight=()))
+    assert unjudged.startswith("It walks straight on: its first spring, 41 N·mm/deg, is stiffer")
+    assert "stable" not in unjudged
     assert "The curve of 0.40 m straightens" in said(begun, **curve(0.4), turning=-0.1)
     assert "The curve of 0.40 m will straighten" in said(begun, **curve(0.4), turning=0.1)
     begun.box.put(wishes.Spring(0, stiffness(8.0)))
@@ -59,6 +63,35 @@ def test_every_state_has_its_sentence(begun):
     assert pulled == "Joint 2 is pulled aside, and it walks a curve of 0.90 m to the left as long as that lasts."
     assert said(begun, pulled=np.array([0.0, 0.1, 0.0, 0.0, -0.1])).startswith("Joints 2, 5 are pulled aside")
     assert "It has stopped: a yaw joint bent" in said(begun, status=Status.OUT_OF_RANGE)
+
+
+def test_an_undulating_robot_walks_no_curve():
+    """Its bend changes sides."""
+    session, known = Session(PLANAR), Theory(remark="it sways")
+    for wish in (wishes.Spring(None, stiffness(3.0)), wishes.Spring(0, stiffness(20.0))):
+        session.box.put(wish)
+        session.obey()
+    growth, bent, swaying = growth_of(session.settings.robot), 0, 0
+    for _ in range(60):
+        session.walk_on(1.0)
+        seen = session.seen()
+        bent += seen.bend > 0.3
+        told = " ".join(sentences(seen, session.settings, known, growth))
+        assert "curve" not in told
+        swaying += "It walks on, swaying from side to side." in told
+        assert "a sway from side to side grows by 12 % a second" in told
+    assert bent > 20
+    assert swaying > 20
+
+
+def test_a_bend_that_stays_on_its_side_after_undulations_is_a_curve(begun):
+    begun._left.clear()
+    told = []
+    for each in [*np.repeat([True, False, True, False], 10), *np.ones(21, dtype=bool)]:
+        begun._left.append(each)
+        told.append(begun.seen().undulates)
+    assert told == [False] * 30 + [True] * 30 + [False]
+    assert "swaying from side to side" in said(begun, replace(THEORY, straight=()), **curve(0.4), undulates=True)
 
 
 @pytest.mark.parametrize(

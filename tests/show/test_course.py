@@ -40,6 +40,16 @@ def test_the_picture_names_targets_and_what_became_of_them(done, narrow):
         assert np.flatnonzero(np.isnan(line.get_ydata())).tolist() == [100]
 
 
+def test_the_dot_is_where_the_distance_is_measured(done):
+    """Half a module ahead of it a missed target looked reached."""
+    with style.house_style():
+        floor = draw(done).axes[0]
+    dots = [each.get_xydata()[0] for each in floor.lines if each.get_markersize() == 4.5]
+    first = done.record.isel(robot=0)
+    walked = first.position.transpose("time", "axis").sel(time=[0.0, 2.0], method="nearest").values
+    np.testing.assert_allclose(dots[:2], walked, atol=1e-12)
+
+
 @pytest.mark.parametrize(("targets", "lines"), [(1, 3), (0, 1)])
 def test_a_target_that_stays_or_none_at_all_is_drawn_too(done, targets, lines):
     """As of a course that ends with its first target, or has none that can be reached."""

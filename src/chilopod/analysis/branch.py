@@ -55,7 +55,7 @@ def curved_walks(
     side: int = 1,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Follow the curved walks from the pitchfork at the upper end of stability through an interval of a parameter.
+    """Follow the curved walks from the stiffest pitchfork of the straight walk through an interval of a parameter.
 
     Parameters
     ----------

@@ -288,7 +288,8 @@ def first_loss(
     Raises
     ------
     AnalysisError
-        If there is no bifurcation, or it is of another kind; None is any kind.
+        If there is no bifurcation, it is of another kind (None is any kind), or the straight walk at ``between[1]`` is
+        not known to be stable.
     """
     what, between = "loss of stability" if kind is None else kind.label, between or searched_springs(robot)
     spaced = np.geomspace if between[0] > 0.0 else np.linspace
@@ -296,6 +297,10 @@ def first_loss(
         # From the stiff end down, so that points far below, where the walk is unstable anyway, cost nothing.
         points = bifurcations(robot, parameter, (float(low), between[1]), normal_form=False)
         if points:
+            stable = stability.multipliers(family(robot, parameter)(between[1])).stable
+            if not stable:
+                problem = f"the straight walk above the {points[-1].point.kind.label} is {VERDICTS[stable]}"
+                raise AnalysisError(problem, field=parameter, value=interval_text(robot, parameter, between))
             if kind in (None, points[-1].point.kind):
                 if not normal_form:
                     return points[-1]
@@ -313,7 +318,8 @@ def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) ->
 
 
 def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:
-    """Pitchfork in k1, searched at all springs that may be critical."""
+    """Pitchfork at which the straight walk loses stability as k1 is softened, see :func:`first_loss`; searched at all
+    springs that may be critical."""
     return first_loss(robot, K1, None, Kind.PITCHFORK, normal_form)
 
 

@@ -205,7 +205,7 @@ class Gate:
 
     # -- messages
 
-    def message(self, connection: ServerConnection, raw: Any) -> bytes | None:
+    def message(self, connection: _Guarded, raw: Any) -> bytes | None:
         """Checked part of a message, written down anew for viser to read; None if it is refused."""
         read: Any = None
         try:
@@ -222,13 +222,16 @@ class Gate:
             self._refuse(f"a message, {reprlib.repr(read)!a}")
         return msgspec.msgpack.encode(read) if offered else None
 
-    def _offers(self, connection: ServerConnection, message: Any) -> bool:
+    def _offers(self, connection: _Guarded, message: Any) -> bool:
         """True if the page has the element that a message names."""
         server = self._viser
         assert server is not None
         there = list(server._websock_server._live_connections.items())
         here = server.get_clients().get(next((number for number, each in there if each is connection), -1))
         scopes = [server.gui] if here is None else [server.gui, here.gui]
+        connection.introduced |= isinstance(message, _messages.ViewerCameraMessage)
+        if not connection.introduced:  # viser would move elements in all browsers, and tell nobody here
+            return False
         match message:
             case _messages.ScenePointerMessage(event_type=event, ray_origin=start, ray_direction=ray, screen_pos=at):
                 return event == "click" and start is not None and ray is not None and len(at) == 1
@@ -250,6 +253,7 @@ class _Guarded(ServerConnection):
     def __init__(self, gate: Gate, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
         self._gate, self._due = gate, 0.0
+        self.introduced = False  #: True once it has sent its camera
 
     async def recv(self, *args: Any, **more: Any) -> Any:
         while True:

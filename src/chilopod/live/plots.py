@@ -25,14 +25,14 @@ from chilopod.show.style import CURVES, SCENE
 
 _WIDTH, _HEIGHT = 320.0, 200.0  # px
 _LEFT, _RIGHT, _TOP, _BOTTOM = 42.0, 312.0, 8.0, 166.0  # px, of the axes
-_LETTERS = 42  # of a line
+_LETTERS, _BESIDE = 42, 28  # of a line, and of one beside branches
 _TRAIL: Final = 60  # earlier points of the walk
 _LEAST, _MOST = 60.0, 240.0  # deg of bend, between which the axis ends
 _SPAN = 40.0  # s of joint angles that are shown
 _POINTS = 160
 _ABOVE = 800, 560  # px, of the picture from above
 _LINE = 18  # px of a line of its text
-_STABLE, _UNSTABLE = 'stroke-width="2.5"', 'stroke-width="1.5" stroke-dasharray="5 4"'
+STABLE, UNSTABLE = 'stroke-width="2.5"', 'stroke-width="1.5" stroke-dasharray="5 4"'
 
 
 class Pitchfork:
@@ -123,23 +123,26 @@ def _bends(theory: Theory) -> Array:
 
 
 def _branches(theory: Theory, bends: Array, place: _Place) -> list[str]:
-    fork = theory.pitchfork
-    if fork is None:
-        return [
-            _text(0.5 * (_LEFT + _RIGHT), _TOP + 26.0 + 14.0 * row, escape(line), "middle")
-            for row, line in enumerate(wrap(theory.remark, _LETTERS))
-        ]
-    parts = [
-        _line([place(fork, 0.0), place(place.stiffest, 0.0)], _STABLE),
-        _line([place(0.0, 0.0), place(fork, 0.0)], _UNSTABLE),
-        _text(place(fork, 0.0)[0] + 6.0, place(fork, 0.0)[1] - 7.0, f"pitchfork {_in_unit(fork):.3g}", "start"),
-    ]
-    if theory.remark:
-        parts.append(_text(_RIGHT, _BOTTOM - 21.0, escape(theory.remark), "end"))
+    parts, before = [], None
+    for each in theory.straight:
+        (x, y), end = place(each.low, 0.0), place(each.high, 0.0)
+        if each.stable is not None and end[0] > x:
+            parts.append(_line([(x, y), end], STABLE if each.stable else UNSTABLE))
+        if each.begins and each.stable is not before and each.low < place.stiffest:
+            way, right = f"{each.begins} {_in_unit(each.low):.3g}", x < 0.7 * _RIGHT
+            parts.append(_text(x + 6.0 if right else x - 6.0, y - 7.0, way, "start" if right else "end"))
+        before = each.stable
+    # Branches are on the left, and the words beside them on the right.
+    x, anchor, letters = (
+        (0.5 * (_LEFT + _RIGHT), "middle", _LETTERS) if theory.pitchfork is None else (_RIGHT, "end", _BESIDE)
+    )
+    rows = wrap(theory.remark, letters)
+    y = _TOP + 26.0 if theory.pitchfork is None else _BOTTOM - 7.0 - 14.0 * len(rows)
+    parts += [_text(x, y + 14.0 * row, escape(line), anchor) for row, line in enumerate(rows)]
     for side in (1.0, -1.0):
         points = [place(*each) for each in zip(theory.springs, side * bends, strict=True)]
         for first, last, stable in stretches(theory.stable.tolist()):
-            parts.append(_line(points[first : last + 1], _STABLE if stable else _UNSTABLE))
+            parts.append(_line(points[first : last + 1], STABLE if stable else UNSTABLE))
     return parts
 
 

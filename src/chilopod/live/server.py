@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
+from chilopod.analysis.parameters import K1
 from chilopod.engine import engine_named
 from chilopod.errors import in_words
 from chilopod.extras import needs
@@ -145,7 +146,9 @@ class Live:
         self.view.pins.on_drag("left")(self._controls.drag)
 
     def wish(self, wish: wishes.Wish) -> None:
-        """Leave a wish, from any thread, as the page does."""
+        """Leave a wish, from any thread, as the page does; a ParameterError if a slider cannot be set so."""
+        if isinstance(wish, wishes.Set):
+            self.session.checked(wish)
         self.session.box.put(wish)
         self._wished = True
 
@@ -265,13 +268,13 @@ class Live:
         """Ask for the unknown theory of the present robot."""
         robot = self.session.settings.robot
         if engine_named(self.session.engine).traits.exact:
-            self._beside.ask(robot, "growth")
+            self._beside.ask(robot)
         # The theory is of any first spring.
         parts = [(each.springs.stiffness[1:], *but_springs(each)) for each in (robot, before) if each is not None]
         if before is None or parts[0] != parts[1]:
             self._theory = Theory(remark="computing the pitchfork", computing=True)
             self.session.law = None
-            self._beside.ask(robot)
+            self._beside.ask(robot, self.session.sliders[K1].limits)
 
     def _shown(self) -> Theory:
         """Theory as far as a challenge allows."""

@@ -14,7 +14,7 @@ from chilopod.engine import Command, Controller, Status, Walk, engine_named, ste
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.live import wishes
-from chilopod.live.sliders import sliders_of
+from chilopod.live.sliders import Slider, sliders_of
 from chilopod.live.state import Seen, Settings, as_finite, as_seed, as_within, but_springs
 from chilopod.record import Recording
 from chilopod.robot import Robot
@@ -43,6 +43,7 @@ _LONGEST = 900.0  # s of it in one piece
 _MOST_RECORDS = 100  # of a session
 _MOST_BYTES = 1 << 29  # of all of them, before they are packed
 _MOST_WORDS = 4
+_REMEMBERED = 600  # looks, in which an undulation is sought
 
 
 class Session:
@@ -114,6 +115,7 @@ class Session:
             self._target,
             self._steering,
             walk.states()[0],
+            self._undulates(),
         )
 
     def messages(self) -> list[str]:
@@ -181,6 +183,14 @@ class Session:
         self._start(robot, states)
         self._looks: deque[Array] = deque([self._walk.observe().joint_angles[0]] * LOOKS, maxlen=LOOKS)
         self._bends: deque[float] = deque(maxlen=LOOKS + 1)
+        self._left: deque[bool] = deque(maxlen=_REMEMBERED)
+
+    def _undulates(self) -> bool:
+        """True if the bend goes from side to side: it has not stayed on this one for longer than the last whole
+        undulation took."""
+        left = np.array(self._left)
+        *_, begin, _, end = (0, 0, 0, *(np.flatnonzero(left[1:] != left[:-1]) + 1))
+        return bool(begin > 0 and len(left) - end <= end - begin)
 
     def _start(self, robot: Robot, states: Array) -> None:
         if self.settings.recording and not (self._recorded < _MOST_RECORDS and self._bytes < _MOST_BYTES):
@@ -210,7 +220,12 @@ class Session:
             self._push()
         if np.isfinite(angles).all():
             self._looks.append(angles)
-            self._bends.append(float(np.abs(np.mean(self._looks, axis=0)).sum()))
+            mean = np.mean(self._looks, axis=0)
+            self._bends.append(float(np.abs(mean).sum()))
+            if self._controller is None and not self._pull.any():
+                self._left.append(bool(mean.sum() < 0.0))
+            else:  # who steers or pulls changes sides too
+                self._left.clear()
 
     def _between_cycles(self) -> None:
         """Changes that are possible between two gait cycles only."""
@@ -264,8 +279,8 @@ class Session:
 
     def _obey(self, wish: wishes.Wish) -> None:
         match wish:
-            case wishes.Set(slider, value):
-                self._set(slider, value)
+            case wishes.Set():
+                self._set(wish)
             case wishes.Target(place, by_hand):
                 self._aim(place, by_hand)
             case wishes.Steering(strategy):
@@ -289,12 +304,16 @@ class Session:
             case wishes.Record():
                 self.stop_recording()
 
-    def _set(self, name: str, value: object) -> None:
-        slider = self.sliders.get(name)
+    def checked(self, wish: wishes.Set) -> tuple[Slider, float]:
+        """Slider of a wish and its value; a ParameterError if there is none, or the value is out of range."""
+        slider = self.sliders.get(wish.slider)
         if slider is None:
-            near, allowed = nearest_name(name, self.sliders), ", ".join(self.sliders)
-            raise ParameterError("must be a slider", field="slider", value=name, allowed=allowed, nearest=near)
-        number, before = as_within(name, value, slider.limits, slider.si), self.settings.robot
+            near, allowed = nearest_name(wish.slider, self.sliders), ", ".join(self.sliders)
+            raise ParameterError("must be a slider", field="slider", value=wish.slider, allowed=allowed, nearest=near)
+        return slider, as_within(slider.name, wish.value, slider.limits, slider.si)
+
+    def _set(self, wish: wishes.Set) -> None:
+        (slider, number), before = self.checked(wish), self.settings.robot
         settings = slider.apply(self.settings, number)
         self._engine.common(settings.robot)
         self.settings = settings

@@ -32,6 +32,7 @@ class Seen:
     target: tuple[float, float] | None  #: m
     steering: str  #: name of the strategy that steers there: leg yaw while those of springs are not known; "" for none
     state: Array  #: as ``initial`` of the engine's ``start`` takes it, (n,)
+    undulates: bool  #: True if it bends from side to side, so that its mean is no curve
 
     @property
     def bend(self) -> float:

@@ -11,7 +11,9 @@ import signal
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,16 @@ _GROWTH = 30.0  # s that a short question may take
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """First springs (N*m/rad) between which the straight walk does not gain or lose stability."""
+
+    low: float
+    high: float
+    stable: bool | None  # None if undecided
+    begins: str = ""  # how stability changes at ``low``, empty where only the search begins
+
+
+@dataclass(frozen=True)
 class Theory:
     """Theory of a robot with any first spring; None for unknown parts, with a remark that gives the reason."""
 
@@ -39,6 +51,7 @@ class Theory:
     radii: Array = field(default_factory=lambda: np.empty(0))  # of these walks, m
     stable: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # True if the walk is stable
     law: RadiusLaw | None = None  # radius law of the springs, for strategies
+    straight: tuple[Stretch, ...] = ()  # of the straight walk by rising first spring; nothing is known elsewhere
     remark: str = ""
     computing: bool = False  # True if more is to come
 
@@ -48,10 +61,14 @@ class Theory:
         if self.pitchfork is None:
             return None
         if spring >= self.pitchfork:
-            return float("inf")
+            return float("inf") if self.verdict(spring) else None
         if self.law is None or spring < self.law.values[0]:
             return None
         return self.law.radius(spring)
+
+    def verdict(self, spring: float) -> bool | None:
+        """True if the straight walk with a first spring (N*m/rad) is stable, None if that is not known."""
+        return next((each.stable for each in self.straight if each.low <= spring <= each.high), None)
 
 
 @dataclass(frozen=True)
@@ -72,26 +89,45 @@ def growth_of(robot: Robot) -> Growth:
     return Growth(robot, rate, abs(sways))
 
 
-def theory_of(robot: Robot, engine: str, callback: Callable[[Theory], None]) -> None:
+def theory_of(robot: Robot, engine: str, springs: tuple[float, float], callback: Callable[[Theory], None]) -> None:
     """Compute the theory of a robot, and call a function with each intermediate result; its exceptions end the work.
 
-    In an engine whose walks are not those of the planar theory, some are walked. The first spring does not matter.
+    In an engine whose walks are not those of the planar theory, some are walked. The first spring does not matter;
+    those between which the straight walk is judged are ``springs`` (N*m/rad).
     """
     known = Theory(robot, computing=True)
     try:
         if engine_named(engine).traits.exact:
-            _exact(known, callback)
+            _exact(known, springs, callback)
         else:
             from chilopod.tasks import radius_law
 
             law = radius_law(robot, engine, progress=lambda done, _: callback(_following(known, done)))
             stable = np.ones(len(law.values), dtype=np.bool_)
-            callback(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law))
+            # Straight walks with stiffer springs are not walked.
+            straight = (Stretch(0.0, law.pitchfork, False),)
+            callback(Theory(robot, law.pitchfork, law.values[::-1], law.radii[::-1], stable, law, straight))
     except ChilopodError as error:
         callback(replace(known, remark=error.problem, computing=False))
 
 
-def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
+def straight_walks(robot: Robot, springs: tuple[float, float]) -> tuple[Stretch, ...]:
+    """Stretches of the straight walk between two first springs, undecided where bifurcations may be missing."""
+    from chilopod.analysis import bifurcations
+    from chilopod.analysis.straight_walk import family
+    from chilopod.stability import Kind, multipliers
+
+    why, make, ways = list[str](), family(robot, K1), {Kind.NEIMARK_SACKER: "sway"}
+    found = [each.point for each in bifurcations(robot, K1, springs, normal_form=False, remark=why.append)]
+    begins = ["", *(ways.get(each.kind, each.kind.label) for each in found)]
+    ends = pairwise([springs[0], *(each.value for each in found), springs[1]])
+    return tuple(
+        Stretch(low, high, None if why else multipliers(make(0.5 * (low + high))).stable, way)
+        for (low, high), way in zip(ends, begins, strict=True)
+    )
+
+
+def _exact(known: Theory, springs: tuple[float, float], callback: Callable[[Theory], None]) -> None:
     from chilopod.analysis import curved_walks, first_loss
     from chilopod.stability import Kind
     from chilopod.tasks.radius_law import that_holds
@@ -101,7 +137,12 @@ def _exact(known: Theory, callback: Callable[[Theory], None]) -> None:
     # As the radius law has it, but for the first spring, which is what varies.
     low, high = (part * max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]) for part in _BETWEEN)
     callback(replace(known, remark="computing the pitchfork"))
-    loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
+    known = replace(known, straight=straight_walks(robot, (min(low, springs[0]), max(high, springs[1]))))
+    try:
+        loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
+    except ChilopodError as error:
+        callback(replace(known, remark=error.problem, computing=False))
+        return
     known = replace(known, pitchfork=loss.point.value)
     callback(_following(known, 0.0))
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=lambda done, _: callback(_following(known, done)))
@@ -136,10 +177,11 @@ class Beside:
             self._process.start()
         there.close()
 
-    def ask(self, robot: Robot, what: str = "theory") -> None:
-        """Ask for the theory of a robot, or for the ``growth`` of small bends of its straight walk."""
+    def ask(self, robot: Robot, springs: tuple[float, float] | None = None) -> None:
+        """Ask for the theory of a robot, see :func:`theory_of`, or without springs for the growth of small bends of its
+        straight walk."""
         with suppress(OSError):  # the process may have ended, and answers nothing any more
-            self._here.send((what, robot))
+            self._here.send((robot, springs))
 
     def answers(self) -> list[Theory | Growth]:
         """Answers since the last call; never waits."""
@@ -165,15 +207,15 @@ def _answer(pipe: Connection, engine: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # as it is from the start, unless a thread of the page started it
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    waiting: dict[str, Robot] = {}
+    waiting: dict[str, Any] = {}
 
     def take() -> None:
-        what, robot = pipe.recv()
-        waiting[what] = robot
+        robot, springs = pipe.recv()
+        waiting["theory" if springs else "growth"] = robot, springs
 
     def growth() -> None:
         with suppress(ChilopodError):  # where there is no straight walk to speak of
-            pipe.send(growth_of(waiting.pop("growth")))
+            pipe.send(growth_of(waiting.pop("growth")[0]))
 
     def tell(known: Theory) -> None:
         while pipe.poll():
@@ -192,4 +234,5 @@ def _answer(pipe: Connection, engine: str) -> None:
                 growth()
                 continue
             with suppress(_Stale):
-                theory_of(waiting.pop("theory"), engine, tell)
+                robot, springs = waiting.pop("theory")
+                theory_of(robot, engine, springs, tell)

@@ -64,7 +64,8 @@ def _held(seen: Seen, settings: Settings) -> list[str]:
 
 def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     k1 = float(seen.stiffness[0])
-    radius, side, bent, arc = radius_of(seen), _side(seen), seen.bend > _STRAIGHT, _arc(seen)
+    radius, side, arc = radius_of(seen), _side(seen), _arc(seen, growth)
+    bent = seen.bend > _STRAIGHT and not seen.undulates
     if theory.pitchfork is None:
         return _without_pitchfork(seen, theory, growth)
     fork, settled = f"the pitchfork at {spring_text(theory.pitchfork)}", theory.settled(k1)
@@ -72,6 +73,8 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
         stiff = f"its first spring, {spring_text(k1)}, is stiffer than {fork}"
         if growth and growth.rate > 0.0:
             return f"It walks {arc}. Though {stiff}, the straight walk is unstable: {_grows(growth)}."
+        if not theory.verdict(k1) and not (growth and growth.rate < 0.0):
+            return f"It walks {arc}: {stiff}."
         if bent:
             now = "straightens" if seen.turning < 0.0 else "will straighten"
             return f"The curve of {radius:.2f} m {now}: {stiff}."
@@ -81,7 +84,7 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     if settled is None:
         beyond = theory.remark or "no settled curve is known with this spring"
         return f"{soft}, and it walks {arc} ({beyond})."
-    if abs(radius - settled) < _SETTLED * settled and abs(seen.turning) < _SLOW * seen.bend:
+    if bent and abs(radius - settled) < _SETTLED * settled and abs(seen.turning) < _SLOW * seen.bend:
         return f"Settled on {arc}; the branch of curved walks has {settled:.2f} m. {soft}."
     if not bent:
         speed = f" by {_percent(growth)} a second" if growth and growth.rate > 0.0 else ""
@@ -93,7 +96,7 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
 
 def _without_pitchfork(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     """Sentences on a robot whose pitchfork is not known yet, or that has none."""
-    walks = f"It walks {_arc(seen)}."
+    walks = f"It walks {_arc(seen, growth)}."
     if growth:
         stable = growth.rate <= 0.0
         now = f"what disturbs it fades by {_percent(growth)} a second" if stable else _grows(growth)
@@ -121,8 +124,15 @@ def _side(seen: Seen) -> str:
     return "left" if seen.mean_angles.sum() < 0.0 else "right"
 
 
-def _arc(seen: Seen) -> str:
-    return f"a curve of {radius_of(seen):.2f} m to the {_side(seen)}" if seen.bend > _STRAIGHT else "straight on"
+def _arc(seen: Seen, growth: Growth | None = None) -> str:
+    """Way of a walk in words; a bend that goes from side to side, or is bound to, is no curve."""
+    if seen.bend <= _STRAIGHT:
+        return "straight on"
+    if seen.undulates:
+        return "on, swaying from side to side"
+    if growth and growth.rate > 0.0 and growth.sways:
+        return f"on, bent to the {_side(seen)} just now"
+    return f"a curve of {radius_of(seen):.2f} m to the {_side(seen)}"
 
 
 def _percent(growth: Growth) -> str:

@@ -51,11 +51,12 @@ def draw_modules(axes: Axes, centres: Array, headings: Array, length: float, **l
 
 
 def draw_spines(axes: Axes, spines: Array) -> None:
-    """Draw bodies (moments, points, 2) as lines with their joints, the front end a larger dot."""
-    look: dict[str, Any] = {"alpha": 0.35, "linewidth": 2.5, "markersize": 3, "zorder": 2}
+    """Draw bodies (moments, points, 2) as lines with their joints, and as a larger dot the centre of module 1, from
+    which distances are measured."""
+    look: dict[str, Any] = {"alpha": 0.35, "linewidth": 2.5, "markersize": 3, "markevery": slice(1, -1), "zorder": 2}
     for spine in spines:
         axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, **look)
-        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)
+        axes.plot(*spine[:2].mean(axis=0), "o", color=style.BLACK, markersize=4.5, zorder=4)
 
 
 def draw_joints(axes: Axes, joints: Array, color: str, size: float = 4.0) -> None:
