@@ -12,6 +12,7 @@ import pytest
 
 from chilopod import stability
 from chilopod.analysis import bifurcations, straight_walk
+from chilopod.flows.taylor import stepping
 from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.planar import PlanarModel, start
 from chilopod.planar.along import FollowedModel, walk_means
@@ -156,7 +157,7 @@ def test_read_only_arrays_compile_no_kernel_a_second_time():
 
 
 def layouts(types: Any) -> Iterator[str]:
-    """Of all arrays among the types of some arguments."""
+    """Layouts of all arrays among the types of some arguments."""
     for each in types:
         if hasattr(each, "layout"):
             yield each.layout
@@ -168,5 +169,8 @@ def test_arrays_of_another_order_in_memory_compile_no_kernel_a_second_time():
     FollowedModel(PRESET).flow(MODEL.orbit + 1e-3, 0.0, 0.1)
     MODEL.flow_states(np.asfortranarray([MODEL.orbit, MODEL.orbit]), 0.0, 0.1)
     start(PRESET, seeds=[3, 4]).advance(0.1)
-    for kernel in (_advance, walk_abreast):
+    system = stability.from_rhs(lambda t, x: [x[1], np.cos(t) - x[0]], 2, 2.0 * np.pi)
+    system.flow(np.ones(2), 0.0, 0.1)
+    system.flow_states(np.asfortranarray(np.ones((3, 2))), 0.0, 0.1)
+    for kernel in (_advance, walk_abreast, stepping.advance):
         assert {layout for signature in kernel.signatures for layout in layouts(signature)} == {"C"}

@@ -65,7 +65,7 @@ def test_a_straight_walk_that_sways_is_not_drawn_as_a_stable_one(spring, stretch
 
 
 def test_the_words_in_the_picture_keep_apart():
-    """Of a remark beside a branch no line reaches over the axis, or another line."""
+    """No line of a remark beside a branch reaches over the axis, or another line."""
     remark = "the curved walks beside the pitchfork must be stable and tighten for a radius law"
     picture = drawn(Theory(PLANAR, stiffness(12.0), remark=remark), SPRINGS[1], [])
     texts = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="(\w+)">([^<]+)', picture)

@@ -127,8 +127,8 @@ def advance_each(
     tape: Any, directions: Any, clock: Any, params: Any, states: Any, span: Any, control: Any, outcome: Any
 ) -> tuple[int, int, float]:
     """Carry several states, shape (states, n), without derivatives, up to the first that does not reach the end."""
-    for x in states:
-        status, steps, t = advance(tape, directions, clock, params, x, span, control, outcome)
+    for i in range(states.shape[0]):  # a loop over the rows would compile `advance` once more, for strided arrays
+        status, steps, t = advance(tape, directions, clock, params, states[i], span, control, outcome)
         if status != DONE:
             return status, steps, t
     return DONE, 0, span[1]

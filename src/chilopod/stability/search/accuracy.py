@@ -18,7 +18,7 @@ _FOLLOWED, _LEAST_ERROR = 10.0, 1e-15  # factor on the error of the first orbit 
 class Accuracy:
     """Relative errors of the derivatives of return maps.
 
-    That ``of_flow`` is in units that balance the states: the flow may contract strongly within a return, and at
+    ``of_flow`` is the flow's, in units that balance the states: it may contract strongly within a return, and at
     followed orbits less than at the first one.
     """
 
