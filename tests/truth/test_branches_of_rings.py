@@ -4,10 +4,12 @@ from math import cos, pi, sqrt
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from chilopod.errors import ParameterError
-from chilopod.stability import Ending, Kind, follow, locate, switch
+from chilopod.stability import Ending, Kind, follow, from_rhs, locate, switch
 from chilopod.stability.symmetry.isotypic import SymmetricKind
 from helpers import systems
 
@@ -108,6 +110,49 @@ def test_the_symmetry_of_a_ring_need_not_be_declared(cells, moves):
     assert [point.bifurcation.multiplicity for point in special] == [count for _, count in known]
     for point, (value, _) in zip(special, known, strict=True):
         assert abs(point.value - value) < 1e-12
+
+
+def test_the_bound_of_a_double_multiplier_of_a_flow():
+    """Three Brusselators without a declared symmetry: where two multipliers cross at once, orbits leave in any
+    direction of a plane. Truth by another integrator: the variation of one cell in a wave around the ring."""
+
+    def cell(u, v):
+        return 1.0 - 3.5 * u + u * u * v, 2.5 * u - u * u * v
+
+    def family(c):
+        def rhs(t, x):
+            u, v = x[::2], x[1::2]
+            du, dv = cell(u, v)
+            spread = [c * (v[i - 1] + v[(i + 1) % 3] - 2.0 * v[i]) for i in range(3)]
+            return [each for i in range(3) for each in (du[i], dv[i] + spread[i])]
+
+        return from_rhs(rhs, 6, None, guess_period=6.58)
+
+    def crossed(t, x):
+        return x[0] - 0.5 if t > 1.0 else 1.0
+
+    crossed.terminal, crossed.direction = True, -1.0
+
+    def off(c):
+        def rhs(t, x):
+            (u, v), w = x[:2], x[2:].reshape(2, 2)
+            slopes = np.array([[2.0 * u * v - 3.5, u * u], [2.5 - 2.0 * u * v, -u * u - 3.0 * c]])
+            return np.concatenate([cell(u, v), (slopes @ w).ravel()])
+
+        run = solve_ivp(rhs, (0.0, 9.0), [*start, 1, 0, 0, 1], "DOP853", events=crossed, rtol=1e-12, atol=1e-13)
+        return np.linalg.eigvals(run.y[2:, -1].reshape(2, 2)).real.max() - 1.0
+
+    start = [1.0, 3.0]
+    for _ in range(12):
+        run = solve_ivp(lambda t, x: cell(*x), (0.0, 9.0), start, "DOP853", events=crossed, rtol=1e-12, atol=1e-13)
+        start = run.y[:, -1]
+    true = brentq(off, 0.5, 0.6, xtol=1e-11)
+    (point,) = follow(family, np.tile(start, 3), (0.3, 1.0)).special_points
+    (other,) = locate(family, (0.3, 1.0), orbit=np.tile(start, 3))
+    for found in (point.bifurcation, other):
+        assert (found.kind, found.multiplicity) == (Kind.BRANCH_POINT, 2)
+        assert abs(found.value - true) < 1e-9
+        assert found.error_bound < 1e-8
 
 
 def linear(matrix):

@@ -234,15 +234,18 @@ class Regular(NamedTuple):
 def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regular | None:
     """Place and orbit at a multiplier +1, where H - 1 is singular and Newton's method stops anywhere along the mode.
 
-    The orbit and det(H' - 1) are interpolated from regular places on both sides, or on one side at an end, ever closer
-    together until interpolations of two orders agree. None if the orbit is regular, there is no room, or another
-    multiplier is as near +1.
+    The orbit and a test function are interpolated from regular places on both sides, or on one side at an end, ever
+    closer together until interpolations of two orders agree. The test function of one multiplier is det(H' - 1); that
+    of several that cross together, as a symmetry makes them do, is their mean distance from +1. None if the orbit is
+    regular, there is no room, or another multiplier is as near +1.
     """
-    if crossing.event is not CircleEvent.PLUS or crossing.multiplicity > 1 or crossing.collision:
+    count = crossing.multiplicity
+    together = count == 1 or abs(crossing.change) == count
+    if crossing.event is not CircleEvent.PLUS or not together or crossing.collision:
         return None
     tried: list[tuple[float, float, _Interpolation]] = []
     for nodes, reach in _nodes(course, crossing.value):
-        found = _interpolated(course, crossing.value, nodes, reach)
+        found = _interpolated(course, crossing, nodes, reach)
         if found is not None:
             # Without agreement the root finder's value remains.
             far = 0.0 if found.converged else abs(found.place)
@@ -258,10 +261,13 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     distances = np.abs(spec.values - 1.0)
     order = distances.argsort()
     distances, errors = distances[order], spec.error[order]
-    if distances[0] > _TOGETHER * distances[1:].min(initial=np.inf):
+    if distances[count - 1] > _TOGETHER * distances[count:].min(initial=np.inf):
         return None  # the polynomials do not separate two crossings
-    errors[0] += distances[0]  # rounding at the places, larger than at the zero where another multiplier is near
-    uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(errors)))
+    errors[:count] += distances[:count]  # rounding at the places, larger than at the zero where another one is near
+    if count > 1:
+        uncertain = float(errors[:count].max())
+    else:
+        uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(errors)))
     bound += SAFETY * uncertain * reach / found.slope
     return Regular(place, bound, found.orbit, found.orbit_error, reach, orbit)
 
@@ -278,11 +284,11 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
 
 
 class _Interpolation(NamedTuple):
-    """Place and orbit by polynomials through det(H' - 1) and the orbit, in units of the reach."""
+    """Place and orbit by polynomials through the test function and the orbit, in units of the reach."""
 
-    place: float  # zero of the determinant
+    place: float  # zero of the test function
     between: float  # its distance from the zero of the polynomial without the outermost two places
-    slope: float  # slope of the determinant
+    slope: float  # slope of the test function
     orbit: Array  # orbit at the zero
     orbit_error: Array
     beside: Sample
@@ -293,13 +299,12 @@ class _Interpolation(NamedTuple):
         return self.between <= _AGREES and abs(self.place) <= _AT_HOME
 
 
-def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _Interpolation | None:
+def _interpolated(course: Course, crossing: Crossing, nodes: Array, reach: float) -> _Interpolation | None:
     try:
-        beside = course.at(place + reach * nodes)
+        beside = course.at(crossing.value + reach * nodes)
     except (AnalysisError, SpentError):
         return None
-    # The product over all multipliers stays smooth where the critical one meets another.
-    values = np.array([(spectrum(each.image).values - 1.0).prod().real for each in beside])
+    values = np.array([_off_plus_one(spectrum(each.image).values, crossing.multiplicity) for each in beside])
     orbits = np.array([each.orbit for each in beside])
     inner = np.abs(nodes) < np.sort(np.abs(nodes))[-2]
     fine, coarse = (Polynomial.fit(x, y, x.size - 1) for x, y in ((nodes, values), (nodes[inner], values[inner])))
@@ -310,6 +315,14 @@ def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _
     off = np.abs(orbit - through(nodes[inner], orbits[inner], zero))
     near = beside[int(np.abs(nodes).argmin())]
     return _Interpolation(zero, abs(zero - other), abs(float(fine.deriv()(zero))), orbit, off, near)
+
+
+def _off_plus_one(values: ComplexArray, count: int) -> float:
+    """Test function of ``count`` multipliers that pass +1 together, smooth along a course."""
+    off = values - 1.0
+    if count == 1:  # the product over all stays smooth where the critical one meets another
+        return float(off.prod().real)
+    return float(off[np.abs(off).argsort()[:count]].mean().real)
 
 
 def _root_near_zero(polynomial: Polynomial, nodes: Array) -> float | None:

@@ -151,10 +151,12 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
             return with_bounds(curve.system(value), x, duration, error[:-1] * curve.state_units)
 
         regular = past_singular(course, crossing, bounded_at)
-    if regular is None:
+    if regular is None or crossing.multiplicity > 1:
         orbit = _orbit(within, point, place)
         along = place_error(course, crossing, orbit.image)
-    else:
+    if regular is not None and crossing.multiplicity > 1 and not regular.error_bound < along:
+        regular = None
+    if regular is not None:
         orbit, along = regular.orbit, regular.error_bound
         point = replace(point, value=curve.reached(start, regular.sampled)[1])
     if place.branching and crossing.change == 0:

@@ -336,12 +336,12 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     # A symmetry-breaking mode is not part of the orbit, which is regular among symmetric states.
     trivial = block is None or block.trivial
     regular = past_singular(course, crossing, bounded_at) if trivial and not samples.known else None
-    if regular is None:
+    if regular is None or crossing.multiplicity > 1:
         value, (sample,) = crossing.value, samples.at(np.array([crossing.value]))
         system, x, image = samples.family(value), sample.orbit, sample.image
         orbit = from_known(system, x, image=image) if samples.known else with_bounds(system, x, image.duration)
         bound = place_error(course, crossing, orbit.image)
-    else:
+    if regular is not None and (crossing.multiplicity == 1 or regular.error_bound < bound):
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit
     # Where an orbit is lost the point may be its fold.
     lost = samples.end < samples.high and value + bound >= samples.end
