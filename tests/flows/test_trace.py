@@ -3,7 +3,7 @@
 import functools
 import math
 import types
-from math import cos, fabs, floor
+from math import comb, cos, exp, expm1, fabs, floor
 from types import SimpleNamespace
 
 import numba
@@ -12,6 +12,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from chilopod.flows.tracing.bernoulli import bernoulli
 from chilopod.flows.tracing.trace import evaluate, evaluate_jacobian, trace
 from chilopod.flows.tracing.traced import REPLACED, Untraceable
 from chilopod.stability import from_rhs
@@ -361,3 +362,15 @@ def test_an_object_at_the_place_of_an_earlier_one_is_another(polynomial):
         flow = from_rhs(lambda t, x, f=found: [f(x[0])], 1, 1.0).flow
         del found
         assert flow(np.ones(1), 0.0, 1.0)[1].item() == pytest.approx(np.exp(-rate), rel=1e-13)
+
+
+@pytest.mark.parametrize("u", [-700.0, -5.0, -2.1, -1.9, -1e-9, 0.3, 1.99, 2.01, 6.0, 40.0])
+def test_derivatives_of_the_bernoulli_function(u):
+    """Derivatives of u = (exp(u) - 1) b(u), by Leibniz's rule: from the second on
+    b^(n) (exp(u) - 1) + sum over k < n of C(n, k) b^(k) exp(u) = 0."""
+    b = [bernoulli(u, n) for n in range(13)]
+    scale = exp(-max(u, 0.0))
+    assert b[0] * expm1(u) * scale == pytest.approx(u * scale, rel=1e-14)
+    for n in range(1, 13):
+        parts = [b[n] * expm1(u) * scale, *(comb(n, k) * b[k] * exp(u) * scale for k in range(n))]
+        assert sum(parts) == pytest.approx(scale * (n == 1), abs=1e-9 * max(map(abs, parts)))

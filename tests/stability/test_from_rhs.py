@@ -491,16 +491,34 @@ def test_a_fast_harmonic_has_the_period(harmonic):
 # Quotients 0 / 0
 
 
+POWERS = np.arange(41)
+NUMBERS = bernoulli(40) / factorial(POWERS)  # of u / (exp(u) - 1)
+MINUS = NUMBERS * (-1.0) ** POWERS
+SINE = np.where(POWERS % 2, 0.0, (-1.0) ** (POWERS // 2)) / factorial(POWERS + 1)
+QUOTIENTS = {
+    "expm1": (lambda u, k: u / np.expm1(u), NUMBERS),
+    "rate of an ion channel": (lambda u, k: 0.2 * u / (1 - np.exp(-u / 5)), MINUS / 5.0**POWERS),
+    "parameters": (lambda u, k: k * u / (1.0 - np.exp(-u / k)), MINUS),
+    "sums": (lambda u, k: (0.3 - 0.1 * (u + 3.0)) / (np.exp(0.3 - 0.1 * (u + 3.0)) - 1.0), MINUS / 10.0**POWERS),
+    "Goldman's current": (lambda u, k: u * (2.0 - np.exp(-u)) / (1.0 - np.exp(-u)), MINUS + np.eye(41)[1]),
+    "sine": (lambda u, k: np.sin(u) / u, SINE),
+}
+
+
 @pytest.mark.parametrize("place", [0.01, 0.2])
-def test_a_motion_passes_a_quotient_of_zeros(place):
-    """x / (exp(x) - 1) is smooth at zero, where rounding spoils its Taylor series; against the polynomial there."""
+@pytest.mark.parametrize("name", QUOTIENTS)
+def test_a_motion_passes_a_quotient_of_zeros(name, place):
+    """It is smooth at zero, where rounding spoils its Taylor series; against the polynomial there."""
+    quotient, numbers = QUOTIENTS[name]
 
-    def system(quotient):
-        return from_rhs(lambda t, x: [-0.3 * x[0] + 0.1 * quotient(x[0] - place) + np.cos(t)], 1, 2 * pi)
+    def system(quotient, method="taylor"):
+        def rhs(t, x, k):
+            return [-0.3 * x[0] + 0.1 * quotient(x[0] - place, k) + np.cos(t)]
 
-    numbers = bernoulli(40) / factorial(np.arange(41))
-    found = multipliers(system(lambda u: u / np.expm1(u)), [0.1])
-    exact = multipliers(system(lambda u: np.polynomial.polynomial.polyval(u, numbers)), [0.1])
+        return from_rhs(rhs, 1, 2 * pi, args=(1.0,), method=method)
+
+    found = multipliers(system(quotient, "automatic" if name == "sine" else "taylor"), [0.1])
+    exact = multipliers(system(lambda u, k: np.polynomial.polynomial.polyval(u, numbers)), [0.1])
     assert abs(found.values[0] - exact.values[0]) <= found.error_bound + exact.error_bound <= 1e-12
 
 

@@ -15,7 +15,7 @@ from chilopod.compiled import fused_njit
 from chilopod.flows.tracing import tape as ops
 
 _FAR, _FAR_TANH = 36.0, 9.0
-"""Sizes of arguments beyond which exp, sinh and cosh, and tanh, may be constant to round-off beside other terms."""
+"""Sizes of arguments beyond which exp and the like, and tanh, may be constant to round-off beside other terms."""
 _CHANGE = 0.25  # largest relative change of such an argument in a step
 _UNDERFLOW = 1e-290  # limit below which numbers lose precision: their round-off would look like a singularity
 _SAME = 3e-13
@@ -110,7 +110,7 @@ def _unsaturated(tape: Any, values: Any, order: int, h: float) -> float:
     program = tape.program
     for i in range(tape.layout[3], tape.layout[4]):
         code = program[0, i]
-        if code == ops.EXP or code == ops.SINH or code == ops.COSH or code == ops.TANH:
+        if code == ops.EXP or code == ops.SINH or code == ops.COSH or code == ops.TANH or code == ops.BERNOULLI:
             argument = values[program[1, i]]
             size = abs(argument[0])
             if size > (_FAR_TANH if code == ops.TANH else _FAR):

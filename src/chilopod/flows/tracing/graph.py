@@ -15,6 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.bernoulli import HIGHEST, bernoulli
+
+_ROUNDING = 1e-15  # relative difference of numbers that are equal but for rounding
 
 Node = tuple[int, tuple[int, ...]]
 
@@ -158,9 +161,82 @@ class Graph:
                 return self.multiply(self.number(1.0 / vb), a)  # exact
         if va == 0.0 and vb is None:
             return self.number(0.0)
+        if (smooth := self._smooth_quotient(a, b)) is not None:
+            return smooth
         if self.depends[b] == ops.CONSTANT and self.depends[a] != ops.CONSTANT:
             return self.multiply(self._new(ops.QUOTIENT, (self.number(1.0), b)), a)
         return self._new(ops.QUOTIENT, (a, b))
+
+    def bernoulli(self, a: int, order: int = 0) -> int:
+        """The derivative of some order of u / (exp(u) - 1)."""
+        if (value := self.value(a)) is not None:
+            return self.number(bernoulli(value, order))
+        node = self._new(ops.BERNOULLI, (a, self.number(float(order))))
+        if node not in self.weights:
+            self.weights[node] = self.number(0.0) if order == HIGHEST else self.bernoulli(a, order + 1)
+        return node
+
+    def _smooth_quotient(self, a: int, b: int) -> int | None:
+        """a / b as a multiple of the Bernoulli function, if b is c (exp(u) - 1) and a a multiple of u; else None."""
+        if self.depends[b] != ops.MOVING or self.nodes[b][0] != ops.LINEAR or len(self.terms(b)) != 2:
+            return None
+        (_, one), (c, exponential) = sorted(self.terms(b), key=lambda term: self.value(term[1]) is None)
+        if (
+            self.nodes[exponential][0] != ops.EXP
+            or self.value(one) is None
+            or self.multiply(c, self.number(-1.0)) != one
+        ):
+            return None
+        (u,) = self.nodes[exponential][1]
+        scale, core = self._split(u)
+        for part, rest in self._factors(a):
+            weight, other = self._split(part)
+            share = self.divide(weight, scale) if other == core else self._ratio(part, u)
+            if share is not None:
+                smooth = self.multiply(self.divide(share, c), self.bernoulli(u))
+                return smooth if rest is None else self.multiply(smooth, rest)
+        return None
+
+    def _split(self, node: int) -> tuple[int, int]:
+        """A constant factor of a node, and the node without it."""
+        factor = self.number(1.0)
+        while self.nodes[node][0] == ops.LINEAR and len(self.terms(node)) == 1:
+            ((weight, node),) = self.terms(node)
+            factor = self.multiply(factor, weight)
+        return factor, node
+
+    def _factors(self, node: int) -> list[tuple[int, int | None]]:
+        """Pairs of a factor of a node and the rest, None for 1."""
+        factor, core = self._split(node)
+        if self.nodes[core][0] != ops.PRODUCT:
+            return [(node, None)]
+        a, b = self.nodes[core][1]
+        return [(node, None), (a, self.multiply(factor, b)), (b, self.multiply(factor, a))]
+
+    def _ratio(self, a: int, b: int) -> int | None:
+        """The number a / b of two sums whose weights are numbers in this ratio; else None."""
+        above, below = self._weights(a), self._weights(b)
+        if above.keys() != below.keys() or not all(below.values()):
+            return None
+        ratios = [above[node] / below[node] for node in below]
+        alike = max(ratios) - min(ratios) <= _ROUNDING * abs(ratios[0])
+        return self.number(ratios[0]) if alike else None
+
+    def _weights(self, node: int) -> dict[int | None, float]:
+        """Weights of the nodes in a sum, and its constant as that of None; a weight that is no number is NaN."""
+        code, operands = self.nodes[node]
+        if (value := self.value(node)) is not None:
+            return {None: value}
+        if code != ops.LINEAR:
+            return {node: 1.0}
+        total: dict[int | None, float] = {}
+        for weight, term in self.terms(node):
+            code, operands = self.nodes[weight]
+            above, below = (self.value(operands[0]), self.value(operands[1])) if code == ops.QUOTIENT else (None, None)
+            number = above / below if above is not None and below else self.value(weight)
+            for each, share in self._weights(term).items():
+                total[each] = total.get(each, 0.0) + share * (math.nan if number is None else number)
+        return total
 
     def power(self, a: int, exponent: int) -> int:
         """a to the power of another node."""

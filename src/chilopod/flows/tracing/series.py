@@ -20,6 +20,7 @@ import numpy as np
 
 from chilopod.compiled import copy_into, fused_njit
 from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.bernoulli import bernoulli
 from chilopod.lanes import HALF, as_lanes
 
 _INFINITE = 1e300  # value that counts as infinite: it leaves room for derivatives
@@ -61,6 +62,8 @@ def _function(code: int, a: float, b: float) -> float:
         return np.power(a, b) if a < math.inf or abs(b) > _STEEP else math.nan
     if code == ops.ATAN:
         return math.atan(a)
+    if code == ops.BERNOULLI:
+        return bernoulli(a, int(b))
     return math.asin(a) if abs(a) <= 1.0 else math.nan
 
 

@@ -5,7 +5,8 @@ A :class:`chilopod.flows.tracing.graph.Graph` collects operations while a functi
 Taylor coefficients obey a recurrence (Griewank and Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, sec. 13.2):
 
 * ``LINEAR``: a sum of nodes with constant weights, ``PRODUCT``, ``SQUARE``, ``QUOTIENT``;
-* functions c = phi(a) with c' = w a', where w is another node of the tape: sin, cos, exp, ... ;
+* functions c = phi(a) with c' = w a', where w is another node of the tape: sin, cos, exp, ... ; ``BERNOULLI`` is the
+derivative of u / (exp(u) - 1) whose order is its second operand;
 * ``STEP`` (the sign of its operand) and ``FLOOR``, constant along a step of the integration and the only operations
 where a right-hand side or its derivatives may jump, and ``SELECT``, one of two nodes by a ``STEP``.
 """
@@ -24,9 +25,9 @@ Integers = NDArray[np.int64]
 STATE, TIME, PARAMETER, NUMBER = 0, 1, 2, 3
 LINEAR, PRODUCT, SQUARE, QUOTIENT = 4, 5, 6, 7
 STEP, FLOOR, SELECT = 8, 9, 10
-EXP, SIN, COS, TAN, SINH, COSH, TANH, LOG, SQRT, POWER, ATAN, ASIN = range(11, 23)
+EXP, SIN, COS, TAN, SINH, COSH, TANH, LOG, SQRT, POWER, ATAN, ASIN, BERNOULLI = range(11, 24)
 
-GUARD = 23  # kind of switch: the guard of an event
+GUARD = 24  # kind of switch: the guard of an event
 
 CONSTANT, TIMED, MOVING = 0, 1, 2  # dependence of a node: on parameters only, on time too, or on the state
 
