@@ -19,6 +19,7 @@ from chilopod.show.figures.branch import panel
 from chilopod.stability.branches.branch_points import BranchPoint
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.returns import whole_period
+from chilopod.steering.radius_law import RadiusLaw
 
 ROBOT = load_robot("aoi2022-planar")
 
@@ -42,6 +43,15 @@ def test_the_radius_of_the_body_axis(former):
     branch = curved_walks(former, K1, (stiffness(7.8), stiffness(20.0)), points=40)
     found = [radius_at(former, branch, k1) for k1 in (11.9, 11.5, 11.0, 10.0, 8.0)]
     assert found == pytest.approx([1.095, 0.680, 0.544, 0.425, 0.318], rel=0.005)
+
+
+def test_walks_beside_the_pitchfork_are_as_stable_as_those_beyond():
+    """Their multipliers are too near the circle to decide alone, for which the radius law was refused."""
+    robot = ROBOT.set_from_text(["springs.stiffness=10 N*mm/deg"])
+    walks = curved_walks(robot, K1, (stiffness(2.0), stiffness(10.0)), points=6)
+    assert 1.0 - walks.multiplier.values[1] < 1e-6
+    assert walks.verdict.values.tolist() == ["undecided", *["stable"] * 5]
+    assert RadiusLaw.of_branch(walks.parameter_si, walks.axis_radius, walks.stable, "N*mm/deg").tightest < 10.0
 
 
 @pytest.mark.parametrize(("mass", "length"), [(1e-4, 3e-3), (1e3, 10.0)])

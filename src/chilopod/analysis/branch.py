@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import tomllib
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -275,6 +276,19 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     return Branch(points, ending, float(data.attrs["step"]))
 
 
+def _stability(branch: Branch) -> list[bool | None]:
+    """Stability of every orbit of a branch. Where its own multipliers are too near the circle, as beside a pitchfork,
+    it is that of the other orbits up to the next special points, at which alone it changes."""
+    # At a special point a multiplier is 1, and round-off decides its side.
+    stable = [None if point.special else point.stable for point in branch.points]
+    special = [i for i, point in enumerate(branch.points) if point.special]
+    for a, b in pairwise([-1, *special, len(stable)]):
+        decided = set(stable[a + 1 : b]) - {None}
+        if len(decided) == 1 and not branch.remarks:
+            stable[a + 1 : b] = [*decided] * (b - a - 1)
+    return stable
+
+
 def _walked(
     robot: Robot, parameter: str, between: tuple[float, float], branch: Branch, attributes: dict[str, Any]
 ) -> xr.Dataset:
@@ -286,9 +300,8 @@ def _walked(
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
     verdicts = [
-        # At a special point a multiplier is 1, and round-off decides its side.
-        Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[None if point.special else point.stable]
-        for most, point in zip(means.most_bent, points, strict=True)
+        Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[stable]
+        for most, stable in zip(means.most_bent, _stability(branch), strict=True)
     ]
     radius = [float(model.robot.axis_radius(angles)) for model, angles in zip(models, means.mean_angle, strict=True)]
 
