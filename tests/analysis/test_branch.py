@@ -50,7 +50,7 @@ def test_walks_beside_the_pitchfork_are_as_stable_as_those_beyond():
     robot = ROBOT.set_from_text(["springs.stiffness=10 N*mm/deg"])
     walks = curved_walks(robot, K1, (stiffness(2.0), stiffness(10.0)), points=6)
     assert 1.0 - walks.multiplier.values[1] < 1e-6
-    assert walks.verdict.values.tolist() == ["undecided", *["stable"] * 5]
+    assert walks.verdict.values.tolist() == ["undecided", *["stable"] * 6]
     assert RadiusLaw.of_branch(walks.parameter_si, walks.axis_radius, walks.stable, "N*mm/deg").tightest < 10.0
 
 
