@@ -254,6 +254,33 @@ def test_a_fast_motion_is_no_jump():
     assert not jumps_at_ends(system, np.array([1.0, 0.0, 1.0]), 2.0 * np.pi)
 
 
+@pytest.mark.parametrize(("rate", "length"), [(1.0, 1.0), (100.0, 1.0), (1e6, 1e-9)])
+def test_bounds_of_multipliers_by_energy(rate, length):
+    """A multiplier is exactly 1, and the parameter, zero but for rounding, moves it: x'' + x + x^3 = 0 and a pendulum,
+    in some units."""
+
+    def hardening(x):
+        return x + x**3 / length**2
+
+    def pendulum(x):
+        return length * np.sin(x / length)
+
+    for force in (hardening, pendulum):
+
+        def family(value, force=force):
+            def rhs(t, x):
+                return [x[1] + value * force(x[0]), -(rate**2) * force(x[0]) + value * x[1]]
+
+            return from_rhs(rhs, 2, None, guess_period=6.2 / rate)
+
+        branch = follow(family, begin(family, 0.0, [0.5 * length, 0.0]), (-0.1 * rate, 0.1 * rate), points=12)
+        assert len(branch.points) > 8
+        assert branch.remarks == ()
+        for point in branch.points:
+            assert np.abs(point.multipliers - 1.0).max() <= point.error_bound < 1e-6
+            assert point.stable is None
+
+
 @pytest.mark.parametrize("width", [1e-5, 1e-3])
 def test_a_family_by_energy_has_no_branch_points_of_its_own(width):
     """Orbits about a point of Hill's problem, by the parameter of a term that vanishes: H' - 1 is nearly singular along

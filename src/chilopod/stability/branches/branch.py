@@ -53,6 +53,7 @@ BUDGET = 200_000
 _MEETING = 1e-6  # distance of a multiplier from +1 at a special point where branches meet
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
+_IN_FOLD = "the branch starts in a fold"
 _STEADY = 1e-6  # largest value of the parameter, relative to its scale, along a family by energy
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
@@ -121,7 +122,7 @@ class Branch(Result):
             for each in self.points
             if each.special is not None
         ]
-        if len(values) > 1 and max(map(abs, values)) <= _STEADY * self.scale:  # a family by energy
+        if _by_energy(values, self.scale):
             special = [(each.special.label, f"{each.period:.9g}", "") for each in self.special_points if each.special]
             values = [float(point.period or 0.0) for point in self.points]
             head = (
@@ -255,7 +256,7 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
         first = replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=special)
         anchor = curve.anchor(first, ahead=step if meeting else 0.0)
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
-    remarks = ("the branch starts in a fold",) if in_fold else ()
+    remarks = (_IN_FOLD,) if in_fold else ()
     return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor
 
 
@@ -315,8 +316,15 @@ def followed(
             moved = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
         if moved is not None:
             remarks.append(MOVED.format(found[-1].value))
+    if _by_energy([point.value for point in found], curve.scale):
+        remarks = [remark for remark in remarks if remark != _IN_FOLD]
     said = tuple(dict.fromkeys([*remarks, *_unpaired_folds(found)]))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
+
+
+def _by_energy(values: list[float], scale: float) -> bool:
+    """True for a family of conservative orbits, along which the parameter is zero but for rounding."""
+    return len(values) > 1 and max(map(abs, values)) <= _STEADY * scale
 
 
 def _unpaired_folds(points: list[BranchPoint]) -> list[str]:

@@ -47,6 +47,8 @@ from chilopod.stability.returns import (
 from chilopod.stability.spectrum import return_multipliers, spectrum
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
+_STEADY = 1e-6  # change of the parameter along a step, relative to the step, that tells nothing of its effect
+_BESIDE = 1e-5  # change of the parameter, relative to its scale, for that effect
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
 _FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, and above which one fails
 _SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, relative to it
@@ -264,11 +266,26 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.state_units)))
         length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(matrix[:n, :n] - anchor.matrix[:n, :n])) / length
+        if abs(moved[n]) <= _STEADY * length:
+            bend = max(bend, self._bend_by_parameter(anchor, x, image, moved[n]))
         # The flow's error relative to its magnification is a bound already.
         sizes = self.state_units
         error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
         flow = float(error.max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
         return bend * (off + weakest * flow * max(1.0, self._relative_size(x)))
+
+    def _bend_by_parameter(self, anchor: Anchor, x: Array, image: ReturnMap, moved: float) -> float:
+        """Change of the return map's derivative with the parameter, in units, for a curve along which the parameter
+        stays: that along the curve does not show it."""
+        section = anchor.section and replace(anchor.section, duration=image.duration)
+        step = _BESIDE if anchor.last.value + (moved + _BESIDE) * self.scale <= self.between[1] else -_BESIDE
+        try:
+            beside = self.image(x, anchor.last.value + (moved + step) * self.scale, section)
+        except AnalysisError:
+            return np.inf
+        sizes = self.state_units
+        change = (beside.jacobian - image.jacobian) * sizes / sizes[:, None]
+        return float(np.linalg.norm(change)) / _BESIDE
 
     def arrived(self, step: Step[Anchor, OnCurve]) -> Step[Anchor, OnCurve]:
         """A step with the anchor at its end, on the section there."""
