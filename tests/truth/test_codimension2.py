@@ -9,7 +9,17 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_b
 
-from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, PeriodicSystem, follow2, from_rhs, locate
+from chilopod.stability import (
+    BifurcationPoint,
+    CodimensionTwo,
+    Ending,
+    Kind,
+    PeriodicSystem,
+    follow2,
+    from_map,
+    from_rhs,
+    locate,
+)
 from helpers.systems import henon, of_map
 
 mapped = partial(of_map, many=True)
@@ -237,6 +247,42 @@ def test_chenciner():
     check_curve(curve, lambda values: values[0] - values[1] ** 2)
     check_special(curve, (CodimensionTwo.CHENCINER, (0.09, 0.3)))
     check_next(curve.special[0], -0.5 * 2.0**2)  # |z| is sqrt(2) of the amplitude along the unit mode
+
+
+@pytest.mark.parametrize("off", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("order", [3, 4])
+def test_chenciner_near_a_resonance(off, order):
+    """u -> (1 + p) (1 + q u^2 + 2 u^4) u, turned by an angle near 2 pi / order, in coordinates that are bent."""
+
+    def turned(u, p, q):
+        size = u @ u
+        angle = 2.0 * np.pi / order + off + 0.7 * size + 0.3 * size**2
+        factor, rise = (1.0 + p) * (1.0 + q * size + 2.0 * size**2), (1.0 + p) * (q + 4.0 * size)
+        turn, across = turning(angle, 1.0), turning(angle + 0.5 * np.pi, 1.0)
+        slopes = rise * turn @ u + factor * (0.7 + 0.6 * size) * across @ u
+        return factor * turn @ u, factor * turn + np.outer(slopes, 2.0 * u)
+
+    def bent(u):
+        y = u[1] + 0.5 * u[0] ** 2
+        return np.array([u[0] + 0.8 * y**2, y]), np.array([[1.0 + 1.6 * y * u[0], 1.6 * y], [u[0], 1.0]])
+
+    def straight(w):
+        x = w[0] - 0.8 * w[1] ** 2
+        return np.array([x, w[1] - 0.5 * x**2]), np.array([[1.0, -1.6 * w[1]], [-x, 1.0 + 1.6 * w[1] * x]])
+
+    def family2(p, q):
+        def image(w):
+            u, first = straight(w)
+            v, second = turned(u, p, q)
+            end, third = bent(v)
+            return end, third @ second @ first
+
+        return from_map(image, 2)
+
+    (start,) = locate(lambda p: family2(p, 0.2), (-0.2, 0.3), orbit=[0.0, 0.0])
+    (point,) = follow2(family2, start, ((-0.5, 0.5), (-0.5, 0.5)), second=0.2).special
+    assert point.kind is CodimensionTwo.CHENCINER
+    assert abs(point.next_coefficient - 8.0) <= point.next_coefficient_error < 1e-3
 
 
 def turning(angle, size):

@@ -169,10 +169,7 @@ class Manifold:
         """Coefficient of a resonant monomial of odd order, and a bound on its error, which includes the difference of
         the sampled curve from the centre manifold: curves disturbed as much at random are sampled too."""
         at, (value, error) = self.at, found.term(powers)
-        n = at.state.size
-        if n == (1 if at.real else 2):
-            return value, error
-        random = np.random.default_rng(0)
+        n, random = at.state.size, np.random.default_rng(0)
         directions = at.turns()
         largest = found.radius * RADII[0]
         z = largest * directions
