@@ -103,8 +103,8 @@ class Left(Challenge):
 
     name = "turn left twice in a row"
     task = (
-        "Begin anew (R), soften the first spring and let the bend settle, without a pull or a target. Do so until the "
-        "robot has turned left twice in a row. Then say why you cannot choose the side."
+        "Press R for the next seed, soften the first spring and let the bend settle, without a pull or a target. Do so "
+        "until the robot has turned left twice in a row. Then say why you cannot choose the side."
     )
     answers = ("The gait prefers one side", "The spring decides", "The sides are alike: chance decides")
 
@@ -121,7 +121,7 @@ class Left(Challenge):
         elif self._counts and seen.bend > _BENT and abs(seen.turning) < _STEADY * seen.bend:
             left = seen.mean_angles.sum() < 0.0
             self._row, self._counts = self._row + 1 if left else 0, False
-        now = "Let it bend and settle." if self._counts else "Begin anew (R) for the next attempt."
+        now = "Let it bend and settle." if self._counts else "Press R for the next attempt."
         self.said = "Twice left. Why can you not choose?" if self._row == 2 else f"{self._row} of 2 in a row. {now}"
 
     @property
