@@ -20,10 +20,11 @@ def test_the_end_of_a_circle_is_its_radius():
     """Angles that do not change give the paper's radius, and module 1's pace is its speed."""
     record = simulate(ROBOT, 0.6, rate=50.0)
     time = np.arange(0.0, 20.0, 0.02)
+    angle = 0.05 / 0.3 * time
     made = xr.Dataset(
         {
             "joint_angle": (("time", "robot", "joint"), np.full((time.size, 1, 5), 0.2)),
-            "position": (("time", "robot", "axis"), np.stack([0.05 * time, 0.0 * time], -1)[:, None]),
+            "position": (("time", "robot", "axis"), 0.3 * np.stack([np.sin(angle), np.cos(angle)], -1)[:, None]),
             "status": ("robot", np.array(["walked"], dtype=object)),
         },
         coords={"time": time, "robot": [0], "joint": record.joint, "axis": record.axis},

@@ -211,6 +211,7 @@ def at_once(rows: Iterable[RobotRow]) -> str:
     fallen = [name for (name, _), was, still in zip(tested, decided, left, strict=True) if was and not still]
     return (
         f"{len(p)} verdicts rest on trials that scatter: were all at the edge of what is asked, chance would decide "
-        f"{edge * len(p):.1f} of them. {sum(decided)} are decided, {sum(left)} with a chance of {100.0 * edge:.0f} % "
-        f"of any error among all (Holm){f', not these: {listing(fallen)}' if fallen else ''}."
+        f"{edge * len(p):.1f} of them. {sum(decided)} {'is' if sum(decided) == 1 else 'are'} "
+        f"decided, {sum(left)} with a chance of {100.0 * edge:.0f} % of any error "
+        f"among all (Holm){f', not these: {listing(fallen)}' if fallen else ''}."
     )

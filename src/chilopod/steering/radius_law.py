@@ -58,7 +58,9 @@ class RadiusLaw(ReadOnlyArrays):
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
         count = 1 + (len(good) if good.all() else int(np.argmin(good)))
         if count < 3:
-            problem = "the curved walks beside the pitchfork must be stable and tighten for a radius law"
+            problem = "the curved walks beside the pitchfork must tighten for a radius law"
+            if not stable[1:3].all():
+                problem = "the curved walks beside the pitchfork must be stable for a radius law: here the robot jumps"
             raise AnalysisError(problem, field="branch")
         bent = np.concatenate([[np.inf], radii[1:count]])
         return cls(values[:count][::-1], bent[::-1], unit)

@@ -74,9 +74,10 @@ def radius_law(
 
 
 def bent(robot: Robot, engine: str = "planar", duration: float = DURATION) -> Trial:
-    """An undisturbed walk of a robot that starts bent, recorded ten times a second."""
-    angles = (_LAW_BEND / (robot.body.modules - 1),)
-    return Trial(robot, duration, 0, angles, None, None, NONE, 10.0, engine=engine)
+    """An undisturbed walk of a robot that starts bent, recorded about ten times a second, at the same phases of each
+    gait cycle."""
+    angles, period = (_LAW_BEND / (robot.body.modules - 1),), robot.gait.period
+    return Trial(robot, duration, 0, angles, None, None, NONE, max(1, round(10.0 * period)) / period, engine=engine)
 
 
 def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:
@@ -112,9 +113,11 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
     back = int(np.searchsorted(times, times[-1] - 12.0))
-    # Path length, gait cycle by gait cycle: on a curve the chord of 12 s is shorter.
+    # Path length by arcs, gait cycle by gait cycle, from phase 0: on a curve chords are shorter, and module 1 sways.
     stride = max(1, round(robot.gait.period / (times[1] - times[0])))
-    steps = np.linalg.norm(np.diff(place[back::stride], axis=0), axis=1) / (stride * (times[1] - times[0]))
+    chords = np.diff(place[back - back % stride :: stride] @ np.array([1.0, 1.0j]))
+    turn = float(np.angle(chords[1:] * chords[:-1].conj()).mean()) if len(chords) > 1 else 0.0
+    steps = np.abs(chords) / (np.sinc(0.5 * turn / np.pi) * stride * (times[1] - times[0]))
     return xr.Dataset(
         {
             "mean_angle": ("joint", last, {"units": "rad"}),

@@ -174,7 +174,7 @@ def summary(results: Found) -> str:
     predicted = [row.verdict for row in results.robot_rows() if row.twin and row.kind == Kind.PREDICTED.value]
     if predicted:
         open_, none = predicted.count(Verdict.UNDECIDED), predicted.count(Verdict.NOT_DETERMINED)
-        left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
+        left = f"; {open_} of the others {'is' if open_ == 1 else 'are'} left open by the scatter" if open_ else ""
         left += f"; of {none} its trials determine nothing" if none else ""
         parts.append(
             "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "

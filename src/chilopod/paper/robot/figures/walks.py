@@ -63,7 +63,8 @@ def walks(found: RobotWalks) -> Panel:
             "radii, which springs walk straight and which do not; and the walking speed), so agreement here is no "
             "surprise. What follows was not fitted."
             + (
-                f" In {unsettled} walks the bend still moved by more than 0.1 rad in the last seconds."
+                f" In {unsettled} {'walk' if unsettled == 1 else 'walks'} the bend still moved by more than 0.1 rad in "
+                "the last seconds."
                 if unsettled
                 else ""
             ),
