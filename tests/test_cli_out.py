@@ -68,6 +68,27 @@ def test_what_is_refused_leaves_nothing(capsys, tmp_path, monkeypatch, arguments
     assert os.listdir(tmp_path) == []
 
 
+def test_a_file_of_a_full_disk_is_kept_elsewhere(capsys, tmp_path, monkeypatch):
+    real = os.replace
+
+    def full(source, target):
+        if "there" in str(target):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(source, target)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, "replace", full)
+    (tmp_path / "there").mkdir()
+    assert main(["robot", "new", "there/robot.toml"]) == 2
+    assert capsys.readouterr().err.endswith(f"(No space left on device); kept instead: {tmp_path / 'robot.toml'}\n")
+    assert os.listdir(tmp_path / "there") == []
+
+
+def test_the_option_of_several_values_names_the_wrong_one(capsys):
+    assert main(["reproduce", "--only", "mode", "--only", "nosuch"]) == 2
+    assert capsys.readouterr().err.startswith("error: --only = 'nosuch': must be a section")
+
+
 @pytest.mark.parametrize(
     "arguments",
     [["walk", ROBOT, "--duration", "1 s", "--out", "there/walks.nc"], ["stability", ROBOT, "--out", "there"]],

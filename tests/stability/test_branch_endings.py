@@ -303,3 +303,4 @@ def test_a_family_by_energy_has_no_branch_points_of_its_own(width):
     assert len(branch.points) > 8
     assert branch.special_points == ()
     assert str(branch).startswith(f"Branch by energy: {len(branch.points)} orbits with periods between 3.0")
+    assert branch.plot().get_xlabel() == "period"

@@ -89,7 +89,8 @@ def _as_typed(error: ChilopodError, ctx: Any) -> None:
         error.field = f"{max(option.opts, key=len)} {part}".strip()
         typed = ctx.params[name]
         if not part and ctx.get_parameter_source(name).name == "COMMANDLINE":
-            error.value = " ".join(typed) if isinstance(typed, tuple | list) else typed
+            several = isinstance(typed, tuple | list)
+            error.value = typed if not several else error.value if error.value in typed else " ".join(typed)
         if isinstance(error.value, Path):
             error.value = str(error.value)
 

@@ -216,10 +216,10 @@ def free(paths: Iterable[Path], force: bool, ending: str = "") -> None:
 
 def save(file: Path, text: str, robot: Robot, *, force: bool, as_json: bool, ending: str = "", **more: str) -> None:
     """Write the text of a robot into a file, and name that, as JSON or as text."""
-    from chilopod.output import write_atomic
+    from chilopod.output import write_all
 
     free([file], force, ending)
-    write_atomic(file, text, replace=force)
+    write_all([(file, text)], replace=force)
     said = ": ".join([f"wrote {file}", *more.values()])
     print_result({"robot": robot.name, "file": str(file), **more}, [said], as_json)
 

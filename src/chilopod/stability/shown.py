@@ -37,7 +37,7 @@ _COLUMNS: dict[str, tuple[Any, ...]] = {
     "multiplicity": (int, "number of critical multipliers", "1"),
     "orbit": (float, "state at time 0", _STATE, "state"),
     "mode": (complex, "critical mode", _STATE, "state"),
-    "multiplier": (complex, "critical multiplier of the return map", "1"),
+    "multiplier": (complex, "critical multiplier of the return map; of a Hopf point the eigenvalue", "1"),
     "multipliers": (complex, "multipliers", "1", "multiplier"),
     "half_period": (complex, "multipliers of the return map", "1"),
     "modulus": (float, "modulus of the multipliers", "1"),

@@ -143,7 +143,8 @@ class Branch(Result):
         return picture(lambda axes: self.plot(axes, int(moved.argmax())), "branch of periodic orbits")
 
     def plot(self, axes: Axes | None = None, state: int = 0) -> Axes:
-        """Draw a state at time 0 over the parameter: stable parts solid, unstable ones dashed, undecided ones dotted.
+        """Draw a state at time 0 over the parameter, or over the period along a family by energy: stable parts solid,
+        unstable ones dashed, undecided ones dotted.
 
         Parameters
         ----------
@@ -155,13 +156,16 @@ class Branch(Result):
         values, orbits = map(np.array, columns(self.points, "value", "orbit").values())
         if not (isinstance(state, Real) and state in range(orbits.shape[1])):
             raise ParameterError("must be a state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
-        axes, color, state = axes_for(axes), None, int(state)
+        axes, color, state, across = axes_for(axes), None, int(state), "parameter"
+        if _by_energy(values.tolist(), self.scale):
+            values, across = np.array([point.period for point in self.points]), "period"
         for verdict, first, last in self._stretches():
             part = slice(first, last + 1)
             shown = axes.plot(values[part], orbits[part, state], _STYLES[verdict], color=color, label=VERDICTS[verdict])
             color = shown[0].get_color()
-        mark(axes, [(each.special.label, each.value, each.orbit[state]) for each in self.points if each.special])
-        axes.set(xlabel="parameter", ylabel=f"state {state} at time 0")
+        places = zip(self.points, values, strict=True)
+        mark(axes, [(each.special.label, place, each.orbit[state]) for each, place in places if each.special])
+        axes.set(xlabel=across, ylabel=f"state {state} at time 0")
         return axes
 
     def to_dataset(self) -> xr.Dataset:
