@@ -120,7 +120,7 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
         raise typer.Exit(BROKEN)
 
 
-@app.command(short_help="Remove damaged and unfinished files from a folder.")
+@app.command(short_help="Remove files that were set aside or left unfinished.")
 def clean(
     folder: FolderArg,
     old: Annotated[bool, typer.Option("--old", help="Remove trials of other versions too.")] = False,
@@ -129,7 +129,8 @@ def clean(
 ) -> None:
     """Remove useless files from a folder of trials: those set aside, and those that killed processes left unfinished.
 
-    Files that chilopod has not written, and those that a process is writing, stay and are listed.
+    Files that chilopod has not written, and those that a process is writing, stay and are listed. A damaged file stays
+    until its trial is walked again, which sets it aside.
 
     Example: chilopod trials clean report/trials --dry-run
     """

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import replace
 from itertools import chain
 from threading import Event
 from typing import Any, Protocol
@@ -24,7 +25,7 @@ from chilopod.steering import CourseReferee, Target, add_measures
 from chilopod.steering.measures import lengths
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
 from chilopod.trials.record_check import check_record
-from chilopod.trials.trial import Drawn, Trial, conditions, draw
+from chilopod.trials.trial import Disturbance, Drawn, Trial, conditions, draw
 
 NOT_KEPT = "not kept"
 """Attribute with the reason why a record must not be kept; files never have it."""
@@ -150,19 +151,31 @@ def _who(trial: Trial) -> str:
 
 def _doubts(trial: Trial) -> str:
     """Reason why a controller's walks are not reproducible, if so: its first gait cycle is walked twice, once in each
-    process."""
+    process, and among other robots."""
     if not _is_own(trial):
         return ""
     who = _who(trial)
     if who not in _KNOWN:
         cycle = min(trial.robot.gait.period, trial.duration)
+        beside = replace(trial, seed=trial.seed + 1, disturbance=Disturbance())
+        if isinstance(trial.target, Target):
+            beside = replace(beside, target=Target(-0.5 * trial.target.bearing, trial.target.distance))
         one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
+        among = _steered([beside, trial, beside], cycle)[0].to_dataset()
         # An engine may return anything.
         if not getattr(one, "identical", lambda _: True)(other):
             _KNOWN[who] = "equal observations give different commands (a clock, np.random, a counter?)"
+        elif not _same_bits(one, among.isel(robot=[1]) if "robot" in getattr(among, "dims", ()) else one):
+            _KNOWN[who] = "commands depend on other robots of the batch"
         else:
             _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
     return _KNOWN[who]
+
+
+def _same_bits(one: xr.Dataset, other: xr.Dataset) -> bool:
+    """True if two robots have the same joint angles at all times."""
+    known = [data.joint_angle.values for data in (one, other) if "joint_angle" in data]
+    return len(known) < 2 or np.array_equal(known[0], known[1], equal_nan=True)
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
