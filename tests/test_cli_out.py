@@ -84,6 +84,11 @@ def test_a_file_of_a_full_disk_is_kept_elsewhere(capsys, tmp_path, monkeypatch):
     assert os.listdir(tmp_path / "there") == []
 
 
+def test_one_size_of_the_report(capsys):
+    assert main(["reproduce", "--quick", "--all"]) == 2
+    assert "must be given alone; allowed: one of" in capsys.readouterr().err
+
+
 def test_the_option_of_several_values_names_the_wrong_one(capsys):
     assert main(["reproduce", "--only", "mode", "--only", "nosuch"]) == 2
     assert capsys.readouterr().err.startswith("error: --only = 'nosuch': must be a section")

@@ -12,6 +12,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -279,6 +280,18 @@ def test_another_preset_is_another_robot(page):
     while not page._query().startswith("seed="):
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def test_an_address_sets_the_whole_walk(page):
+    """Sliders that it leaves out go back to the file."""
+    page.errand(partial(page._open_address, True), "friction=0.5&k3=8&seed=1")
+    page.errand(partial(page._open_address, True), "k1=8&seed=2")
+    end = time.monotonic() + 10.0
+    while page._query() != "k1=8&seed=2":
+        assert time.monotonic() < end, page._query()
+        assert page.failure is None
+        time.sleep(0.02)
+    page.errand(partial(page._open_address, True), "seed=1")
 
 
 def test_a_browser_that_nobody_knows_yet_moves_no_slider(page):

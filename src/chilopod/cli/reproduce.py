@@ -79,6 +79,10 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
         raise ParameterError(problem, field="--set", value=options.overrides[0], allowed=allowed)
     from chilopod.paper.section import Size
 
+    sizes = {"--all": options.everything, "--quick": options.quick, "--tiny": options.tiny}
+    if sum(sizes.values()) > 1:
+        given = " ".join(name for name, on in sizes.items() if on)
+        raise ParameterError("must be given alone", field="size", value=given, allowed="one of --all, --quick, --tiny")
     size = Size.FULL if options.everything or options.only else Size.MAIN
     size = Size.TINY if options.tiny else Size.QUICK if options.quick else size
     sections = chosen(options.only, size, options.paper)  # refuses an unknown section

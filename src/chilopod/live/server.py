@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from chilopod.analysis.parameters import K1
-from chilopod.engine import engine_named
+from chilopod.analysis.parameters import ALL, K1
+from chilopod.engine import Status, engine_named
 from chilopod.errors import in_words
 from chilopod.extras import needs
 from chilopod.live import wishes
@@ -285,9 +285,10 @@ class Live:
         session, seen, shown = self.session, self.seen, self._shown()
         words = sentences(seen, session.settings, shown, self._growth if shown is self._theory else None)
         settings = session.settings
-        slow = "" if settings.paused or rate > 0.8 * settings.speed else f", as fast as it goes: {rate:.1f} times"
+        slow = rate < 0.8 * settings.speed and not settings.paused and seen.status is Status.WALKED
+        paced = f", as fast as it goes: {rate:.1f} times" if slow else ""
         recording = ", recording" if settings.recording else ""
-        return f"{' '.join(words)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
+        return f"{' '.join(words)}\n\n{seen.time:.0f} s, seed {settings.seed}{paced}{recording}"
 
     # -- presets, challenges and addresses, in the thread of the walk
 
@@ -341,7 +342,12 @@ class Live:
         preset = preset_of(asked)
         if preset is not None and preset != self.preset:
             self.choose(preset)
-        told, wrong = read(asked, self.session.sliders)
+        session, (told, wrong) = self.session, read(asked, self.session.sliders)
+        if told:  # what an address leaves out is as in the file and its preset
+            file = [
+                wishes.Set(row.name, row.read(session.first)) for row in session.sliders.values() if row.name != ALL
+            ]
+            told = [*file, *read(PRESETS[self.preset].settings, session.sliders)[0], *told]
         for wish in told:
             self.wish(wish)
         if wrong:
