@@ -75,12 +75,15 @@ class _Options(RobotOptions):
         deliver(lambda: write_all(files, replace=self.force), lambda: print_result(result, lines, self.as_json))
 
 
+_POINTS = 25
+
+
 @dataclass(frozen=True)
 class _PlanarOptions(_Options):
     """Argument and options of ``identify planar``, as they were typed."""
 
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = "aoi2022-planar"
-    points: Annotated[int, typer.Option(metavar="N", help="Number of points of the profile.", min=3, max=200)] = 25
+    points: Annotated[int, typer.Option(metavar="N", help="Number of points of the profile.", min=3, max=200)] = _POINTS
     measure: Annotated[bool, typer.Option("--next", help="Say which measurements would tell most.")] = False
     check: Annotated[
         int, typer.Option("--check", metavar="N", help="Identify N robots whose constants are known.", min=0, max=10000)
@@ -114,8 +117,8 @@ def planar(options: _PlanarOptions) -> None:
 
     def solve(progress: Callable[[str], Progress]) -> tuple[Found, More]:
         if isinstance(data, identify.RecordedWalks):
-            if options.measure or options.check:
-                field = "--next" if options.measure else "--check"
+            others = {"--next": options.measure, "--check": options.check, "--points": options.points != _POINTS}
+            if field := next((name for name, on in others.items() if on), ""):
                 raise ParameterError("must not be given with recorded walks", field=field)
             folder = given.parent if given else Path()
             return identify.identify_recorded(robot, data, folder, progress("identification")), {}

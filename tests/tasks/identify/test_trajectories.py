@@ -210,7 +210,9 @@ def test_the_command_writes_walks_and_a_robot_with_its_intervals(capsys, tmp_pat
     free = '[free]\n"ground.friction" = ["100 N*s/m", "500 N*s/m"]\n'
     (tmp_path / "mine.toml").write_text(f'{free}[[trajectory]]\nfile = "walk.nc"\nsettings = ["{SPRING}"]\n')
     arguments = ["identify", "planar", "--data", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out"), "--json"]
-    assert main([*arguments, "--next"]) == 2
+    for option in (["--next"], ["--check", "2"], ["--points", "5"]):
+        assert main([*arguments, *option]) == 2
+        assert capsys.readouterr().err.startswith(f"error: {option[0]}: must not be given with recorded walks")
     assert main(arguments) == 0
     found = json.loads(capsys.readouterr().out)
     best = load_robot(tmp_path / "out" / "identified.toml")
