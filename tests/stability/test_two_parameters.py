@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from chilopod.errors import ParameterError
 from chilopod.stability import (
@@ -57,6 +58,8 @@ def test_closed_curve_ends_where_it_began(rising):
     assert np.abs(np.hypot(*curve.values.T) - 1.0).max() < 1e-13
     turn = abs(angles[-1] - angles[0])
     assert 2.0 * np.pi - 0.15 < turn < 2.0 * np.pi
+    (line,) = curve.plot(Figure().add_subplot()).lines
+    np.testing.assert_array_equal(line.get_xydata(), [*curve.values, curve.values[0]])
 
 
 def test_edges_of_the_box_are_met_exactly():
