@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from chilopod.errors import ParameterError
 from chilopod.stability import (
@@ -57,6 +58,8 @@ def test_closed_curve_ends_where_it_began(rising):
     assert np.abs(np.hypot(*curve.values.T) - 1.0).max() < 1e-13
     turn = abs(angles[-1] - angles[0])
     assert 2.0 * np.pi - 0.15 < turn < 2.0 * np.pi
+    (line,) = curve.plot(Figure().add_subplot()).lines
+    np.testing.assert_array_equal(line.get_xydata(), [*curve.values, curve.values[0]])
 
 
 def test_edges_of_the_box_are_met_exactly():
@@ -339,6 +342,24 @@ def test_another_multiplier_like_the_critical_one(sign):
     (found,) = curve.special
     assert found.kind is CodimensionTwo.SEVERAL_CRITICAL
     np.testing.assert_allclose(found.values, 0.0, atol=1e-14)
+
+
+def test_two_flips_of_which_one_breaks_a_symmetry_have_one_name_on_both_curves():
+    """Coupled logistic maps at [3, 0], where both multipliers are -1 and none is +1."""
+
+    def family2(r, e):
+        coupling = np.array([[1.0 - e, e], [e, 1.0 - e]])
+        symmetry = [[0.0, 1.0], [1.0, 0.0]]
+        return from_map(
+            lambda x: (coupling @ (r * x * (1.0 - x)), coupling * (r * (1.0 - 2.0 * x))), 2, spatial_symmetry=symmetry
+        )
+
+    starts = locate(lambda r: family2(r, -0.1), (2.2, 3.4), orbit=[0.55, 0.55], normal_form=False)
+    box = ((2.0, 3.9), (-0.4, 0.4))
+    curves = [follow2(family2, start, box, second=-0.1, coefficients=False) for start in starts]
+    found = [special for curve in curves for special in curve.special]
+    assert [each.kind for each in found] == [CodimensionTwo.SEVERAL_CRITICAL] * 2
+    np.testing.assert_allclose([each.values for each in found], [[3.0, 0.0]] * 2, atol=1e-12)
 
 
 def test_a_pitchfork_is_not_followed_among_systems_without_its_symmetry():

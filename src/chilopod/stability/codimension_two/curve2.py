@@ -143,7 +143,8 @@ class Curve2(Result):
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the curve over both parameters, with points of codimension two, on given or new axes of matplotlib."""
         axes = axes_for(axes)
-        axes.plot(*self.values.T, label=self.kind.label)
+        drawn = np.vstack([self.values, self.values[:1]]) if Ending.CLOSED in self.endings else self.values
+        axes.plot(*drawn.T, label=self.kind.label)
         mark(axes, [(each.kind.label, each.values[0], each.values[1]) for each in self.special])
         axes.set(xlabel="first parameter", ylabel="second parameter")
         return axes

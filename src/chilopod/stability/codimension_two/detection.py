@@ -260,10 +260,10 @@ class Detector:
         # At the point itself the modes of two equal multipliers are any combinations of both.
         nearest = int(np.abs(there.spectrum.values[there.others] - sign).argmin())
         mode = there.spectrum.right[:, there.others[nearest]]
-        if reverses(here.system, mode, here.at.frame.size):
-            return together(self._kind, Kind.PITCHFORK)
         if sign < 0:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
+        if reverses(here.system, mode, here.at.frame.size):
+            return together(self._kind, Kind.PITCHFORK)
         meets = self.curve.known or np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING
         return together(self._kind, Kind.BRANCH_POINT if meets else Kind.FOLD)
 
