@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError
-from chilopod.stability import Kind
+from chilopod.stability import Kind, from_map, locate
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalFormStatus, normal_form
 from chilopod.stability.points import Criticality, criticality, kind_at_plus_one
@@ -207,3 +207,37 @@ def test_beside_one_to_three_the_errors_grow(distance):
     expected = 2 * (c + nu.conj() * 2 * d * h.conj())
     assert abs(form.cubic - expected.real) <= form.cubic_error
     assert abs(form.rotation - expected.imag) <= form.rotation_error < 0.01 * abs(expected)
+
+
+@pytest.mark.parametrize("distance", [1e-3, 1e-6, 3e-7, 1e-7])
+def test_beside_one_to_two_the_errors_include_those_of_the_modes(distance):
+    """A slanted turn by nearly pi, whose modes rounding turns; coefficients from modes in closed form (Kuznetsov)."""
+    c, s, quadratic, cubic = -np.cos(distance), np.sin(distance), 0.9, 0.4
+    slant = np.array([[1.0, 0.7], [0.0, 1.0]])
+    turn = slant @ np.array([[c, -s], [s, c]]) @ np.linalg.inv(slant)
+    half, one = (turn[0, 0] - turn[1, 1]) / 2.0, np.eye(2)
+    root = 1j * np.sqrt(-half * half - turn[0, 1] * turn[1, 0])
+    nu = np.trace(turn) / 2.0 + root
+    mode, left = np.array([turn[0, 1], root - half]), np.array([turn[1, 0], root - half])
+    mode = mode / np.linalg.norm(mode)
+    left = left / (left @ mode)
+
+    def twice(u, v):
+        return np.array([0.0, 2.0 * quadratic * u[0] * v[0]])
+
+    third = np.array([0.0, 6.0 * cubic * mode[0] ** 2 * mode[0].conj()])
+    third = third + 2.0 * twice(mode, np.linalg.solve(one - turn, twice(mode, mode.conj())))
+    third += twice(mode.conj(), np.linalg.solve(nu**2 * one - turn, twice(mode, mode)))
+    expected = left @ third / nu / 2.0
+
+    def family(p):
+        def image(x):
+            slope = 2.0 * quadratic * x[0] + 3.0 * cubic * x[0] ** 2
+            bent = [0.0, quadratic * x[0] ** 2 + cubic * x[0] ** 3]
+            return (1.0 + p) * turn @ x + bent, (1.0 + p) * turn + [[0.0, 0.0], [slope, 0.0]]
+
+        return from_map(image, 2, orbit=np.zeros(2), scale=np.ones(2))
+
+    (point,) = locate(family, (-0.1, 0.1))
+    assert abs(point.coefficient - expected.real) <= point.coefficient_error
+    assert abs(point.rotation - expected.imag) <= point.rotation_error < 1e-6

@@ -222,7 +222,7 @@ def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
 def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> HopfForm:
     """The normal form of a pair near a frequency, with its error due to those of the equilibrium and derivative."""
     matrix = linear_part(system, x)[1]
-    off = matrix_error(system, x, matrix, error)
+    off = matrix_error(system, x, matrix, error) + 4.0 * EPSILON * np.abs(matrix)
     random = np.random.default_rng(1)
     form = _hopf_form(system, x, matrix, frequency)
     scatter = [

@@ -167,19 +167,28 @@ class Manifold:
 
     def coefficient(self, found: Sampled, powers: Powers) -> Term:
         """Coefficient of a resonant monomial of odd order, and a bound on its error, which includes the difference of
-        the sampled curve from the centre manifold: curves disturbed as much at random are sampled too."""
+        the sampled curve from the centre manifold: curves disturbed as much at random are sampled too. The modes err as
+        rounding turns them towards those of near multipliers."""
         at, (value, error) = self.at, found.term(powers)
         n, random = at.state.size, np.random.default_rng(0)
         directions = at.turns()
         largest = found.radius * RADII[0]
         z = largest * directions
         off = {each: np.abs(excess) + uncertain for each, (excess, uncertain) in self._excess(found).items()}
-        shifts, factors = [], []
+        matrix, q, p = at.image.jacobian, at.right, at.left.conj()
+        rounding = at.image.error + 4.0 * np.finfo(float).eps * np.abs(matrix)
+        right, left = matrix @ q, p @ matrix
+        off[1, 0] = np.abs(right - q * (p @ right)) + rounding @ np.abs(q)
+        # The image across the mode, which an error of p projects onto it.
+        across = np.abs(self._bend_by(powers, found.taylor(powers)[0][:-1]))
+        error += float((np.abs(left - (left @ q) * p) + np.abs(p) @ rounding) @ across)
+        shifts, factors, longer = [], [], 0.0
         for _ in range(_DRAWS):
             wrong = {}
             for each, difference in off.items():
                 signs = random.choice([-1.0, 1.0], n) if at.real else np.exp(2j * np.pi * random.random(n))
                 wrong[each] = self._bend_by(each, signs * difference)
+            longer = max(longer, float(abs(q.conj() @ wrong[1, 0]) / (q.conj() @ q).real))
             shift = at.displacements(wrong, z)
             ratios = np.abs(shift).max(axis=0) / found.size
             ratios = ratios[np.isfinite(ratios) & (ratios > 0.0)]
@@ -193,14 +202,14 @@ class Manifold:
             return value, np.inf
         harmonics = np.fft.fft(image @ at.left.conj())[:, 1] / directions.size
         moved = np.abs(harmonics - found.outermost) / (np.array(factors) * largest ** sum(powers))
-        return value, error + _SURE * float(moved.max())
+        return value, error + _SURE * (float(moved.max()) + (sum(powers) - 1) * longer * abs(value))
 
     def _bend_by(self, powers: Powers, excess: NDArray[np.inexact]) -> ComplexArray:
         """Solution w of (nu^i conj(nu)^j - A) w = excess, shape (n,), without a part along q if resonant."""
         i, j = powers
         nu, n = self.at.multiplier, self.at.state.size
         matrix = nu**i * nu.conjugate() ** j * np.eye(n) - self.at.image.jacobian
-        if not self._resonant[powers]:
+        if not self._resonant.get(powers, True):
             return np.asarray(np.linalg.solve(matrix, excess), dtype=np.complex128)
         q, p = self.at.right, self.at.left
         bordered = np.block([[matrix, q[:, None]], [p.conj()[None], np.zeros((1, 1))]])
