@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chilopod.stability import Ending, Kind, begin, follow, from_rhs, locate
+from chilopod.stability import Ending, Kind, begin, follow, from_map, from_rhs, locate
 
 
 def forced(mu):
@@ -109,3 +109,18 @@ def test_a_branch_that_starts_in_it_says_so(name):
     branch = follow(family, begin(family, fold, orbit(fold)), (fold - 0.5, fold + 0.5), points=5)
     assert "the branch starts in a fold" in branch.remarks
     assert branch.points[-1].value > fold
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_a_fold_of_a_map_where_the_state_is_zero(unit):
+    """Rounding of the terms that cancel there does not shrink with the state."""
+
+    def bent(p):
+        return from_map(lambda x: ([x[0] + x[0] ** 2 / unit + unit * ((p + 1.1) - 2.05)], [[1 + 2 * x[0] / unit]]), 1)
+
+    found, branch = locate(bent, (0.8, 1.4), orbit=[-0.4 * unit]), follow(bent, [-0.4 * unit], (0.8, 1.4))
+    assert found.complete
+    assert branch.ending is Ending.LEFT_INTERVAL
+    for (point,) in (found, [each.bifurcation for each in branch.special_points]):
+        assert point.kind is Kind.FOLD
+        assert abs(point.value - 0.95) <= point.error_bound < 1e-14

@@ -41,6 +41,7 @@ from chilopod.stability.returns import (
     in_parts,
     on_section,
     return_duration,
+    returned_states,
     section_at,
     velocity_at,
 )
@@ -49,6 +50,7 @@ from chilopod.stability.spectrum import return_multipliers, spectrum
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
 _STEADY = 1e-6  # change of the parameter along a step, relative to the step, that tells nothing of its effect
 _BESIDE = 1e-5  # change of the parameter, relative to its scale, for that effect
+_SCATTER = 1e-13 * np.arange(-2.0, 3.0)  # distances, in units, at which returns differ linearly, but for rounding
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
 _FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, and above which one fails
 _SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, relative to it
@@ -154,10 +156,13 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return residual <= _CLEAR * self._noise(found.x, found.value, anchor.section)
 
     def _noise(self, x: Array, value: float, section: Section | None) -> float:
-        """Difference of two computations of a return, in units: the part of a residual due to the flow's error."""
-        image, system = self.image(x, value, section), self.system(value)
-        other = in_parts(system, x, image.duration)
-        return float(np.abs((other - image.state) / self.state_units).max())
+        """Part of a residual, in units, due to the error of a return: the difference of two computations, or the
+        scatter of neighbouring returns, as a map has no parts."""
+        image, system, sizes = self.image(x, value, section), self.system(value), self.state_units
+        off = in_parts(system, x, image.duration) - image.state
+        if not off.any():
+            off = np.diff(returned_states(system, x + np.outer(_SCATTER, sizes), section), n=2, axis=0)
+        return float(np.abs(off / sizes).max())
 
     def size(self, step: Step[Anchor, OnCurve]) -> float:
         x = step.found.x
