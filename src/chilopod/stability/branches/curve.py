@@ -48,7 +48,6 @@ from chilopod.stability.returns import (
 from chilopod.stability.spectrum import return_multipliers, spectrum
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
-_STEADY = 1e-6  # change of the parameter along a step, relative to the step, that tells nothing of its effect
 _BESIDE = 1e-5  # change of the parameter, relative to its scale, for that effect
 _SCATTER = 1e-13 * np.arange(-2.0, 3.0)  # distances, in units, at which returns differ linearly, but for rounding
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
@@ -200,7 +199,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         last, n, space = anchor.last, anchor.last.orbit.size, anchor.space
         self.steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
         count = node_count(guess.matrix[:n, :n] + np.eye(n), np.ones(n)) if space is None else 0
-        off, weakest, corrections = self.precision, 0.0, 0
+        off, weakest, corrections = np.full(2, self.precision), np.zeros(2), 0
         if count >= _MANY_NODES:
             moved, x, value, image, matrix = self._shot(anchor, plane, count)
             if bounded:
@@ -209,9 +208,10 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         else:
             timed, solved = self._solved(anchor, timed, guess, plane, count)
             (x, value, mapped), moved, corrections = solved.found, solved.moved, solved.corrections
-            # The residual shows one direction.
-            off = _CLEAR * float(np.linalg.norm(solved.inverse @ solved.residual))
-            weakest = float(np.linalg.svd(solved.inverse, compute_uv=False)[0])
+            # The residual shows one direction. Second comes the parameter alone.
+            inverse, correction = solved.inverse, solved.inverse @ solved.residual
+            off = _CLEAR * np.array([np.linalg.norm(correction), abs(correction[-1])])
+            weakest = np.array([np.linalg.svd(inverse, compute_uv=False)[0], np.linalg.norm(inverse[-1])])
             image, matrix = self.matrix_at(x, value, timed.section, last.tangent, bounded, mapped)
         tangent = null_vector(within_space(space, matrix))
         if not tangent @ last.tangent >= SHARPEST_TURN:
@@ -263,7 +263,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return inside
 
     def _wrong(
-        self, anchor: Anchor, x: Array, image: ReturnMap, moved: Array, matrix: Array, off: float, weakest: float
+        self, anchor: Anchor, x: Array, image: ReturnMap, moved: Array, matrix: Array, off: Array, weakest: Array
     ) -> float:
         """Error of the derivative due to that of the orbit: ``off``, and ``weakest`` times the error of the flow."""
         n = x.size
@@ -271,17 +271,18 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.state_units)))
         length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(matrix[:n, :n] - anchor.matrix[:n, :n])) / length
-        if abs(moved[n]) <= _STEADY * length:
-            bend = max(bend, self._bend_by_parameter(anchor, x, image, moved[n]))
         # The flow's error relative to its magnification is a bound already.
         sizes = self.state_units
         error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
         flow = float(error.max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
-        return bend * (off + weakest * flow * max(1.0, self._relative_size(x)))
+        wrong = off + weakest * flow * max(1.0, self._relative_size(x))
+        stays = abs(moved[n]) <= _CLEAR * wrong[1]
+        by_parameter = self._bend_by_parameter(anchor, x, image, moved[n]) if stays else 0.0
+        return float(np.array([bend, by_parameter]) @ wrong)
 
     def _bend_by_parameter(self, anchor: Anchor, x: Array, image: ReturnMap, moved: float) -> float:
-        """Change of the return map's derivative with the parameter, in units, for a curve along which the parameter
-        stays: that along the curve does not show it."""
+        """Change of the return map's derivative with the parameter, in units, for a step that does not change the
+        parameter by more than its error: the change along the curve does not show it."""
         section = anchor.section and replace(anchor.section, duration=image.duration)
         step = _BESIDE if anchor.last.value + (moved + _BESIDE) * self.scale <= self.between[1] else -_BESIDE
         try:
