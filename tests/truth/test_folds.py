@@ -116,9 +116,11 @@ def test_a_fold_of_a_map_where_the_state_is_zero(unit):
     """Rounding of the terms that cancel there does not shrink with the state."""
 
     def bent(p):
-        return from_map(lambda x: ([x[0] + x[0] ** 2 / unit + unit * ((p + 1.1) - 2.05)], [[1 + 2 * x[0] / unit]]), 1)
+        return from_map(
+            lambda x: ([x[0] + x[0] ** 2 / unit + unit * (p + 1.1) - 2.05 * unit], [[1 + 2 * x[0] / unit]]), 1
+        )
 
-    found, branch = locate(bent, (0.8, 1.4), orbit=[-0.4 * unit]), follow(bent, [-0.4 * unit], (0.8, 1.4))
+    found, branch = locate(bent, (0.3, 1.4), orbit=[-0.8 * unit]), follow(bent, [-0.8 * unit], (0.3, 1.4))
     assert found.complete
     assert branch.ending is Ending.LEFT_INTERVAL
     for (point,) in (found, [each.bifurcation for each in branch.special_points]):

@@ -50,7 +50,8 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
         states = np.vstack([states, states[:1]])
         times = np.linspace(0.0, whole, len(states))
     if len(states) < _FEWEST_ROWS:
-        raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
+        allowed = f"one state, shape ({n},), or a whole orbit: {_FEWEST_ROWS} rows or more, one for each time"
+        raise ParameterError("must have more rows", field="orbit", value=guess, allowed=allowed)
     if not (np.diff(times) > 0.0).all():
         raise ParameterError("must have rising times", field="orbit")
     lasts, first = float(times[-1] - times[0]), 0.0
