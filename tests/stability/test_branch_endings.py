@@ -277,8 +277,10 @@ def test_bounds_of_multipliers_by_energy(rate, length):
         assert len(branch.points) > 8
         assert branch.remarks == ()
         for point in branch.points:
-            assert np.abs(point.multipliers - 1.0).max() <= point.error_bound < 1e-5
+            assert np.abs(point.multipliers - 1.0).max() <= point.error_bound
             assert point.stable is None
+            if abs(point.orbit[0]) < 2.5 * length:  # the pendulum is unstable upright, and magnifies errors near there
+                assert point.error_bound < 1e-9
 
 
 @pytest.mark.parametrize("width", [1e-5, 1e-3])

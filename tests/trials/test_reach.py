@@ -15,7 +15,8 @@ import pytest
 import edited_controllers as edits
 from chilopod import load_robot
 from chilopod.engine import Command, Event
-from chilopod.trials import Trial, run
+from chilopod.steering import Target
+from chilopod.trials import NONE, Disturbance, Trial, run
 from chilopod.trials.reach import Reach, UnknownKindError
 
 PLANAR = load_robot("aoi2022-planar")
@@ -98,7 +99,20 @@ class Coupled(Attr):
         return Command(leg_yaw=np.full((len(seen.joint_angles), 2), 0.3 * seen.joint_angles.mean()))
 
 
+@dataclass(frozen=True)
+class Lonely(Attr):
+    def act(self, event, seen):
+        return Command(leg_yaw=np.zeros((2, 2))[: len(seen.joint_angles)])
+
+
+@dataclass(frozen=True)
+class Steady(Attr):
+    def act(self, event, seen):
+        return Command(leg_yaw=0.1 * np.stack([seen.bearing, seen.bearing], axis=1))
+
+
 DOUBTS = {
+    "it fails among other robots": Lonely(),
     "changes while it steers": Remembering(),
     "equal observations give different commands": Counting(),
     "commands depend on other robots of the batch": Coupled(),
@@ -112,6 +126,14 @@ def test_a_controller_that_does_not_repeat_itself_is_not_kept(reason, tmp_path, 
     assert list(tmp_path.iterdir()) == []
     (said,) = [each.message for each in caplog.records if each.name == "chilopod.trials.store"]
     assert reason in said
+
+
+def test_a_controller_of_ones_own_is_kept_whatever_disturbs_its_walks(tmp_path):
+    """The robots beside it are disturbed as it is: noise of their sensors would be its own too."""
+    robot = load_robot("aoi2022")
+    for engine, disturbance in (("planar", NONE), ("twin", NONE), ("twin", Disturbance())):
+        run([Trial(robot, 0.3, 0, (), Target(0.4, 1.2), Steady(), disturbance, engine=engine)], tmp_path)
+    assert len(list(tmp_path.glob("*.nc"))) == 3
 
 
 LATE = [0.0]

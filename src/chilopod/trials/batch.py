@@ -19,17 +19,18 @@ import xarray as xr
 from chilopod.cores import cores
 from chilopod.engine import Walk, engine_named, event_times, steer
 from chilopod.engine.batch import with_end
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.progress import Progress, silent
 from chilopod.steering import CourseReferee, Target, add_measures
 from chilopod.steering.measures import lengths
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
 from chilopod.trials.record_check import check_record
-from chilopod.trials.trial import Disturbance, Drawn, Trial, conditions, draw
+from chilopod.trials.trial import Drawn, Trial, conditions, draw
 
 NOT_KEPT = "not kept"
 """Attribute with the reason why a record must not be kept; files never have it."""
 
+_OTHERWISE = 0.05  # joint angles of robots beside one that starts straight, rad
 _CHANGES = "an object that its code can reach changes while it steers"
 _KNOWN: dict[str, str] = {}  # findings about controllers, by everything that defines them
 _MOST_BYTES = 256e6
@@ -157,25 +158,31 @@ def _doubts(trial: Trial) -> str:
     who = _who(trial)
     if who not in _KNOWN:
         cycle = min(trial.robot.gait.period, trial.duration)
-        beside = replace(trial, seed=trial.seed + 1, disturbance=Disturbance())
+        beside = replace(trial, seed=trial.seed + 1, joint_angles=() if any(trial.joint_angles) else (_OTHERWISE,))
         if isinstance(trial.target, Target):
             beside = replace(beside, target=Target(-0.5 * trial.target.bearing, trial.target.distance))
         one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
-        among = _steered([beside, trial, beside], cycle)[0].to_dataset()
+        try:
+            among = _steered([beside, trial, beside], cycle)[0].to_dataset()
+        except ChilopodError as error:  # of a controller for one robot alone
+            _KNOWN[who] = f"it fails among other robots ({error.problem})"
+            return _KNOWN[who]
         # An engine may return anything.
         if not getattr(one, "identical", lambda _: True)(other):
             _KNOWN[who] = "equal observations give different commands (a clock, np.random, a counter?)"
-        elif not _same_bits(one, among.isel(robot=[1]) if "robot" in getattr(among, "dims", ()) else one):
+        elif not _same_bits(one, among):
             _KNOWN[who] = "commands depend on other robots of the batch"
         else:
             _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
     return _KNOWN[who]
 
 
-def _same_bits(one: xr.Dataset, other: xr.Dataset) -> bool:
-    """True if two robots have the same joint angles at all times."""
-    known = [data.joint_angle.values for data in (one, other) if "joint_angle" in data]
-    return len(known) < 2 or np.array_equal(known[0], known[1], equal_nan=True)
+def _same_bits(alone: xr.Dataset, among: xr.Dataset) -> bool:
+    """True if a robot walks alone as it does as the second of three, or an engine's records are not of so many."""
+    one, other = (getattr(each, "joint_angle", None) for each in (alone, among))
+    if [getattr(each, "sizes", {}).get("robot") for each in (one, other)] != [1, 3]:
+        return True
+    return np.array_equal(one.isel(robot=0), other.isel(robot=1), equal_nan=True)  # type: ignore[union-attr]
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:

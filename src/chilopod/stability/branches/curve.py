@@ -48,7 +48,7 @@ from chilopod.stability.returns import (
 from chilopod.stability.spectrum import return_multipliers, spectrum
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
-_BESIDE = 1e-5  # change of the parameter, relative to its scale, for that effect
+_BESIDE = 1e-5  # change of the parameter, relative to its scale, that shows its effect on a return
 _SCATTER = 1e-13 * np.arange(-2.0, 3.0)  # distances, in units, at which returns differ linearly, but for rounding
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
 _FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, and above which one fails
