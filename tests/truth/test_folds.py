@@ -126,3 +126,23 @@ def test_a_fold_of_a_map_where_the_state_is_zero(unit):
     for (point,) in (found, [each.bifurcation for each in branch.special_points]):
         assert point.kind is Kind.FOLD
         assert abs(point.value - 0.95) <= point.error_bound < 1e-14
+
+
+@pytest.mark.parametrize("start", [-0.33, -0.4])
+@pytest.mark.parametrize("power", [3, 7, 10, 13])
+def test_terms_of_a_map_that_cancel(power, start):
+    """x + x^2 + p + 1/16, with rounding of 2^power: a fold at p = -1/16, and a period doubling one below it."""
+
+    def family(p):
+        def image(x):
+            return [x[0] + x[0] ** 2 + (p + 2.0**power) - (2.0**power - 0.0625)], [[1.0 + 2.0 * x[0]]]
+
+        return from_map(image, 1)
+
+    branch = follow(family, [-np.sqrt(-start - 0.0625)], (start, 0.5))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    (fold,) = branch.special_points
+    is_fold(fold.bifurcation, -0.0625)
+    (doubling,) = locate(family, (start - 1.0, -0.8), orbit=[-np.sqrt(-start + 0.9375)], normal_form=False)
+    assert doubling.kind is Kind.PERIOD_DOUBLING
+    assert abs(doubling.value + 1.0625) <= doubling.error_bound < 1e-11

@@ -46,6 +46,7 @@ _END, _NEAR_END = 1e-4, 1e-3  # parts of a return, at its ends
 _LEAST_JUMP, _CLOSER = 1e-3, 30  # least jump of the derivative there, relative to it, and halvings to its place
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
+_NEIGHBOURS = 1e-10 * np.cos(np.arange(9.0))  # uneven distances of neighbours, relative to the sizes of the states
 _PAST = 1.5e-5  # distance along a curve, in its units, at which an orbit is past a grazing
 _JUMPS, _HALVINGS = 0.3, 20  # least jump of the derivative in a grazing, relative to it, and halvings to its place
 _FALLING = 0.5  # least fall of the residual that is progress
@@ -392,6 +393,13 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
         else:
             result[i] = arrival[1]
     return result
+
+
+def scatter(system: SystemLike, image: ReturnMap, x: Array, size: Array, section: Section | None = None) -> Array:
+    """Range, shape (n,), by which returns of neighbours of a state scatter round the plane of their derivative."""
+    moves = np.outer(_NEIGHBOURS / max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())), size)
+    off = returned_states(system, x + moves, section) - image.state - moves @ image.jacobian.T
+    return np.asarray(np.ptp([0.0 * x, *off], axis=0))
 
 
 def return_maps(systems: Sequence[SystemLike], orbits: Sequence[Array]) -> list[ReturnMap]:

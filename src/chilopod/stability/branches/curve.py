@@ -41,7 +41,7 @@ from chilopod.stability.returns import (
     in_parts,
     on_section,
     return_duration,
-    returned_states,
+    scatter,
     section_at,
     velocity_at,
 )
@@ -49,7 +49,6 @@ from chilopod.stability.spectrum import return_multipliers, spectrum
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
 _BESIDE = 1e-5  # change of the parameter, relative to its scale, that shows its effect on a return
-_SCATTER = 1e-13 * np.arange(-2.0, 3.0)  # distances, in units, at which returns differ linearly, but for rounding
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
 _FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, and above which one fails
 _SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, relative to it
@@ -152,16 +151,14 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         residual = off * max(_SMALLEST, size)
         if singular or not stalled or residual > SETTLED * max(1.0, size):
             return False
-        return residual <= _CLEAR * self._noise(found.x, found.value, anchor.section)
+        return residual <= _CLEAR * float(self.noise(found.x, found.value, anchor.section).max())
 
-    def _noise(self, x: Array, value: float, section: Section | None) -> float:
-        """Part of a residual, in units, due to the error of a return: the difference of two computations, or the
-        scatter of neighbouring returns, as a map has no parts."""
+    def noise(self, x: Array, value: float, section: Section | None) -> Array:
+        """Parts of a residual, shape (n,), in units, due to the error of a return: the difference of two computations,
+        or the scatter of neighbouring returns, as a map has no parts."""
         image, system, sizes = self.image(x, value, section), self.system(value), self.state_units
-        off = in_parts(system, x, image.duration) - image.state
-        if not off.any():
-            off = np.diff(returned_states(system, x + np.outer(_SCATTER, sizes), section), n=2, axis=0)
-        return float(np.abs(off / sizes).max())
+        off = np.abs(in_parts(system, x, image.duration) - image.state)
+        return np.asarray((off if off.any() else scatter(system, image, x, sizes, section)) / sizes)
 
     def size(self, step: Step[Anchor, OnCurve]) -> float:
         x = step.found.x

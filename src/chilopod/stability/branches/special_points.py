@@ -237,20 +237,21 @@ def _noise(curve: Curve, here: Step[Anchor, OnCurve], section: Section | None) -
         share = np.abs(np.linalg.inv(here.matrix)[-1, :-1])
     except np.linalg.LinAlgError:
         return np.inf
-    return curve.scale * SAFETY * float(share @ _off(curve, here.found.x, image))
+    return curve.scale * SAFETY * float(share @ _off(curve, here.found, section, image))
 
 
-def _off(curve: Curve, x: Array, image: ReturnMap) -> Array:
+def _off(curve: Curve, found: OnCurve, section: Section | None, image: ReturnMap) -> Array:
     """Distance by which an orbit may miss its return, in units of the states, shape (n,)."""
-    sizes = curve.state_units
+    x, sizes = found.x, curve.state_units
     wrong = np.broadcast_to(image.error, image.jacobian.shape)
-    return np.asarray((np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes)
+    off = (np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes
+    return np.asarray(off + curve.noise(x, found.value, section))
 
 
 def _fold_error(curve: Curve, here: Step[Anchor, OnCurve], image: ReturnMap) -> float:
     """Error of the parameter at a fold, from left . (H - x) = 0: to first order x does not enter."""
     matrix = here.matrix[:-1]
     left = np.linalg.svd(matrix[:, :-1])[0][:, -1]
-    off = float(np.abs(left) @ _off(curve, here.found.x, image))
+    off = float(np.abs(left) @ _off(curve, here.found, here.start.section, image))
     slope = abs(float(left @ matrix[:, -1]))
     return curve.scale * SAFETY * off / slope if slope > 0.0 else np.inf

@@ -355,6 +355,8 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
             twice = REPEATED * np.abs(returns.in_parts(system, x, image.duration) - image.state) + _CHANCE * size
             flow = flow + twice if stiff else np.minimum(flow, twice)
         wrong = np.abs(image.state - x) + flow
+        if not offers(system, "velocity"):  # terms of a map may cancel
+            wrong += returns.scatter(system, image, x, size, section)
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative belongs to a state with this error: along the orbit's least certain direction.
