@@ -397,6 +397,17 @@ def test_advice_names_what_is_not_set_yet(monkeypatch):
         from_rhs(oscillator, 2, 1.0, tolerance=0.0)
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
+def test_a_cube_passes_zero_at_any_tolerance(tolerance):
+    def cube(t, x):
+        return [x[1], -0.2 * x[1] - x[0] ** 3 + 0.3 * np.cos(t)]
+
+    found = multipliers(from_rhs(cube, 2, 2.0 * pi, tolerance=tolerance), [1.0, 0.2])
+    exact = multipliers(from_rhs(cube, 2, 2.0 * pi), [1.0, 0.2])
+    assert (np.abs(found.values - exact.values) <= found.error_bounds + exact.error_bounds).all()
+    assert found.error_bounds.max() < tolerance
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_bad_arguments_are_one_line(case):
     rhs, dimension, period, options, field = REFUSED[case]

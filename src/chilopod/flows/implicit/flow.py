@@ -21,6 +21,7 @@ from chilopod.frozen import Array, ReadOnlyArrays
 _STAGES, _OTHER_STAGES = 9, 7
 _NEAREST = 3  # largest number of couplings between two states with their derivative under step control
 _MOST_WORK = 3e9  # multiplications
+_SMALL = 53  # number of unknowns of a step below which its cost hardly falls
 _FEWEST_STEPS = 2000
 _VOLUME_STEPS = 64  # fewest steps for the growth of volume
 _FINER = 0.2
@@ -105,7 +106,7 @@ class ImplicitFlow(ReadOnlyArrays):
         derivative, report = np.eye(size), np.zeros(3)
         method = _method(stages)
         result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), report)
-        budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
+        budget = max(_FEWEST_STEPS, int(_MOST_WORK / max(n * stages, _SMALL) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
             branches = _branches(self.tape, params, np.array([0.5 * (a + b)]))[:, 0].copy()
             limit = min(longest, longest_step(self.fast, float(self.edges[-1]), a, b))

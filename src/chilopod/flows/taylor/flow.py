@@ -32,6 +32,7 @@ _FEWEST_STEPS = 5000
 _MOST_CLOCKS = 8  # tables of 4096 rows, each for one set of parameters
 _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
+_LEAST_ORDER = 12  # the step control of the other order sees terms up to the fourth: a cube may start with its third
 _COMMON = 20.0  # factor on the usual difference of all entries, for those that agree by chance
 _NOTHING_BESIDE = 1e-6  # negligible entry, relative to the geometric mean of the largest in its row and column
 _SHAKE = 4.0 * 2.0**-53
@@ -71,7 +72,7 @@ class TaylorFlow:
         n = tape.dimension
         self.tape, self.edges, self.period, self.patience = tape, np.array(edges), period, patience
         self._epsilon = max(tolerance, _LEAST_TOLERANCE)
-        self.order = max(8, math.ceil(-0.65 * math.log(self._epsilon)))  # near the order of least work
+        self.order = max(_LEAST_ORDER, math.ceil(-0.65 * math.log(self._epsilon)))  # near the order of least work
         self._directions = np.array(directions, dtype=np.float64) if tape.switches.size else None
         self._shaken = 1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0))
         self._clock = functools.lru_cache(_MOST_CLOCKS)(self._clock_table)
