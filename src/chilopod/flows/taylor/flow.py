@@ -173,7 +173,9 @@ class TaylorFlow:
             if self._divides_zero(t, x, params, _BESIDE * np.maximum(np.abs(x), np.abs(rates) * (span[1] - span[0]))):
                 return ZERO_BY_ZERO
             zero = _ZERO * float(np.abs([x, rates]).max())
-            for code, operand in self.tape.program[:2, : nodes.size].T.tolist():
+            for code, operand, other in self.tape.program[:3, : nodes.size].T.tolist():
+                if code == POWER and float(values[other]).is_integer():
+                    continue
                 if code in _OVERFLOWING and values[operand] > _LARGE:
                     return f"the right-hand side overflows: {_OVERFLOWING[code]} of {values[operand]:.6g}"
                 if code in _ROOTS and values[operand] <= zero:

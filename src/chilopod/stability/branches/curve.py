@@ -48,7 +48,7 @@ from chilopod.stability.returns import (
 from chilopod.stability.spectrum import return_multipliers, spectrum
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
-_BESIDE = 1e-5  # change of the parameter, relative to its scale, that shows its effect on a return
+_BESIDE = 1e-10  # change of the parameter, relative to its scale, that shows its effect on a return
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
 _FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, and above which one fails
 _SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, relative to it
