@@ -281,14 +281,15 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """Change of the return map's derivative with the parameter, in units, for a step that does not change the
         parameter by more than its error: the change along the curve does not show it."""
         section = anchor.section and replace(anchor.section, duration=image.duration)
-        step = _BESIDE if anchor.last.value + (moved + _BESIDE) * self.scale <= self.between[1] else -_BESIDE
+        step = max(_BESIDE, 8.0 * float(np.spacing(abs(anchor.last.value))) / self.scale)
+        step = step if anchor.last.value + (moved + step) * self.scale <= self.between[1] else -step
         try:
             beside = self.image(x, anchor.last.value + (moved + step) * self.scale, section)
         except AnalysisError:
             return np.inf
         sizes = self.state_units
         change = (beside.jacobian - image.jacobian) * sizes / sizes[:, None]
-        return float(np.linalg.norm(change)) / _BESIDE
+        return float(np.linalg.norm(change)) / abs(step)
 
     def arrived(self, step: Step[Anchor, OnCurve]) -> Step[Anchor, OnCurve]:
         """A step with the anchor at its end, on the section there."""
