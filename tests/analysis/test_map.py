@@ -247,14 +247,6 @@ def test_transcritical_curves_have_no_criticality(monkeypatch):
     assert found.as_json()["folded_share"] is None
 
 
-def test_transcritical_points_at_numbers_of_modules_have_no_coefficient():
-    robot = ROBOT.with_value("gait.side_phase", np.deg2rad(150.0))
-    found = mapped(robot, (K1, "10 N*mm/deg", "11 N*mm/deg"), ("modules", 6, 7), points=3)
-    (curve,) = found.curves
-    assert (curve.kind, curve.line) == (Kind.TRANSCRITICAL, False)
-    assert np.isnan(curve.coefficient).all()
-
-
 def test_pitchfork_turns_along_its_curve():
     """Where the coefficients of points located one by one pass through zero."""
     offset = "legs.forward_offset"
