@@ -24,6 +24,7 @@ def test_files_and_text_say_the_same(tmp_path):
     table = pd.read_csv(tmp_path / "map.csv", comment="#")
     assert list(table.columns[:3]) == ["y", "x [N*mm/deg]", "growth [1/s]"]
     np.testing.assert_array_equal(table["growth [1/s]"], growth.ravel())
+    assert table.folded.isna().all()  # folds were not followed
     again = run(*MAP, "--points", "9", "--json", "--force", "--out", tmp_path)
     assert again[0] == 0
     assert json.loads(again[1]) == json.loads((tmp_path / "map.json").read_text())

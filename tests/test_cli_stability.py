@@ -208,7 +208,9 @@ def test_numbers_without_a_unit_are_said_to_be_si(command):
         assert "no bifurcation of the straight walk for springs.stiffness[0] between 34.9066 N*mm/deg and 1309" in out
     else:
         assert code == 2
-        assert "'34.91 N*mm/deg to 1309 N*mm/deg': the straight walk has no pitchfork in this interval" in err
+        said = "--between springs.stiffness[0] = '34.91 N*mm/deg to 1309 N*mm/deg': the straight walk has no pitchfork"
+        allowed = "allowed: an interval around a pitchfork; `chilopod bifurcation` lists where the walk bends"
+        assert err.splitlines()[-1] == f"error: {said} in this interval; {allowed}"
     for between in (("0.2", "75 N*mm/deg"), ("11 N*mm/deg", "13 N*mm/deg")):
         _, _, err = bifurcation(between=between)
         assert ("note: a number without a unit is SI" in err) is (between[0] == "0.2")

@@ -33,6 +33,20 @@ def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records():
     assert loaded("from chilopod.analysis import bifurcations, pitchfork, straight_walk", *HEAVY) == set()
 
 
+def test_a_misspelt_name_is_noticed_before_the_command_loads_what_it_computes_with():
+    robot = ("aoi2022-planar", "--engine", "plana")
+    wrong = [
+        ("course", robot[0], "--targets", "slalmo"),
+        ("course", *robot, "--targets", "slalom"),
+        ("course", robot[0], "--targets", "slalom", "--controller", "no.such:Thing"),
+        ("turn", *robot, "--target", "45 deg, 1.3 m"),
+        ("walk", *robot),
+        ("bifurcation", robot[0], "--parameter", "springs.stif"),
+    ]
+    code = f"from chilopod.cli import main\nassert [main(each) for each in {wrong}] == [2] * {len(wrong)}"
+    assert loaded(code, *HEAVY, "scipy", "numba") == set()
+
+
 def test_what_walks_loads_the_twin_only_where_it_walks():
     code = "from chilopod.tasks import turn, radius_law\nfrom chilopod.trials import NONE, Trial, run, together"
     assert loaded(code, "mujoco", "matplotlib", "cmaes", "distributed") == set()

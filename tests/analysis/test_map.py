@@ -207,13 +207,19 @@ def test_between_a_fold_and_a_subcritical_pitchfork_curved_walks_exist_too():
     fold = MapCurve(kind=Kind.FOLD, values=lines[1][:6], coefficient=np.full(6, np.nan), **about)
     x, y = np.meshgrid(found.x_values / stiffness(1.0), found.y_values)
     straight = x > 10.0 + 20.0 * (y - 0.05)
-    both = replace(found, fate=(~straight).astype(np.int8), curves=(pitchfork, fold))
+    assert found.as_json()["folded_share"] is None  # folds were not followed
+    assert np.isnan(found.to_dataset().folded).all()
+    both = replace(found, fate=(~straight).astype(np.int8), curves=(pitchfork, fold), folds_known=True)
     np.testing.assert_array_equal(both.folded, straight & (y < 0.05) & (x < 10.0 - 20.0 * (y - 0.05)))
     assert both.folded.any()
     assert both.as_json()["folded_share"] == both.to_dataset().folded.values.mean() > 0.0
     assert any("beside curved walks" in line for line in both.lines())
     assert "curved walks too" in [text.get_text() for text in both.plot(Figure().add_subplot()).get_legend().texts]
     assert not replace(both, curves=(pitchfork,)).folded.any()
+    some = replace(both, folds_known=False)
+    np.testing.assert_array_equal(some.folded, np.where(both.folded, 1.0, np.nan))
+    assert (some.as_json()["folded_share"], "beside curved walks" in str(some)) == (None, False)
+    assert "curved walks too" in [text.get_text() for text in some.plot(Figure().add_subplot()).get_legend().texts]
 
 
 def test_coefficients_of_a_map_are_those_of_its_robots():
@@ -222,6 +228,23 @@ def test_coefficients_of_a_map_are_those_of_its_robots():
     end = int(np.argmin(curve.values[:, 1]))
     (there,) = bifurcations(ROBOT, K1, (stiffness(11.0), stiffness(13.0)))
     assert curve.coefficient[end] == pytest.approx(there.coefficient, rel=1e-6)
+
+
+def test_transcritical_curves_have_no_criticality(monkeypatch):
+    """The sign of the quadratic term is that of the mode, which is arbitrary: of mirrored robots it differs."""
+    monkeypatch.setattr(map_curves, "_LONGEST", 0.5)
+    robot = ROBOT.with_value("gait.side_phase", np.deg2rad(210.0))
+    found = mapped(robot, (K1, stiffness(10.0), stiffness(11.5)), ("body.mass", 8.0, 9.0), points=2, also=["folds"])
+    (curve,) = found.curves
+    assert curve.kind is Kind.TRANSCRITICAL
+    assert np.isnan(curve.coefficient).all()
+    assert set(found.as_json()["curves"][0]["coefficients"]) == {None}
+    for show in ("kind", "criticality"):
+        lines = found.plot(Figure().add_subplot(), show).lines
+        (line,) = (each for each in lines if each.get_label() == "transcritical")
+        assert line.get_linestyle() == "-."
+    assert found.remarks == ("curved walks beside transcritical points are not followed to their folds",)
+    assert found.as_json()["folded_share"] is None
 
 
 def test_pitchfork_turns_along_its_curve():

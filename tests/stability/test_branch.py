@@ -64,6 +64,22 @@ def test_in_pieces_as_in_one():
     assert [point.error_bound for point in pieces.points] == [point.error_bound for point in whole.points]
 
 
+def logistic(r):
+    return from_map(lambda x: (r * x * (1.0 - x), [[r - 2.0 * r * x[0]]]), 1)
+
+
+# Spent in a step, and while the step with the period doubling is searched.
+@pytest.mark.parametrize("budget", [100, 158, 206])
+def test_a_budget_changes_no_point(budget):
+    whole = follow(logistic, [0.5], (2.0, 3.6))
+    piece = follow(logistic, [0.5], (2.0, 3.6), budget=budget)
+    assert piece.ending is Ending.BUDGET
+    pieces = follow(logistic, piece, (2.0, 3.6))
+    assert [point.special for point in whole.special_points] == [Kind.PERIOD_DOUBLING]
+    assert [point.value for point in pieces.points] == [point.value for point in whole.points]
+    assert pieces.remarks == whole.remarks == ()
+
+
 def test_a_branch_that_left_goes_on_in_a_wider_interval():
     (fork,) = locate(gentle, (-0.1, 0.1))
     branch = follow(gentle, switch(gentle, fork)[0], (-0.1, 0.1), step=0.05)

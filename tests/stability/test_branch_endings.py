@@ -147,6 +147,17 @@ def test_a_budget_ends_a_branch_and_keeps_what_was_found():
     assert max(point.error_bound for point in on.points) < 1e-8  # the last one's, too
 
 
+def test_a_branch_that_goes_on_closes_where_a_single_run_does():
+    """Also within two steps."""
+    start = begin(circle, 0.0, [0.5])
+    whole = follow(circle, start, (-1.0, 1.0))
+    steps = sum(point.special is None for point in whole.points[1:])
+    piece = follow(circle, start, (-1.0, 1.0), points=steps - 1)
+    on = follow(circle, piece, (-1.0, 1.0), points=steps)
+    assert (piece.ending, on.ending) == (Ending.ENOUGH_POINTS, Ending.CLOSED)
+    assert [point.value for point in on.points] == [point.value for point in whole.points]
+
+
 def test_a_guess_and_an_orbit_start_a_branch():
     by_guess = follow(linear, [0.1], (0.0, 1.0))
     by_orbit = follow(linear, find_orbit(linear(0.0), [0.1]), (0.0, 1.0))

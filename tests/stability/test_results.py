@@ -229,10 +229,12 @@ def test_special_points_are_marked_in_tables():
     data = folded().to_dataset()
     special = data.isel(point=data.special.values == "fold")
     np.testing.assert_allclose(special.value, [FOLD, -FOLD], atol=1e-12)
-    assert (np.abs(special.value - [FOLD, -FOLD]) <= special.error_bound).all()
+    assert (np.abs(special.value - [FOLD, -FOLD]) <= special.value_error_bound).all()
     assert special.criticality.values.tolist() == ["not defined"] * 2
     assert special.verdict.values.tolist() == ["undecided"] * 2
-    assert np.isnan(data.error_bound[data.special == ""]).all()
+    assert np.isnan(data.value_error_bound[data.special == ""]).all()
+    assert data.multipliers_error_bound.values.tolist() == [point.error_bound for point in folded().points]
+    assert "of the multipliers" in data.multipliers_error_bound.long_name
     two = curve().to_dataset()
     (at,) = np.flatnonzero(two.special == "1:2 resonance")
     np.testing.assert_allclose(two["values"][at], [3.0, -1.0], atol=1e-12)

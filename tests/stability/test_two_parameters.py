@@ -192,7 +192,7 @@ def test_what_two_parameters_would_unfold_is_refused():
 @pytest.mark.parametrize("kind", [Kind.KREIN_COLLISION, Kind.HOPF])
 def test_a_point_of_a_wrong_kind_is_named(kind):
     point, _ = start_at(0.4, kind)
-    with pytest.raises(ParameterError, match=f"{kind.label}, which is not followed; allowed: .* of another kind"):
+    with pytest.raises(ParameterError, match=rf"^start = '{kind.label}': must be of a kind .* of another kind$"):
         follow2(circle(), point, BOX, second=SECOND)
     one = np.ones(1, complex)
     special = SpecialPoint2(np.zeros(2), np.zeros(2), np.zeros(1), one, 1.0 + 0j, one, 0.0, kind=CodimensionTwo.CUSP)

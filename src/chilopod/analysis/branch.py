@@ -98,8 +98,9 @@ def curved_walks(
         problem = "the straight walk has no pitchfork in this interval"
         searched = interval_text(robot, parameter, between)
         others = [f"{each.point.kind.label} at {units.format(each.point.value, each.unit, digits=6)}" for each in found]
-        allowed = f"a pitchfork; here are: {', '.join(others)}" if others else None
-        raise AnalysisError(problem, field=parameter, value=searched, allowed=allowed)
+        here = f"here are: {', '.join(others)}" if others else "`chilopod bifurcation` lists where the walk bends"
+        allowed = f"an interval around a pitchfork; {here}"
+        raise AnalysisError(problem, field=f"between {parameter}", value=searched, allowed=allowed)
     fork = forks[-1]
     # The positive side of the mode is that of positive joint angles.
     angles = fork.point.mode.real[3 : robot.body.modules + 2]

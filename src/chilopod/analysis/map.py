@@ -31,6 +31,7 @@ from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
 from chilopod.output import write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
+from chilopod.stability import Kind
 
 _VERSION = 1  # of the file of growth rates, increased whenever their meaning or computation changes
 _ALSO = ("folds", "radius")
@@ -110,13 +111,16 @@ def map(
         grid.refine(wanted, rest)
         search.run()
     radius, lost = _radii(grid, bending, rest)
-    if sum(search.lost):
+    if search.lost:
         lost.append(f"the pitchfork is subcritical at {sum(search.lost)} points, but its folds were not found")
+    if search.with_folds and any(curve.kind is Kind.TRANSCRITICAL for curve in search.curves):
+        search.remarks.append("curved walks beside transcritical points are not followed to their folds")
     growth, frequency, error, unstable, fate = grid.values
     return StabilityMap(
         robot, plane.x, plane.y, grid.x, grid.y, growth, frequency, error, unstable.astype(np.int16),
         fate.astype(np.int8), grid.computed, radius, curves=tuple(search.curves),
-        remarks=(*dict.fromkeys(search.remarks), *_invalid(grid), *lost), folds_lost=bool(search.lost),
+        remarks=(*dict.fromkeys(search.remarks), *_invalid(grid), *lost),
+        folds_known=search.with_folds and not (search.lost or search.remarks),
     )  # fmt: skip
 
 

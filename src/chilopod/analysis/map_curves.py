@@ -27,6 +27,7 @@ from chilopod.planar import PlanarModel
 from chilopod.planar.along import FollowedModel
 from chilopod.progress import Progress
 from chilopod.stability import BifurcationPoint, CodimensionTwo, Curve2, Ending, Kind, Point2, follow2, switch2
+from chilopod.stability.points import WITHOUT_CRITICALITY
 
 _LONGEST = 0.04  # step along a curve, in units of the box
 _MOST = 12  # curves
@@ -60,7 +61,7 @@ class MapCurve(ReadOnlyArrays):
         Values of both numbers in SI units, and bounds on their errors, shape (points, 2).
     coefficient
         Cubic coefficient of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
-        supercritical, NaN where it is not known, shape (points,).
+        supercritical, shape (points,). NaN where it is not known, and of transcritical points, which have none.
     line
         True if the points follow each other on a curve, False if each belongs to a number of modules.
     """
@@ -144,7 +145,7 @@ class Search:
             for point in points:
                 place = np.array(edge.ordered(point.value, beside))
                 error = np.array(edge.ordered(point.error_bound, 0.0))
-                by_kind.setdefault(point.kind, []).append((place, error, self._coefficient(point, place)))
+                by_kind.setdefault(point.kind, []).append((place, error, self._coefficient(point.kind, point, place)))
         for kind, found in by_kind.items():
             values, errors, coefficients = (np.array(column) for column in zip(*found, strict=True))
             self.curves.append(MapCurve(kind, values, errors, coefficients, line=False))
@@ -242,23 +243,23 @@ class Search:
                 for fold in self._fold(edge, middle, p, q, len(subcritical)):
                     self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
-            self.lost += [0] * self.with_folds
             self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
 
     def _add(self, curve: Curve2, edge: Edge) -> None:
         """Keep a curve in the order of the map's axes, and say where it ends before it should."""
         order = [*edge.ordered(0, 1)]
         special = tuple(MapPoint(each.kind, each.values[order], each.error_bound[order]) for each in curve.special)
-        coefficients = [self._coefficient(each, each.values[order]) for each in curve.points]
+        coefficients = [self._coefficient(curve.kind, each, each.values[order]) for each in curve.points]
         errors = np.array([each.error_bound for each in curve.points])[:, order]
         self.curves.append(MapCurve(curve.kind, curve.values[:, order], errors, np.array(coefficients), special))
         for ending in dict.fromkeys(each for each in curve.endings if each in _CUT_OFF):
             self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {ending.sentence}")
 
-    def _coefficient(self, point: BifurcationPoint | Point2, place: Array) -> float:
-        """Coefficient for an amplitude of joint angles, as of one robot; NaN if there is none."""
+    def _coefficient(self, kind: Kind, point: BifurcationPoint | Point2, place: Array) -> float:
+        """Cubic coefficient for an amplitude of joint angles, as of one robot; NaN if there is none."""
         found = coefficient_of(point, self.plane.at(*place.tolist()).body.modules)
-        return np.nan if found is None else found
+        # That of a curve without criticality is quadratic, and changes its sign with the mode.
+        return np.nan if found is None or kind in WITHOUT_CRITICALITY else found
 
     def _box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Part of the plane in which there are results."""

@@ -40,6 +40,7 @@ _COLORS = {
     Fate.FAILED: "#6f6f6f",
 }
 _CURVES = {Kind.PITCHFORK: "#1a1a1a", Kind.NEIMARK_SACKER: "#0072b2", Kind.FOLD: "#d55e00"}
+_OWN = {Kind.FOLD: (":", "fold of curved walks"), Kind.TRANSCRITICAL: ("-.", Kind.TRANSCRITICAL.label)}
 _MARK = "#d55e00"
 
 
@@ -53,14 +54,14 @@ def draw(found: Any, axes: Axes | None, show: str) -> Axes:
 
         look: dict[str, Any] = {"cmap": ListedColormap([_COLORS[fate] for fate in FATES]), "vmin": -0.5}
         axes.pcolormesh(x, y, found.fate, shading="nearest", rasterized=True, vmax=len(FATES) - 0.5, **look)
-        if found.folded.any():
-            axes.contourf(x, y, found.folded, levels=[0.5, 1.5], colors="none", hatches=["////"])
+        if (found.folded > 0.0).any():
+            axes.contourf(x, y, np.nan_to_num(found.folded), levels=[0.5, 1.5], colors="none", hatches=["////"])
     else:
         _field(axes, x, y, found, show)
     if show == "criticality":
         _coefficients(axes, found)
-    else:
-        for curve in found.curves:
+    for curve in found.curves:
+        if show != "criticality" or not np.isfinite(curve.coefficient).any():
             _curve(axes, found, curve)
     for point in found.special:
         at = (axis.shown(value) for axis, value in zip((found.x, found.y), point.values, strict=True))
@@ -76,7 +77,7 @@ def keys(found: Any, axes: Axes) -> list[Any]:
     from matplotlib.patches import Patch
 
     patches = [Patch(facecolor=_COLORS[fate], edgecolor="#767676", label=fate.label) for fate in found.shares]
-    if found.folded.any():
+    if (found.folded > 0.0).any():
         patches.append(Patch(facecolor="none", edgecolor="#767676", hatch="////", label="curved walks too"))
     handles, labels = axes.get_legend_handles_labels()
     return [*patches, *dict(zip(labels, handles, strict=True)).values()]
@@ -127,7 +128,7 @@ def _coefficients(axes: Axes, found: Any) -> None:
 
 
 def _curve(axes: Axes, found: Any, curve: MapCurve) -> None:
-    """A curve, dashed where it is subcritical."""
+    """A curve, dashed where it is subcritical; dash-dotted of transcritical points, which have no criticality."""
     x, y = (axis.shown(curve.values[:, k]) for k, axis in enumerate((found.x, found.y)))
     color, label = _CURVES.get(curve.kind, "#009e73"), curve.kind.label
     if not curve.line:
@@ -135,8 +136,7 @@ def _curve(axes: Axes, found: Any, curve: MapCurve) -> None:
         return
     subcritical = np.nan_to_num(curve.coefficient, nan=-1.0) > 0.0
     for style, chosen, name in (("-", ~subcritical, label), ("--", subcritical, f"{label}, subcritical")):
-        if curve.kind is Kind.FOLD:
-            style, name = ":", "fold of curved walks"
+        style, name = _OWN.get(curve.kind, (style, name))
         # A piece between two points belongs to the side of its first one; at a turning point both sides meet.
         shown = chosen | np.append(False, chosen[:-1])
         if chosen.any():

@@ -45,8 +45,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         True where they were computed, shape (rows, columns); elsewhere growth and frequency are interpolated.
     radius
         Radius of the curved walks, m, shape (rows, columns), NaN where there is none or it was not computed.
-    curves, remarks, folds_lost
-        Curves of bifurcations; sentences about what may be missing or is invalid; True if folds were sought in vain.
+    curves, remarks, folds_known
+        Curves of bifurcations; sentences about what may be missing or is invalid; True if all folds were followed.
     """
 
     robot: Robot
@@ -63,7 +63,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
     radius: Array
     curves: tuple[MapCurve, ...]
     remarks: tuple[str, ...]
-    folds_lost: bool = False
+    folds_known: bool
 
     @property
     def special(self) -> tuple[MapPoint, ...]:
@@ -79,9 +79,9 @@ class StabilityMap(Summary, ReadOnlyArrays):
         return tuple(found)
 
     @cached_property
-    def folded(self) -> NDArray[np.bool_]:
-        """True where curved walks exist beside a stable straight one, shape (rows, columns): along a row or a column,
-        between a fold and the nearest subcritical pitchfork. All False if folds were not followed."""
+    def folded(self) -> Array:
+        """1 where curved walks exist beside a stable straight one, else 0, shape (rows, columns): along a row or a
+        column, between a fold and the nearest subcritical pitchfork. NaN for 0 if not all folds are known."""
         straight = self.fate == FATES.index(Fate.STRAIGHT)
         found = np.zeros_like(straight)
         axes = self.x_values, self.y_values
@@ -91,7 +91,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
                 for fold in folds if forks.size else ():
                     low, high = np.sort([fold, forks[np.abs(forks - fold).argmin()]])
                     row |= (axes[axis] >= low) & (axes[axis] <= high)
-        return read_only(found & straight)
+        return read_only(np.where(found & straight, 1.0, 0.0 if self.folds_known else np.nan))
 
     @property
     def shares(self) -> dict[Fate, float]:
@@ -108,8 +108,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
         shares = ", ".join(f"{fate.label} {100.0 * share:.3g} %" for fate, share in self.shares.items())
         rows, columns = self.fate.shape
         above = [f"{shares} of {columns} x {rows} values, {self.computed.sum()} of which were computed"]
-        if self.folded.any():
-            above.append(f"beside curved walks, straight ones hold at {100.0 * self.folded.mean():.3g} % of the values")
+        if (share := self.folded.mean()) > 0.0:
+            above.append(f"beside curved walks, straight ones hold at {100.0 * share:.3g} % of the values")
         kinds = Counter(curve.kind.label for curve in self.curves)
         above.append(f"curves: {', '.join(f'{count} of {kind}' for kind, count in kinds.items()) or 'none'}")
         table: list[Sequence[str]] = [("on them", self.x.label, self.y.label)]
@@ -150,7 +150,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "values": [self.x_values.size, self.y_values.size],
             "computed": int(self.computed.sum()),
             "shares": {fate.label: share for fate, share in self.shares.items()},
-            "folded_share": None if self.folds_lost else float(self.folded.mean()),
+            "folded_share": finite(self.folded.mean()),
             "curves": [
                 {**plain(curve), "coefficients": [*map(finite, curve.coefficient.tolist())], "line": curve.line}
                 for curve in self.curves
@@ -171,7 +171,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
             "unstable": (grid, self.unstable),
             "fate": (grid, self.fate, {"meaning": meanings}),
             "computed": (grid, self.computed),
-            "folded": (grid, self.folded, {"meaning": "curved walks exist beside a stable straight one"}),
+            "folded": (grid, self.folded, {"meaning": "1: curved walks exist beside a stable straight one; 0: none"}),
             "radius": (grid, self.radius, {"units": "m"}),
         }
         none = np.empty((0, 2))

@@ -263,7 +263,6 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
 
 def onset_of(robot: Robot, parameter: str, between: tuple[str, str] | None, at: str | None = None) -> Onset:
     """Read the number that bends a robot, its interval, and the value at which walks are studied."""
-    from chilopod.analysis import Onset
     from chilopod.analysis.parameters import check_parameter
 
     with reading("parameter"):
@@ -271,6 +270,8 @@ def onset_of(robot: Robot, parameter: str, between: tuple[str, str] | None, at: 
     limits = between and interval(robot, parameter, between)
     with reading("at"):
         studied = None if at is None else robot.override(parameter, at).get(parameter)
+    from chilopod.analysis import Onset
+
     with reading("between"):
         return Onset(parameter, limits, studied)
 

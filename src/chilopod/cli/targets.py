@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -77,17 +78,18 @@ def course(
     spring = None if k1 is None else options.spring(chosen.springs, k1)
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
+    goals = course_named(targets, 1.0 if seconds is None else seconds)
 
     def results(progress: Callable[[str], Progress]) -> Driven:
+        how = options.steering  # before what takes seconds to import
         from chilopod.tasks.course import Driver, drive, driver, patience_of
         from chilopod.trials import check_fits
 
-        goals = course_named(targets, patience_of(options.engine) if seconds is None else seconds)
-        how = options.steering
+        way = replace(goals, patience=patience_of(options.engine)) if seconds is None else goals
         # What cannot be driven is refused before the radius law takes its time.
-        check_fits(Driver(described, chosen, law=None, **how).trial(goals).repeated(options.seed, options.repeats))
+        check_fits(Driver(described, chosen, law=None, **how).trial(way).repeated(options.seed, options.repeats))
         ready = driver(described, chosen, spring, **how, folder=options.trials, progress=progress("radius law"))
-        return drive(ready, goals, **options.runs(progress("course")))
+        return drive(ready, way, **options.runs(progress("course")))
 
     options.walk_into(out, "course", results)
 
@@ -144,9 +146,9 @@ def turn(
         seconds = None if duration is None else units.parse(duration, "s")
 
     def results(progress: Callable[[str], Progress]) -> Turn:
+        how = {"duration": seconds, **options.steering}
         from chilopod.tasks import turn as walk_there
 
-        how = {"duration": seconds, **options.steering}
         return walk_there(described, goal, chosen, spring, **how, **options.runs(progress("turn")))
 
     options.walk_into(out, "turn", results)

@@ -53,15 +53,14 @@ def walk(
     with reading("initial_joints"):
         angles = joint_angles(initial_joints)
     free([out] if out else [], options.force, ".nc")
-    from chilopod.record import RATE
-    from chilopod.tasks import ends
-    from chilopod.trials import Trial
-
     with ExitStack() as stack:
         with options.walking("walk") as progress:
-            one = Trial(
-                described, seconds, 0, angles, rate=RATE if rate is None else rate, forces=forces, **options.steering
-            )
+            how = options.steering  # before what takes seconds to import
+            from chilopod.record import RATE
+            from chilopod.tasks import ends
+            from chilopod.trials import Trial
+
+            one = Trial(described, seconds, 0, angles, rate=RATE if rate is None else rate, forces=forces, **how)
             trials = one.repeated(options.seed, options.repeats)
             file = stack.enter_context(_record_file(out, trials)) if out else None
             add = file.add if file else lambda index, record: None

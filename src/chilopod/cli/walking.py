@@ -74,9 +74,10 @@ class WalkOptions(RobotOptions):
 
     @property
     def steering(self) -> dict[str, Any]:
-        """Engine and controller, arguments of every task and of a trial."""
-        from chilopod.engine import controller_named
+        """Engine and controller, arguments of every task and of a trial; refuses unknown ones."""
+        from chilopod.engine import controller_named, engine_named
 
+        engine_named(self.engine)
         own = None if self.controller is None else controller_named(self.controller)
         return {"engine": self.engine, "controller": own}
 

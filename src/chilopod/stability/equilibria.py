@@ -125,7 +125,8 @@ def autonomous(system: SystemLike) -> Autonomous:
     """Check that a system does not depend on time."""
     check_system(system)
     if not is_autonomous(system):
-        raise ParameterError("must not depend on time", field="system", allowed="period=None, and no t in the function")
+        allowed = "period=None, and no t in the function; a map has no equilibria: use `find_orbit` or `locate`"
+        raise ParameterError("must be a flow that does not depend on time", field="system", allowed=allowed)
     return system
 
 

@@ -26,6 +26,8 @@ _COLUMNS: dict[str, tuple[Any, ...]] = {
     "value": (float, "parameter", _PARAMETER),
     "values": (float, "both parameters", _PARAMETER, "parameter"),
     "error_bound": (float, "bound on the error of the parameter", _PARAMETER, "parameter"),
+    "value_error_bound": (float, "bound on the error of the parameter at a special point", _PARAMETER),
+    "multipliers_error_bound": (float, "bound on the error of the multipliers that are not small", "1"),
     "kind": (str, "what happens here", ""),
     "special": (str, "what happens at a special point", ""),
     "criticality": (str, "which way new orbits go", ""),

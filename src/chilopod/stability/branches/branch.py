@@ -173,8 +173,10 @@ class Branch(Result):
         verdicts = [VERDICTS[None if point.special else point.stable] for point in self.points]
         values = columns(self.points, "value", "special", "period", "orbit", "multipliers")
         about = columns((each.bifurcation for each in self.points), "error_bound", "criticality", "coefficient")
+        errors = {"multipliers_error_bound": [each.error_bound for each in self.points]}
+        errors["value_error_bound"] = about.pop("error_bound")
         end = {"ending": self.ending.label, "reason": self.reason, "remarks": "; ".join(self.remarks)}
-        return dataset("point", {**values, **about, "verdict": verdicts}, periods=self.periods, **end)
+        return dataset("point", {**values, **errors, **about, "verdict": verdicts}, periods=self.periods, **end)
 
 
 @with_shared_symmetries

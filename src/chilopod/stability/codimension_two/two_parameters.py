@@ -136,8 +136,8 @@ def _target(family2: Family2, start: BifurcationPoint, second: float) -> tuple[i
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("must be a point of these systems", field="start", value=start.orbit.shape)
     if start.kind in (Kind.KREIN_COLLISION, Kind.HOPF):
-        said, allowed = f"is of the kind {start.kind.label}, which is not followed", "a point of another kind"
-        raise ParameterError(said, field="start", value=start.value, allowed=allowed)
+        said, allowed = "must be of a kind that is followed", "a point of another kind"
+        raise ParameterError(said, field="start", value=start.kind.label, allowed=allowed)
     known = offers(system, "orbit") and start.kind is not Kind.FOLD
     if start.kind is Kind.NEIMARK_SACKER:
         return 0, known

@@ -58,14 +58,15 @@ def trace(
     if outward(equations.box, anchor.values, anchor.tangent[equations.parameters(anchor)[0]]):
         return Ending.LEFT_INTERVAL, "", size
     for count in itertools.count(1) if points is None else range(1, points + 1):
-        shortened = False
+        shortened, planned = False, size
         while True:
-            if equations.budget.spent:
-                return Ending.BUDGET, equations.budget.spent, size
+            if equations.budget.spent:  # a later run begins the step anew
+                return Ending.BUDGET, equations.budget.spent, planned
             try:
-                step, ending = _taken(equations, anchor, size, count)
+                step, ending = _taken(equations, anchor, size)
                 found, ending = look(step, ending)
-                break
+                if not equations.budget.spent:  # else events may be missing
+                    break
             except (ChilopodError, ArithmeticError, ValueError) as error:
                 # A parameter may leave the domain of the systems, which then raise any exception.
                 shortened = True
@@ -117,7 +118,7 @@ class Parts(Generic[A, S, R]):
         return self._known[place]
 
 
-def _taken(equations: Equations[A, S, R], anchor: A, size: float, count: int) -> tuple[Step[A, S], Ending | None]:
+def _taken(equations: Equations[A, S, R], anchor: A, size: float) -> tuple[Step[A, S], Ending | None]:
     """A step of a size, or a shorter one to an edge of the box or to the start of the curve."""
     guess, ahead = predicted(anchor, size), Plane(anchor.tangent, size)
     edge, step = _edge(equations, anchor, guess), None
@@ -146,7 +147,7 @@ def _taken(equations: Equations[A, S, R], anchor: A, size: float, count: int) ->
         smooth = not of_orbit or float(np.linalg.norm(away[states])) <= tolerances.AWAY * own
         if not (smooth and float(np.linalg.norm(away)) <= tolerances.AWAY * length):
             raise AnalysisError("the curve is not smooth within the step", field="step")
-    closed = _closed(equations, step) if ending is None and count > 2 else None
+    closed = _closed(equations, step) if ending is None else None
     return (step, ending) if closed is None else (closed, Ending.CLOSED)
 
 
