@@ -29,7 +29,7 @@ def test_a_walk_in_three_dimensions(capsys, tmp_path):
         load = record.foot_load.sum(("module", "side")).mean()
         assert float(load) == pytest.approx(8.5 * 9.81, rel=0.02)
     assert main(arguments) == 0
-    assert "feet creep like viscous ones" in capsys.readouterr().out
+    assert "feet creep like viscous ones of 4100 N*s/m" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -189,6 +191,16 @@ def bearing_and_distance(position: Array, heading: Array, target: Array) -> tupl
     return (angle + np.pi) % (2.0 * np.pi) - np.pi, np.hypot(away[..., 0], away[..., 1])
 
 
+def load_xarray() -> None:
+    """Load xarray and, where it is installed, dask, a part of which xarray loads at its first dataset.
+
+    Two threads cannot make their first dataset at once, as modules of dask import each other in a circle.
+    """
+    import_module("xarray")  # takes a third of a second, and only writers of records need it
+    with suppress(ImportError):
+        import_module("dask.array")
+
+
 def walk_record(
     time: Array,
     position: Array,
@@ -214,7 +226,8 @@ def walk_record(
     leg_yaw
         Leg yaw of the legs of module 1, rad, shape (T, robots, 2).
     """
-    import xarray as xr  # takes a third of a second to load, and only writers of records need it
+    load_xarray()
+    import xarray as xr
 
     values = position, heading, velocity, heading_rate, joint_angle, joint_rate, leg_yaw
     return xr.Dataset(

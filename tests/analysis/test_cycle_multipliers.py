@@ -284,6 +284,22 @@ def test_a_free_body_on_a_tether_is_refused_and_bends_that_fall_leave_the_smalle
     assert "only smallest ones are shown" in "\n".join(found.lines())
 
 
+RESTING = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="5 5 .1"/>
+  <body pos="0 0 .05" euler="0 {0} 0"><freejoint/><geom type="box" size=".2 .1 .05" mass="1" euler="0 -{0} 0"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("pitch", [0, 2, 57])
+def test_a_box_at_rest_is_stable_whatever_the_frame_of_its_body(pitch):
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(RESTING.format(pitch)), np.zeros((50, 0)))
+    start = np.zeros(9)
+    start[[0, 2]] = 0.05, np.radians(pitch)
+    found = cycle_multipliers("box", cycle, start, ["pitch"])
+    assert found.title == "box: the periodic motion is stable"
+    assert [abs(mode.multiplier) for mode in found.exact] == pytest.approx([0.030864, 0.030326, 0.029414], abs=2e-6)
+    assert [mode.shape for mode in found.exact].count("bend") == 1
+
+
 def test_actuators_with_a_delay_are_refused():
     text = SLIDE.format(0).replace('<motor joint="p"/>', '<motor joint="p" delay="0.3" nsample="200"/>')
     with pytest.raises(ParameterError, match="state that can be put back"):

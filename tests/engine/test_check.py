@@ -138,6 +138,30 @@ def _ignores_torques(original):
     return {"command": command}
 
 
+def _turns_the_other_way(original):
+    def command(self, command):
+        original.command(self, command)
+        self.told.joint_torque = -self.told.joint_torque
+
+    return {"command": command}
+
+
+def _keeps_torques(original):
+    def command(self, command):
+        torque = self.told.joint_torque
+        original.command(self, command)
+        self.told.joint_torque = np.where(self.told.joint_torque == 0.0, torque, self.told.joint_torque)
+
+    return {"command": command}
+
+
+def _straightens_legs(original):
+    def command(self, command):
+        original.command(self, command if command.leg_yaw is not None else replace(command, leg_yaw=[[0.0, 0.0]]))
+
+    return {"command": command}
+
+
 def _never_fails(original):
     return {"status": property(lambda self: (Status.WALKED,) * len(self.robots))}
 
@@ -230,6 +254,9 @@ def _halts_for_a_moment(original):
         (_obeys_before_it_refuses, "refuses invalid commands"),
         (_ignores_its_limits, "keeps springs within"),
         (_ignores_torques, "turns joints"),
+        (_turns_the_other_way, "turns joints.*bends joint 1 by -"),
+        (_keeps_torques, "turns joints.*after a torque was set back to 0"),
+        (_straightens_legs, "turns joints.*leg_yaw after the last command"),
         (_has_no_halt, "observes in the units.*missing: halt"),
         (_is_changed_by_a_look_at_its_pose, "returns poses without a change"),
         (_goes_where_it_is_aimed, "moves targets without a change"),
@@ -252,6 +279,12 @@ def test_a_broken_promise_is_named(docs, monkeypatch, broken, promise):
     monkeypatch.setattr(check, "_PROMISES", {key: each for key, each in check._PROMISES.items() if asked in key})
     with pytest.raises(AnalysisError, match=promise):
         check_engine(docs["Sketch"](), ROBOT)
+
+
+@pytest.mark.parametrize(("count", "mass"), [(3, "8.5 kg"), (6, "60 kg")])
+def test_slow_joints_and_an_undulating_walk_break_no_promise(monkeypatch, count, mass):
+    monkeypatch.setattr(check, "_PROMISES", {"turns": check._PROMISES["turns joints and legs as commanded"]})
+    check_engine(twin, load_robot("aoi2022").set_from_text([f"body.modules={count}", f"body.mass={mass}"]))
 
 
 def test_traits_and_noise_are_held_to(docs):

@@ -121,6 +121,19 @@ def test_recorded_foot_forces_are_those_that_acted_while_legs_turn_slowly():
 
 
 @BOTH
+def test_a_command_of_torques_leaves_the_ramp_of_the_legs_as_it_is(engine, robot):
+    walks = [engine.start(robot) for _ in range(2)]
+    for walk in walks:
+        walk.command(Command(leg_yaw=[0.2, 0.2], within=0.3))
+    walks[1].command(Command(joint_torque=[0.0] * 5))
+    walks[1].command(Command(stiffness=[robot.springs.stiffness]))
+    for walk in walks:
+        walk.advance(0.2)
+    legs, others = (walk.to_dataset().leg_yaw.values for walk in walks)
+    np.testing.assert_array_equal(others, legs)
+
+
+@BOTH
 def test_a_robot_alone_and_in_a_batch_have_the_same_variables(engine, robot):
     names = []
     for robots in ([robot], [robot, robot]):

@@ -1,5 +1,7 @@
 """Leg kinematics: the two joints put the tip where the path wants it, and paths that cannot be reached are refused."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -84,6 +86,26 @@ def test_legs_that_cannot_reach_are_refused(override):
         check_reach(robot)
     assert caught.value.field == "twin.hip_height"
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "heights"),
+    [
+        (
+            ["gait.stride=15 cm"],
+            "'98 mm'.* 150 mm: .*allowed: 6.28 to 93.67 mm with these links, or a shorter gait.stride",
+        ),
+        (["twin.upper_link=400 mm"], "'98 mm'.*allowed: 346.28 to 459.75 mm with"),
+        (["gait.stride=40 cm"], "'98 mm'.* 400 mm: .*allowed: other links, or a shorter gait.stride"),
+        (["twin.lower_link=1 mm"], "allowed: other links"),
+    ],
+)
+def test_the_height_that_was_given_and_heights_from_which_legs_reach_are_named(changes, heights):
+    robot = PRESET.set_from_text(changes)
+    with pytest.raises(ParameterError, match=heights):
+        check_reach(robot)
+    for end in re.findall(r"([\d.]+) (?:to|mm with)", heights):
+        check_reach(robot.with_value("twin.hip_height", 1e-3 * float(end)))
 
 
 def test_a_robot_without_a_twin_is_named():

@@ -125,7 +125,7 @@ class WalkOptions(RobotOptions):
             if getattr(done, "straight", False):
                 lines.append(f"  nothing disturbed it, so nothing bends it, even where it is unstable: try {hint}")
             if creeps is not None:
-                lines.append(f"  standing feet creep like viscous ones of {creeps:.0f} N*s/m")
+                lines.append(f"  standing feet creep like viscous ones of {float(f'{creeps:.3g}'):g} N*s/m")
             print_result(done.as_json(), lines, self.as_json)
 
         deliver(write, printed)

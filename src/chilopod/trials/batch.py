@@ -21,6 +21,7 @@ from chilopod.engine import Walk, engine_named, event_times, steer
 from chilopod.engine.batch import with_end
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.progress import Progress, silent
+from chilopod.record import load_xarray
 from chilopod.steering import CourseReferee, Target, add_measures
 from chilopod.steering.measures import lengths
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
@@ -75,6 +76,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     threads = min(numba.get_num_threads(), len(trials) // _LANES)
     if threads < 2:
         return _walked(trials)
+    load_xarray()
     stopped = Event()
 
     def go_on(done: float, words: str) -> None:

@@ -26,29 +26,17 @@ def tip_path(robot: Robot, phase: ArrayLike) -> Array:
 
 def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
     """Inverse kinematics of the two pitch joints: hip and knee, rad, shape (..., 2), for a position of the foot's
-    centre ahead of and below the hip, m. ParameterError if the leg cannot reach it."""
+    centre ahead of and below the hip, m, which the leg can reach (:func:`check_reach`)."""
     x, z = np.broadcast_arrays(np.asarray(ahead, dtype=np.float64), np.asarray(below, dtype=np.float64))
     upper, lower = twin.upper_link, twin.lower_link
     distance = np.hypot(x, z)
-    for wrong, worst, allowed in (
-        (distance > upper + lower, distance.max(), f"at most {1e3 * (upper + lower):g} mm, both links"),
-        (distance < abs(upper - lower), distance.min(), f"at least {1e3 * abs(upper - lower):g} mm"),
-    ):
-        if wrong.any():
-            raise ParameterError(
-                "must be lower: the leg cannot reach its path",
-                field="twin.hip_height",
-                value=f"{1e3 * worst:.4g} mm",
-                allowed=allowed,
-            )
     knee = -np.arccos(np.clip((distance**2 - upper**2 - lower**2) / (2.0 * upper * lower), -1.0, 1.0))
     hip = np.arctan2(x, z) - np.arctan2(lower * np.sin(knee), upper + lower * np.cos(knee))
     return np.stack([hip, knee], axis=-1)
 
 
 def servo_targets(robot: Robot, times: ArrayLike) -> Array:
-    """Angles of hip and knee of every leg at times (s, shape (T,)), rad, shape (T, modules, 2 sides, 2 joints).
-    ParameterError if the legs cannot follow."""
+    """Angles of hip and knee of every leg at times (s, shape (T,)), rad, shape (T, modules, 2 sides, 2 joints)."""
     twin = twin_of(robot)
     tip = tip_path(robot, robot.gait.phases(times, robot.body.modules))
     return joint_angles(twin, tip[..., 0], twin.hip_height - tip[..., 1])
@@ -56,8 +44,22 @@ def servo_targets(robot: Robot, times: ArrayLike) -> Array:
 
 def check_reach(robot: Robot) -> None:
     """Check, before any simulation, that the legs reach their whole path; ParameterError otherwise."""
-    tip = tip_path(robot, np.linspace(0.0, 1.0, 721))
-    joint_angles(twin_of(robot), tip[:, 0], twin_of(robot).hip_height - tip[:, 1])
+    twin, (ahead, above) = twin_of(robot), tip_path(robot, np.linspace(0.0, 1.0, 721)).T
+    folded, stretched = abs(twin.upper_link - twin.lower_link), twin.upper_link + twin.lower_link
+    distance = np.hypot(ahead, twin.hip_height - above)
+    if folded <= distance.min() and distance.max() <= stretched:
+        return
+    # Heights of the hip over a foot that is as near as the folded leg lets it be, and as far as the stretched one does.
+    low, high = (above + np.sqrt(np.maximum(end**2 - ahead**2, 0.0)) for end in (folded, stretched))
+    least, most = np.ceil(1e5 * low.max()) / 100.0, np.floor(1e5 * high.min()) / 100.0
+    fits = least <= most and np.abs(ahead).max() <= stretched
+    heights = f"{least:g} to {most:g} mm with these links" if fits else "other links"
+    raise ParameterError(
+        f"must fit gait.stride = {1e3 * robot.gait.stride:.4g} mm: the leg cannot reach its path",
+        field="twin.hip_height",
+        value=f"{1e3 * twin.hip_height:.4g} mm",
+        allowed=f"{heights}, or a shorter gait.stride",
+    )
 
 
 def twin_of(robot: Robot) -> Twin:

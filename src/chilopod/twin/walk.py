@@ -170,9 +170,9 @@ class TwinWalk(BatchWalk):
 
     def command(self, command: Command) -> None:
         self._actuators.command(self._time, command, self._on_foot())
-        self._leg_yaw.to(
-            self._actuators.leg_yaw, self._tick, max(1, round(command.within / self._plan.twin.control_interval))
-        )
+        if command.leg_yaw is not None:
+            ticks = max(1, round(command.within / self._plan.twin.control_interval))
+            self._leg_yaw.to(self._actuators.leg_yaw, self._tick, ticks)
         self._batch.bind("qfrc_applied")[:, self._plan.yaw_rates] = self._actuators.joint_torque
         if self._record is not None:
             self._seen.append(self._look())

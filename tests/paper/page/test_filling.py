@@ -76,6 +76,15 @@ def test_page_is_there_before_anything_is_computed(tmp_path):
         assert re.findall("Still to come:</b> (.*).</p>", html) == ["the first", "the second"]
 
 
+def test_what_two_threads_cannot_load_at_once_is_loaded_before_there_are_two(monkeypatch, tmp_path):
+    report, loaded = Report([ONE], CONTEXT, tmp_path), []
+    monkeypatch.setattr("chilopod.record.import_module", lambda name: loaded.append((name, threading.current_thread())))
+    monkeypatch.setattr(report._thread, "submit", lambda *work: loaded.append("drawing"))
+    with pytest.raises(KeyboardInterrupt), report:
+        raise KeyboardInterrupt
+    assert loaded == [(name, threading.main_thread()) for name in ("xarray", "dask.array")] + ["drawing"]
+
+
 def test_the_first_lines_say_what_is_computed_and_where_the_page_is(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(registry, "load_sections", lambda: (ONE,))
     assert main(["reproduce", "--out", str(tmp_path)]) == 0

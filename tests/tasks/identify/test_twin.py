@@ -84,6 +84,12 @@ def test_a_series_of_ones_own_is_fitted_as_well(tmp_path, monkeypatch):
     [
         ('"1.7 N*mm/deg"', '"0 N*mm/deg"', "onset[1] = '0 N*mm/deg': must be positive"),
         ('onset = ["34', 'onset = ["24', "onset = '24 N*mm/deg': must lie above all springs of curves (28 N*mm/deg)"),
+        (', "1.7 N*mm/deg"]', "]", "onset = ['34 N*mm/deg']: must be two numbers"),
+        (
+            '"twin.clearance" = ["3 mm", "15 mm"]',
+            '"ground.friction" = ["9 N*s/m", "99 N*s/m"]',
+            "free[ground.friction]: must have an effect on walks of the twin; allowed: numbers of [body]",
+        ),
         ('"28 N*mm/deg", "21 N*mm/deg", ', "", "curved: must have 3 springs or more, not 2"),
         ('["0.88 m", "0.044 m"]', '["0.88 m"]', "radii[21 N*mm/deg] = ['0.88 m']: must be a number and its"),
         ('["0.88 m", "0.044 m"]', '["0.88 rad", "0.044 m"]', "radii[21 N*mm/deg][0] = '0.88 rad': is an angle"),

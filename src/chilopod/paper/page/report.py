@@ -23,6 +23,7 @@ from chilopod.paper.page.page import Drawings, Drawn, Film, Shown, State, page
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size, nothing
 from chilopod.paper.straight import schematic
+from chilopod.record import load_xarray
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
 from chilopod.show.files import panel_files
@@ -81,6 +82,7 @@ class Report:
         self._thread = ThreadPoolExecutor(1, "drawing")
 
     def __enter__(self) -> Report:
+        load_xarray()  # this thread makes datasets too
         self._begun = time.perf_counter()
         self._write(State.RUNNING)
         self._opened = self._thread.submit(self._open)

@@ -88,6 +88,13 @@ class _Measured(Quantity):
         return found
 
 
+# Without an effect on walks of the twin that nothing steers.
+_UNREAD = (
+    "ground.",
+    "twin.scanner",
+    "twin.pole",
+    *(f"springs.{each}" for each in ("softest", "stiffest", "rate", "lag")),
+)
 _Free = Annotated[FreeConstants, BeforeValidator(FreeConstants.read)]
 
 
@@ -132,10 +139,14 @@ class BaseSeries(Description):
             if (count := len(set(getattr(self, name)))) < least:
                 raise ParameterError(f"must have {least} springs or more, not {count}", field=name)
         for name, allowed in (("onset", (2,)), ("law", (0, 2))):
-            if len(getattr(self, name)) not in allowed:
-                raise ParameterError("must be two numbers", field=name, value=getattr(self, name))
+            if len(given := getattr(self, name)) not in allowed:
+                shown = [units.format(each, PAPER_UNIT if name == "onset" else "1", digits=6) for each in given]
+                raise ParameterError("must be two numbers", field=name, value=shown)
         if k1 := {K1, ALL} & {*self.free.paths}:
             raise ParameterError("must not be k1, which the walks change", field=f"free[{k1.pop()}]")
+        if unread := next((path for path in self.free.paths if path.startswith(_UNREAD)), ""):
+            problem, sections = "must have an effect on walks of the twin", "[body], [gait], [legs], [springs], [twin]"
+            raise ParameterError(problem, field=f"free[{unread}]", allowed=f"numbers of {sections}")
         softer, onset, stiffer = max(*self.curved, *self.radii), self.onset[0], min(self.straight)
         if not softer < onset < stiffer:
             shown = [units.format(each, PAPER_UNIT, digits=4) for each in (softer, onset, stiffer)]
