@@ -140,6 +140,20 @@ class TestEquilibrium:
         assert find_equilibrium(oscillator(0.0), [0.1, 0.0]).stable is None
         assert find_equilibrium(lorenz(LORENZ_HOPF), lorenz_state(24.7)).stable is None
 
+    @pytest.mark.parametrize("power", [2, 3])
+    def test_a_degenerate_one_is_found_beside_a_decay(self, power):
+        """Newton's method comes nearer by a constant factor, until the derivative is singular."""
+        found = find_equilibrium(from_rhs(lambda t, x: [x[0] ** power, -x[1]], 2, None, guess_period=1.0), [0.3, 0.2])
+        assert abs(found.state[0]) < 1e-6
+        assert (found.error == np.inf).all()
+        assert found.stable is None
+
+    @pytest.mark.parametrize("least", [1.0, 1e-9])
+    def test_where_there_is_almost_one_none_is_found(self, least):
+        system = from_rhs(lambda t, x: [(x[0] - 1.0) ** 2 + least, -x[1]], 2, None, guess_period=1.0)
+        with pytest.raises(AnalysisError, match="no equilibrium found near the guess"):
+            find_equilibrium(system, [1.1, 0.2])
+
     def test_a_singular_one_is_undecided(self):
         found = find_equilibrium(from_rhs(lambda t, x: [x[1], -x[1]], 2, None, guess_period=1.0), [0.1, 0.2])
         assert found.stable is None
@@ -354,6 +368,8 @@ class TestHopf:
         assert point.multiplicity == 4
         assert not point.criticality.known
         assert any("2 pairs" in remark for remark in found.remarks)
+        with pytest.raises(ParameterError, match="2 pairs critical at once; allowed: a state on a cycle"):
+            switch(twice, point)
 
     @pytest.mark.parametrize(
         ("family", "between", "guess", "values", "said"),

@@ -141,6 +141,12 @@ def test_spectra_and_orbits_print():
     assert str(find_orbit(system, [0.3, 0.1])).startswith("Orbit: period 6.283185307, 1 return in it")
 
 
+def test_the_searched_interval_is_drawn():
+    axes = Figure().add_subplot()
+    located().plot(axes)
+    assert axes.get_xlim() == located().searched
+
+
 @RESULTS
 def test_a_result_is_drawn(result):
     axes = Figure().add_subplot()

@@ -14,6 +14,7 @@ from chilopod.stability import (
     SystemLike,
     exponents,
     find_orbit,
+    from_map,
     from_rhs,
     locate,
     multipliers,
@@ -220,6 +221,19 @@ def test_a_defective_matrix_has_a_useless_but_honest_bound():
     assert np.abs(found.values - 1).max() <= found.error_bound
     assert found.error_bound > 1e-8
     assert not found.stable
+
+
+def test_a_double_multiplier_whose_left_vector_is_infinite_warns_of_nothing():
+    system = from_map(
+        lambda x: ([-3.0 * x[0] - 4.0 / 9.0 * x[1], 9.0 * x[0] + x[1]], [[-3.0, -4.0 / 9.0], [9.0, 1.0]]), 2
+    )
+    found = multipliers(system, [0.0, 0.0])
+    assert np.abs(found.values + 1.0).max() <= found.error_bound
+
+
+def test_the_derivative_of_a_map_may_overflow():
+    system = from_map(lambda x: ([1e200 * x[0]], [[1e200]]), 1)
+    assert system.flow(np.zeros(1), 0.0, 2.0)[1] == np.inf
 
 
 @pytest.mark.parametrize("guess", ["text", [1.0, 2.0], [[0.0]], 0.0, [np.nan], None])

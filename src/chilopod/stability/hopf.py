@@ -48,8 +48,8 @@ _WORDS = (
     ("a multiplier is +1", "an eigenvalue is 0"),
     ("a multiplier", "an eigenvalue"),
     ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
-    ("clear of the circle", "clear of the imaginary axis"),
-    ("are on the circle", "are on the imaginary axis"),
+    ("the unit circle", "the imaginary axis"),
+    ("the circle", "the imaginary axis"),
     ("outside", "to the right of it"),
     ("multiplier", "eigenvalue"),
     ("an orbit", "an equilibrium"),
@@ -133,6 +133,8 @@ def _piece(
 
     def described(crossing: Crossing, _: Block | None) -> list[Found]:
         if crossing.event is CircleEvent.PLUS:
+            if _clear_of_zero(family, between, crossing.value, samples):
+                raise AnalysisError("the search resolves no eigenvalue there, and none of f is zero", field="family")
             return [f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one"]
         if crossing.collision:
             return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]
@@ -150,6 +152,18 @@ def _piece(
         return f"the equilibrium ends in a fold at {where}: it meets another one there"
 
     return located(samples, crossings, described, ended, _POINTS), samples.path[-1]
+
+
+def _clear_of_zero(family: Family, between: tuple[float, float], value: float, samples: Samples) -> bool:
+    """True if eigenvalues of f stay away from zero by more than their errors, at a value and beside it."""
+    (sample,) = samples.at(np.array([value]))
+    try:
+        beside = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 0.0, 1.0]), *between)
+        found = [equilibrium_at(family, each, sample.orbit)[1] for each in beside.tolist()]
+    except AnalysisError:  # the equilibrium ends there
+        return False
+    clear = [float((np.abs(each.eigenvalues) - each.error_bounds).min()) for each in found]
+    return clear[1] > 0.5 * max(clear)  # one that passes zero there is much smaller
 
 
 def _of_map(

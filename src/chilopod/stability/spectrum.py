@@ -113,8 +113,9 @@ def spectrum(image: ReturnMap) -> Spectrum:
     scaled = jacobian * units / units[:, None]
     values, right, left = eigensystem(scaled)
     # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
-    error = 4.0 * EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
-    right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
+    with np.errstate(invalid="ignore"):  # left ones of a defective multiplier are infinite, and so is its error
+        error = 4.0 * EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
+        right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
     # Squares of tiny entries vanish; a power of 2 as a unit is exact.
     size = np.exp2(np.floor(np.log2(np.abs(right).max(axis=0))))
     norms = size * np.linalg.norm(right / size, axis=0)

@@ -324,7 +324,8 @@ def from_map(
             start, (x, factor) = x, applied(x)
             if is_new(image):
                 compare(image, lambda x: applied(x)[0], start, x, factor, "image")
-            derivative, reach = factor @ derivative, np.abs(factor) @ reach
+            with np.errstate(all="ignore"):  # derivatives that are not finite are refused later
+                derivative, reach = factor @ derivative, np.abs(factor) @ reach
         return x, derivative, reach
 
     def flow_with_error(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:

@@ -118,7 +118,8 @@ class Critical:
         at, orbit_error = self.at, 0.0
         if isinstance(at, Spot):  # whose errors are known
             state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
-            orbit_error = float(np.abs(self.left) @ state)
+            moved = state > 0.0  # the left mode of a double multiplier is infinite
+            orbit_error = float(np.abs(self.left[moved]) @ state[moved])
         return normal_form(self._returned, self.orbit, scale=at.frame.size, orbit_error=orbit_error)
 
     def fifth(self, *beside: Critical) -> Quintic | None:

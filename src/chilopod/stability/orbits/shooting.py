@@ -208,7 +208,8 @@ class _Equations:
         if free is not None:
             moved = (np.append(x, nodes.value) - free.start) / np.append(sizes, free.scale)
             self._missing = float(free.row @ moved - free.target)
-        self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
+        with np.errstate(all="ignore"):  # a motion that is not finite is refused below
+            self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
         self.frame = frame._replace(sizes=sizes, reach=np.minimum(sizes, frame.reach))
         if not math.isfinite(self.residual):
             lost = np.flatnonzero(~np.isfinite(self._ends).all(axis=1))

@@ -112,14 +112,17 @@ class Located(Result, Sequence[BifurcationPoint]):
         ]
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the kinds of bifurcations over the parameter, on axes of matplotlib or on new ones."""
+        """Draw the kinds of bifurcations over the searched interval, on axes of matplotlib or on new ones."""
         axes = axes_for(axes)
         for point in self.points:
-            axes.plot([point.value], [point.kind.label], "o", color="C0")
+            axes.plot([point.value], [point.kind.label], "o", color="C0", clip_on=False)
             text = f"{point.value:.6g}\n{point.row[2]}".strip()
             at = point.value, point.kind.label
             axes.annotate(text, at, (0, 6), ha="center", textcoords="offset points")
-        axes.margins(x=0.2, y=0.5)
+        axes.margins(y=0.5)
+        ends = [*self.searched, *(point.value for point in self)]  # a fold lies just past the searched part
+        if min(ends) < max(ends):
+            axes.set_xlim(min(ends), max(ends))
         axes.set(xlabel="parameter")
         return axes
 
