@@ -33,6 +33,7 @@ ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "
 NOTICED = 1.0
 """Seconds of compilation after which a message appears."""
 
+_APART = 5.0  # s without compilation after which another message appears
 _FOLDER = "chilopod-"
 FOLDERS = 3
 """Number of versions whose code is kept, for switching between them."""
@@ -141,10 +142,14 @@ class _Compiling(event.Listener):  # type: ignore[misc]
     """Time that numba has spent compiling in this process; called functions count with their callers."""
 
     def __init__(self) -> None:
-        self._before, self._begun, self._depth, self._said = 0.0, 0.0, 0, parent_process() is not None
+        self._before, self._begun, self._ended, self._depth = 0.0, 0.0, 0.0, 0
+        self._waited, self._said = 0.0, False  # compile time before this wait, and True if this one was announced
 
     def on_start(self, event: Any) -> None:
-        if not self._said and self.seconds() > NOTICED and event.data["dispatcher"].__module__.startswith("chilopod"):
+        if not self._depth and time.monotonic() - self._ended > _APART:  # another kind of system, for example
+            self._waited, self._said = self.seconds(), parent_process() is not None
+        own = event.data["dispatcher"].__module__.startswith("chilopod")
+        if own and not self._said and self.seconds() - self._waited > NOTICED:
             self._said = True
             logging.getLogger("chilopod").warning("chilopod: compiling, once on this machine")
         self._begun = self._begun if self._depth else time.monotonic()
@@ -152,7 +157,9 @@ class _Compiling(event.Listener):  # type: ignore[misc]
 
     def on_end(self, event: Any) -> None:
         self._depth -= 1
-        self._before += 0.0 if self._depth else time.monotonic() - self._begun
+        if not self._depth:
+            self._ended = time.monotonic()
+            self._before += self._ended - self._begun
 
     def seconds(self) -> float:
         """Compile time so far, s; functions read from the cache count 0."""
