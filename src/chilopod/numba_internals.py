@@ -33,7 +33,7 @@ ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "
 NOTICED = 1.0
 """Seconds of compilation after which a message appears."""
 
-_APART = 5.0  # s without compilation after which another message appears
+_APART, _AGAIN = 5.0, 15.0  # s without compilation, and with it, after which another message appears
 _FOLDER = "chilopod-"
 FOLDERS = 3
 """Number of versions whose code is kept, for switching between them."""
@@ -143,14 +143,14 @@ class _Compiling(event.Listener):  # type: ignore[misc]
 
     def __init__(self) -> None:
         self._before, self._begun, self._ended, self._depth = 0.0, 0.0, 0.0, 0
-        self._waited, self._said = 0.0, False  # compile time before this wait, and True if this one was announced
+        self._due = NOTICED  # compile time after which the next message appears
 
     def on_start(self, event: Any) -> None:
         if not self._depth and time.monotonic() - self._ended > _APART:  # another kind of system, for example
-            self._waited, self._said = self.seconds(), parent_process() is not None
-        own = event.data["dispatcher"].__module__.startswith("chilopod")
-        if own and not self._said and self.seconds() - self._waited > NOTICED:
-            self._said = True
+            self._due = self.seconds() + NOTICED
+        own = event.data["dispatcher"].__module__.startswith("chilopod") and parent_process() is None
+        if own and self.seconds() > self._due:
+            self._due = self.seconds() + _AGAIN
             logging.getLogger("chilopod").warning("chilopod: compiling, once on this machine")
         self._begun = self._begun if self._depth else time.monotonic()
         self._depth += 1
