@@ -45,7 +45,7 @@ def test_a_terminal_gets_bars(capsys, hasty, monkeypatch):
     assert "all of it" in capsys.readouterr().err
 
 
-def test_compiling_is_said_once_without_a_command_line(caplog, monkeypatch):
+def test_every_wait_for_the_compiler_is_said_without_a_command_line(caplog, monkeypatch):
     monkeypatch.setattr(logging.getLogger("chilopod"), "disabled", False)
     listener = numba_internals._Compiling()
     monkeypatch.setattr(numba_internals, "NOTICED", 0.0)
@@ -54,7 +54,17 @@ def test_compiling_is_said_once_without_a_command_line(caplog, monkeypatch):
     for each in (own, other, own, own):  # so far nothing has been compiled when the first begins
         listener.on_start(each)
         listener.on_end(each)
-    assert [each.message for each in caplog.records] == ["chilopod: compiling, once on this machine"]
+    said = "chilopod: compiling, once on this machine"
+    assert [each.message for each in caplog.records] == [said]
+    monkeypatch.setattr(numba_internals, "_APART", 0.0)
+    for each in (own, own):  # another kind of system, which calls a function
+        listener.on_start(each)
+    assert [each.message for each in caplog.records] == [said, said]
+    monkeypatch.setattr(numba_internals, "_AGAIN", 0.0)
+    for _ in range(2):  # it goes on
+        listener._due -= 15.0
+        listener.on_start(own)
+    assert [each.message for each in caplog.records] == [said] * 4
 
 
 def test_compiling_is_said_once(capsys, hasty, monkeypatch):

@@ -33,6 +33,7 @@ ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "
 NOTICED = 1.0
 """Seconds of compilation after which a message appears."""
 
+_APART, _AGAIN = 5.0, 15.0  # s without compilation, and with it, after which another message appears
 _FOLDER = "chilopod-"
 FOLDERS = 3
 """Number of versions whose code is kept, for switching between them."""
@@ -141,18 +142,24 @@ class _Compiling(event.Listener):  # type: ignore[misc]
     """Time that numba has spent compiling in this process; called functions count with their callers."""
 
     def __init__(self) -> None:
-        self._before, self._begun, self._depth, self._said = 0.0, 0.0, 0, parent_process() is not None
+        self._before, self._begun, self._ended, self._depth = 0.0, 0.0, 0.0, 0
+        self._due = NOTICED  # compile time after which the next message appears
 
     def on_start(self, event: Any) -> None:
-        if not self._said and self.seconds() > NOTICED and event.data["dispatcher"].__module__.startswith("chilopod"):
-            self._said = True
+        if not self._depth and time.monotonic() - self._ended > _APART:  # another kind of system, for example
+            self._due = self.seconds() + NOTICED
+        own = event.data["dispatcher"].__module__.startswith("chilopod") and parent_process() is None
+        if own and self.seconds() > self._due:
+            self._due = self.seconds() + _AGAIN
             logging.getLogger("chilopod").warning("chilopod: compiling, once on this machine")
         self._begun = self._begun if self._depth else time.monotonic()
         self._depth += 1
 
     def on_end(self, event: Any) -> None:
         self._depth -= 1
-        self._before += 0.0 if self._depth else time.monotonic() - self._begun
+        if not self._depth:
+            self._ended = time.monotonic()
+            self._before += self._ended - self._begun
 
     def seconds(self) -> float:
         """Compile time so far, s; functions read from the cache count 0."""

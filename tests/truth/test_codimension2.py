@@ -409,6 +409,28 @@ def test_folds_of_cycles_of_an_autonomous_system():
     check_next(cusp, -2.0 * np.pi)
 
 
+@pytest.mark.parametrize("middle", [(0.0, 0.0), (3.0, -1.0)])
+def test_folds_of_cycles_end_in_a_bautin_point(middle):
+    """r' = r (p + q r^2 - r^4) has folds at p = -q^2 / 4 for q > 0 only, where r^2 = q / 2."""
+
+    def family2(p, q):
+        def rhs(t, x):
+            u, v = x[0] - middle[0], x[1] - middle[1]
+            s = u * u + v * v
+            grown = p + q * s - s * s
+            return [grown * u - v, grown * v + u]
+
+        return from_rhs(rhs, 2, None, guess_period=2.0 * np.pi)
+
+    orbit = np.add(middle, [np.sqrt(0.4), 0.0])
+    start = BifurcationPoint(Kind.FOLD, -0.16, 0.0, orbit, np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0)
+    curve = follow2(family2, start, ((-0.5, 0.5), (-0.7, 1.2)), second=0.8, rising=False, coefficients=False)
+    assert curve.endings[1] is Ending.LOST
+    assert "a Bautin point" in curve.reasons[1]
+    assert 0.0 < curve.values[-1][1] < 1e-3
+    check_curve(curve, lambda values: values[0] + 0.25 * values[1] ** 2)
+
+
 @numba.njit
 def polar(t, x):
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])

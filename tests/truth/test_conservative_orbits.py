@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from chilopod.stability import exponents, from_rhs, locate, multipliers
+from chilopod.stability import begin, exponents, follow, from_rhs, locate, multipliers
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
 
@@ -72,6 +72,25 @@ def test_henon_heiles_on_its_axis(height, units):
     assert found.values.sum().real == pytest.approx(1.0 + trace, abs=1e-7)
     assert np.abs(found.values - 1.0).min() <= found.error_bound < 1e-6
     assert not found.stable
+
+
+def test_a_family_of_very_unstable_orbits_without_sizes_of_its_states():
+    """x'' + x + x^3 = 0 beside the saddle y'' = 1.96 y - y^2, whose return is linear within a hundredth only: its
+    parameter, which is rounding, shows no orbit again."""
+
+    def family(value):
+        def rhs(t, x):
+            a, b = x[0] + x[0] ** 3, x[2] * x[2] - 1.96 * x[2]
+            return [x[1] + value * a, value * x[1] - a, x[3] + value * b, value * x[3] - b]
+
+        return from_rhs(rhs, 4, None, guess_period=6.0)
+
+    branch = follow(family, begin(family, 0.0, [0.5, 0.0, 0.0, 0.0]), (-0.1, 0.1), points=24)
+    amplitudes, periods = np.array([(abs(point.orbit[0]), point.period) for point in branch.points]).T
+    assert len(periods) == 25
+    assert amplitudes[-1] > 2.0
+    exact = 4.0 * ellipk(amplitudes**2 / (2.0 + 2.0 * amplitudes**2)) / np.sqrt(1.0 + amplitudes**2)
+    np.testing.assert_allclose(periods, exact, rtol=1e-10)
 
 
 def test_searches_end():

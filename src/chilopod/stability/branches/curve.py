@@ -30,9 +30,9 @@ from chilopod.stability.branches.branch_points import (
 )
 from chilopod.stability.continuation.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.continuation.tolerances import RETRY, SETTLED, SHARPEST_TURN, SHORTEST
-from chilopod.stability.equilibria import has_centre
+from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk, path
 from chilopod.stability.floquet import full_period
-from chilopod.stability.interface import checked_flow, is_autonomous, offers
+from chilopod.stability.interface import is_autonomous, offers
 from chilopod.stability.orbits.orbit import rounds_in
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
 from chilopod.stability.returns import (
@@ -52,10 +52,7 @@ _BESIDE = 1e-10  # change of the parameter, relative to its scale, that shows it
 _SMALLEST = 1e-3  # size, in units, below which the precision of an orbit no longer rises
 _FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, and above which one fails
 _SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, relative to it
-_SHRUNK = 10.0  # motion, relative to the largest so far, that counts as shrunk, in cube roots of the precision
 _NOT_SMALL = 0.5  # modulus of a multiplier that is not small
-_PARTS = 64  # parts of a period at which states on an orbit are sampled
-_SHRINKS = "the orbit shrinks into an equilibrium: a Hopf point"
 _LONGER = 1.4  # duration of a return, relative to the predicted one, above which it may be several rounds
 _SAME_PERIOD = 1e-3  # relative difference of the periods of the same orbit
 
@@ -319,22 +316,13 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         precision leaves that uncertain by an f-th part."""
         motion = float(np.linalg.norm(velocity / self.state_units)) * found.image.period
         self._motion = max(self._motion, motion)
-        if float(section.normal @ velocity) > 0.0 and motion >= _SHRUNK * np.cbrt(self.precision) * self._motion:
+        if float(section.normal @ velocity) > 0.0 and motion >= SHRUNK * np.cbrt(self.precision) * self._motion:
             return
-        # A small cycle is smaller than its velocity in any state times its period.
-        path = self._path(found.x, found.value, found.image.duration)
-        extent = float(np.linalg.norm((path - found.x) / self.state_units, axis=1).max())
         said = "the motion nearly stops in the section, and the next step has no direction"
-        shrinks = extent <= motion and has_centre(self.system(found.value), found.x, found.image.period)
-        raise AnalysisError(_SHRINKS if shrinks else said, field="orbit")
-
-    def _path(self, x: Array, value: float, duration: float) -> Array:
-        """States on an orbit, at even times over some duration, shape (times, n)."""
-        system, states = self.system(value), [x]
         self.budget.take()
-        for _ in range(_PARTS):
-            states.append(checked_flow(system, states[-1], 0.0, duration / _PARTS)[0])
-        return np.array(states)
+        if has_shrunk(self.system(found.value), found.x, self.state_units, motion, found.image):
+            said = f"{SHRINKS}: a Hopf point"
+        raise AnalysisError(said, field="orbit")
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
         """Displacement of the first point, its tangent, and the coordinates that identify it at any time 0."""
@@ -349,13 +337,14 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             return True
         if first.period is None or abs(point.period - first.period) > _SAME_PERIOD * first.period:
             return False
-        path = (self._path(point.orbit, point.value, point.period) - first.orbit) / self.state_units
-        chords = np.diff(path, axis=0)
+        self.budget.take()
+        away = (path(self.system(point.value), point.orbit, point.period) - first.orbit) / self.state_units
+        chords = np.diff(away, axis=0)
         lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
-        share = np.clip(-(path[:-1] * chords).sum(axis=1) / lengths, 0.0, 1.0)
-        distance = np.linalg.norm(path[:-1] + share[:, None] * chords, axis=1)
+        share = np.clip(-(away[:-1] * chords).sum(axis=1) / lengths, 0.0, 1.0)
+        distance = np.linalg.norm(away[:-1] + share[:, None] * chords, axis=1)
         # A chord lies inside the curve by an eighth of its squared length times the curvature.
-        return bool(distance.min() <= np.abs(np.diff(path, n=2, axis=0)).max())
+        return bool(distance.min() <= np.abs(np.diff(away, n=2, axis=0)).max())
 
     def multipliers(self, image: ReturnMap, wrong: float = 0.0) -> tuple[ComplexArray, float]:
         """Multipliers of the full period, by falling modulus, and a bound on the errors of those that are not small,

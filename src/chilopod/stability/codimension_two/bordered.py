@@ -29,9 +29,10 @@ from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step, inverted
 from chilopod.stability.continuation.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
+from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk
 from chilopod.stability.interface import SystemLike, offers, returns_per_period, sizes, system_of
 from chilopod.stability.orbits.orbit import closings, from_known, known_state
-from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
+from chilopod.stability.returns import ReturnMap, Section, return_map, section_at, velocity_at
 from chilopod.stability.symmetry.groups import symmetric_states
 
 Family2 = Callable[[float, float], SystemLike]
@@ -135,6 +136,8 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     unknowns. Widths of the box are the parameters' units."""
 
     first: Spot  # first point of the curve
+    shrinks = SHRINKS  # reason for its end where its cycles do
+    _motion = 0.0  # largest motion within a period so far
     precision = ROUND_OFF
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
@@ -216,6 +219,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     def arrived(self, step: Step[Spot, Evaluated]) -> Step[Spot, Evaluated]:
         """A step with the point at its end, in a frame adapted to it."""
         start, frame = step.start, step.start.frame
+        self._check_moving(step.found)
         end = self.spot(step.found.place, frame, start.tangent)
         ahead = frame.carried(end.tangent, end.frame)
         ahead /= np.linalg.norm(ahead)
@@ -224,6 +228,22 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         back, tangent = end.frame.between(end.place, start.place), end.frame.carried(start.tangent, frame)
         before = Before(self._onto(end, back), self._onto(end, tangent), None)
         return replace(step, tangent=ahead, end=replace(end, before=before))
+
+    def _check_moving(self, found: Evaluated) -> None:
+        """Check that a cycle has not shrunk into an equilibrium. The fold of small cycles r (m + b r^2 - r^4) = 0 is at
+        b = 2 r^2, and an error of these equations, which is divided by r^3, leaves that uncertain by an r^5-th part."""
+        section, x, size = found.frame.section, found.place.state, found.frame.size
+        if section is None:
+            return
+        system = self.system(found.place.values)
+        velocity = velocity_at(system, x)
+        motion = float(np.linalg.norm(velocity / size)) * found.image.period
+        self._motion = max(self._motion, motion)
+        if float(section.normal @ velocity) > 0.0 and motion >= SHRUNK * self.precision**0.2 * self._motion:
+            return
+        self.budget.take()
+        if has_shrunk(system, x, size, motion, found.image):
+            raise AnalysisError(self.shrinks, field="orbit")
 
     def _onto(self, spot: Spot, direction: Array) -> Array:
         """A direction with its state projected along the motion onto the section of a spot, if it has one."""

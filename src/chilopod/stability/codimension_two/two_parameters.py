@@ -26,6 +26,7 @@ from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Po
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
+from chilopod.stability.equilibria import SHRINKS
 from chilopod.stability.interface import offers, sizes, system_of, with_shared_symmetries
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import event_beside, return_duration, whole_period
@@ -102,6 +103,8 @@ def follow2(
         raise ParameterError("must hold the start", field="between", value=between, allowed=f"around {values}")
     target, known = _target(family2, start, second)
     curve = CriticalCurve(family2, target, known, box, Budget(budget, seconds))
+    if start.kind is Kind.FOLD:
+        curve.shrinks = f"{SHRINKS}: a Bautin point (generalised Hopf)"
     nu = complex(start.multiplier)
     with curve.budget:
         first = curve.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)), start.period)

@@ -201,7 +201,8 @@ def _closed(equations: Equations[A, S, R], step: Step[A, S]) -> Step[A, S] | Non
     length = float(np.linalg.norm(row))
     row /= max(length, np.finfo(float).tiny)
     target = float(row @ first)
-    if not 0.0 < target <= length:
+    # Along a family by energy the parameter is rounding, and shows nothing.
+    if length <= tolerances.SAME * step.size or not 0.0 < target <= length:
         return None
     place = float(brentq(lambda place: row @ step.between(place).moved - target, 0.0, step.size, xtol=1e-15))
     guess = step.between(place)

@@ -313,7 +313,8 @@ class _Equations:
         if frame.astray:
             motion = self._linear[0, :, -3] * here.duration / frame.sizes
             farthest = _CAREFUL * min(1.0, float(np.linalg.norm(motion)))
-        part = min(part, farthest / max(float(np.abs(correction.states / frame.reach).max()), 1e-300))
+        if self._problem.free is None:
+            part = min(part, farthest / max(float(np.abs(correction.states / frame.reach).max()), 1e-300))
         states, time, value = correction
         there = Nodes(here.states + part * states, here.duration + part * time, here.value + part * value)
         # The states may just be growing.

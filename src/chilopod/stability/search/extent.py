@@ -15,7 +15,7 @@ from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.branches.branch import find_fold
 from chilopod.stability.crossing_place import Sample
-from chilopod.stability.equilibria import has_centre
+from chilopod.stability.equilibria import SHRINKS, has_centre
 from chilopod.stability.interface import checked_flow, returns_per_period
 from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.search.samples import NEAR_FOLD, Samples
@@ -70,7 +70,7 @@ def extent(samples: Samples) -> Extent:
     fold = _fold_beside(samples, last, path[-2::-1], rising=True)
     here = (last.value, last.orbit, last.image.period) if fold is None else (fold.value, fold.orbit, fold.period)
     if last.value != high and _at_rest(samples, *here):
-        ending = f"the orbit shrinks into an equilibrium near {here[0]:.9g}: a Hopf point"
+        ending = f"{SHRINKS} near {here[0]:.9g}: a Hopf point"
         return Extent(start, last.value, folds, ending, shrinks=True, beside=beside)
     if fold is None:
         ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
