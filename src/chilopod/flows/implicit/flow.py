@@ -106,7 +106,9 @@ class ImplicitFlow(ReadOnlyArrays):
         derivative, report = np.eye(size), np.zeros(3)
         method = _method(stages)
         result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), report)
-        budget = max(_FEWEST_STEPS, int(_MOST_WORK / max(n * stages, _SMALL) ** 3))
+        # Rounding may make steps of the finer computation short.
+        smallest = _SMALL if tolerance >= self.tolerance else 1
+        budget = max(_FEWEST_STEPS, int(_MOST_WORK / max(n * stages, smallest) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
             branches = _branches(self.tape, params, np.array([0.5 * (a + b)]))[:, 0].copy()
             limit = min(longest, longest_step(self.fast, float(self.edges[-1]), a, b))
