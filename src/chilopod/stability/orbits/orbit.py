@@ -48,6 +48,7 @@ _ROUNDS = 8  # number of rounds of an orbit in a return up to which it is tried 
 _CLOSES = 1e-8  # residual, relative to motion and sizes of the states, of an early return that is then corrected
 _COARSE = 1e-11  # error, relative to the sizes of the states, from which a second computation estimates it too
 _CHANCE = 1e-13  # difference, relative to the sizes of the states, of two computations that may agree by chance
+_BETWEEN = np.array([0.25, 0.251])  # times within a return
 _SYMMETRIC = 1e-12  # residual, relative to the sizes of the states, of a symmetry of the orbit
 _ALIKE = 1e-6  # distance of a return, relative to the sizes and its growth, from the symmetric one
 
@@ -355,7 +356,8 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
             twice = REPEATED * np.abs(returns.in_parts(system, x, image.duration) - image.state) + _CHANCE * size
             flow = flow + twice if stiff else np.minimum(flow, twice)
         wrong = np.abs(image.state - x) + flow
-        if not offers(system, "velocity"):  # terms of a map may cancel
+        # Terms of a map, which does not move between whole times, may cancel.
+        if not offers(system, "velocity") and (returns.carried(system, x[None], *_BETWEEN * duration)[0] == x).all():
             wrong += returns.scatter(system, image, x, size, section)
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
