@@ -78,7 +78,7 @@ def course(
     spring = None if k1 is None else options.spring(chosen.springs, k1)
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
-    goals = course_named(targets, 1.0 if seconds is None else seconds)
+    goals = course_named(targets, 1.0 if seconds is None else seconds)  # the engine's own patience takes long to load
 
     def results(progress: Callable[[str], Progress]) -> Driven:
         how = options.steering  # before what takes seconds to import

@@ -16,19 +16,10 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import UserCode, finite_array, numbers
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.interface import (
-    Autonomous,
-    Family,
-    SystemLike,
-    check_system,
-    checked_flow,
-    is_autonomous,
-    offers,
-    system_of,
-)
+from chilopod.stability.interface import Autonomous, Family, SystemLike, check_system, is_autonomous, offers, system_of
 from chilopod.stability.normal_forms.manifold import RADII, series
 from chilopod.stability.orbits.orbit import Orbit, near_orbit
-from chilopod.stability.orbits.shooting import Nodes
+from chilopod.stability.orbits.shooting import Nodes, nodes_along
 from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.returns import ReturnMap, section_at
 from chilopod.stability.spectrum import EPSILON, SAFETY, disturbed, eigenvalue_errors, phased
@@ -51,7 +42,7 @@ _ANGLES = 8  # angles on a circle, which separate harmonics up to the third
 _SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # spans of samples of f for differences, relative to the sizes of the states
 _FIRST = 1e-4, 1e-6  # cubic terms of the first cycle, relative to the frequency: amplitudes of 1/100 and 1/1000
 _TURNS = 0.1  # largest difference of turns within the period of a small cycle from one
-_PARTS = 64  # parts of a period at which states on an orbit are sampled
+_PARTS = 64  # parts of a return at which a small cycle is sampled
 _MISSED = 0.3  # largest error of the predicted first cycle, relative to its amplitude
 
 
@@ -121,19 +112,11 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     return Equilibrium(x, error, matrix, values, eigenvalue_errors(values, matrix, np.zeros_like(matrix) + off))
 
 
-def path(system: SystemLike, x: Array, duration: float) -> Array:
-    """States on an orbit, at even times over some duration, shape (times, n)."""
-    states = [x]
-    for _ in range(_PARTS):
-        states.append(checked_flow(system, states[-1], 0.0, duration / _PARTS)[0])
-    return np.array(states)
-
-
 def has_shrunk(system: SystemLike, x: Array, units: Array, motion: float, image: ReturnMap) -> bool:
     """True if a cycle with a ``motion``, the velocity in units of the states times the period, has shrunk into an
     equilibrium, which then oscillates with its period."""
     # A small cycle is smaller than its velocity in any state times its period.
-    away = (path(system, x, image.duration) - x) / units
+    away = (nodes_along(system, x, image.duration, _PARTS).states - x) / units
     return float(np.linalg.norm(away, axis=1).max()) <= motion and has_centre(system, x, image.period)
 
 

@@ -30,7 +30,7 @@ from chilopod.stability.branches.branch_points import (
 )
 from chilopod.stability.continuation.equations import Before, Corrected, Equations, Guess, OutsideBoxError, Plane, Step
 from chilopod.stability.continuation.tolerances import RETRY, SETTLED, SHARPEST_TURN, SHORTEST
-from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk, path
+from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk
 from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import is_autonomous, offers
 from chilopod.stability.orbits.orbit import rounds_in
@@ -54,6 +54,7 @@ _FEWEST_NODES, _MANY_NODES = 3, 6  # numbers of nodes below which one suffices, 
 _SOONER, _LATER = 0.2, 0.5  # largest predicted change of the time of a return, relative to it
 _NOT_SMALL = 0.5  # modulus of a multiplier that is not small
 _LONGER = 1.4  # duration of a return, relative to the predicted one, above which it may be several rounds
+_PARTS = 64  # parts of a period at which states on an orbit are sampled
 _SAME_PERIOD = 1e-3  # relative difference of the periods of the same orbit
 
 
@@ -338,7 +339,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         if first.period is None or abs(point.period - first.period) > _SAME_PERIOD * first.period:
             return False
         self.budget.take()
-        away = (path(self.system(point.value), point.orbit, point.period) - first.orbit) / self.state_units
+        states = nodes_along(self.system(point.value), point.orbit, point.period, _PARTS).states
+        away = (np.vstack([states, point.orbit]) - first.orbit) / self.state_units
         chords = np.diff(away, axis=0)
         lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
         share = np.clip(-(away[:-1] * chords).sum(axis=1) / lengths, 0.0, 1.0)
