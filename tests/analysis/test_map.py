@@ -96,6 +96,16 @@ def test_every_value_is_on_its_side_of_the_curves_but_by_a_cell(found):
     assert not (differ & ~near[:-1, :-1]).any()
 
 
+def test_places_that_no_curve_reaches_are_counted(monkeypatch):
+    monkeypatch.setattr(map_curves, "_MOST", 0)
+    found = mapped(ROBOT, X, Y, points=5)
+    (remark,) = found.remarks
+    assert remark.startswith("0 curves are followed; ")
+    left = int(remark.split()[4])
+    assert left > 0
+    assert remark.endswith(" more places where a mode turns are left")
+
+
 def test_it_is_shown_and_stored(found):
     assert str(found).count("\n") < 10
     assert "pitchfork-Neimark-Sacker" in str(found)

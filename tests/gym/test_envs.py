@@ -387,8 +387,16 @@ def test_a_batch_has_a_number_of_robots(count):
 
 def test_single_robots_of_a_vector_are_not_reset():
     robots = chilopod.gym.RobotVectorEnv(num_envs=2)
-    with pytest.raises(ParameterError, match=r"reset_mask.*must be left out"):
+    with pytest.raises(ParameterError, match=r"reset_mask.*must be left out.*each robot begins again"):
         robots.reset(options={"reset_mask": np.array([True, False])})
+
+
+@pytest.mark.parametrize("env", [RobotEnv, chilopod.gym.RobotVectorEnv])
+def test_options_of_a_reset_are_refused(env):
+    robot = env()
+    robot.reset(options={})
+    with pytest.raises(ParameterError, match=r"options = \['task', 'speed'\]: must be left out; allowed: none"):
+        robot.reset(options={"task": "hold", "speed": 0.2})
 
 
 def test_episodes_that_no_memory_holds_are_refused(monkeypatch):

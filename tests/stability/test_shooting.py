@@ -165,3 +165,11 @@ def test_states_moved_by_rounding_alone_give_no_size():
     found = multipliers(from_rhs(toda, 4, None, guess_period=6.26), [0.0, 0.1, 0.0, 0.0])
     assert found.period == pytest.approx(6.263459706114258, abs=1e-10)
     np.testing.assert_allclose(found.values, 1.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("scale", [None, [1.0, 1.0]])
+def test_the_bound_of_an_orbit_that_hardly_any_force_holds(scale):
+    """x'' = -x'/5 - x^31 + 0.3 cos t, whose force is below rounding: the mean of the orbit is zero by its symmetry."""
+    forced = from_rhs(lambda t, x: [x[1], -x[1] / 5 - x[0] ** 31 + 0.3 * np.cos(t)], 2, 2 * np.pi, scale=scale)
+    orbit = find_orbit(forced, [-0.268, 0.058])
+    assert (np.abs(orbit.state - np.array([-1.0, 0.2]) * 0.3 / 1.04) <= orbit.error).all()

@@ -118,6 +118,8 @@ class Search:
             for point in self._located(edge):
                 self._follow(point, edge)
             left = self._uncovered(left)
+        if left:
+            self.remarks.append(f"{_MOST} curves are followed; {len(left)} more places where a mode turns are left")
 
     def cells(self) -> NDArray[np.bool_]:
         """Cells of the finest grid through which the curves pass, shape (rows - 1, columns - 1)."""

@@ -89,9 +89,7 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     ) -> tuple[Row, dict[str, Any]]:
         """Begin an episode with every robot. Robot i has ``seed`` + i, or its own seed of a list; None continues the
         generators."""
-        if options and "reset_mask" in options:
-            said = "must be left out: each robot begins again where its episode ends"
-            raise ParameterError(said, field="options", value="reset_mask")
+        _no_options(options, "; each robot begins again where its episode ends")
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:
@@ -139,6 +137,7 @@ class RobotEnv(gymnasium.Env[Row, Row]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Row, dict[str, Any]]:
         """Begin an episode; with a seed, that of trials with the same seed."""
+        _no_options(options)
         (seed,) = _seeds(seed, 1)
         super().reset(seed=seed)
         step, self._over = self.episodes.begin([self.np_random], [seed]), False
@@ -188,6 +187,11 @@ def _seeds(seed: Any, count: int) -> list[int | None]:
     if len(seed) != count:
         raise ParameterError(f"has the wrong length {len(seed)}", field="seed", allowed=str(count))
     return [None if each is None else _whole(each) for each in seed]
+
+
+def _no_options(options: dict[str, Any] | None, more: str = "") -> None:
+    if options:
+        raise ParameterError("must be left out", field="options", value=list(options), allowed=f"none{more}")
 
 
 def _whole(seed: object) -> int:

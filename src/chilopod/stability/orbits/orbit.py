@@ -359,7 +359,11 @@ def with_bounds(system: SystemLike, x: Array, duration: float, error: Array | No
         # Terms of a map, which does not move between whole times, may cancel.
         if not offers(system, "velocity") and (returns.carried(system, x[None], *_BETWEEN * duration)[0] == x).all():
             wrong += returns.scatter(system, image, x, size, section)
-        inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
+        left, singular, right = np.linalg.svd(basis.T @ scaled @ basis)
+        least = _SINGULAR * singular.max(initial=1.0)
+        # Autonomous orbits may be a family, of which any is right; others that are free are not known at all.
+        cut = (singular <= least) & is_autonomous(system)
+        inverse = basis @ (right.T * np.where(cut, 0.0, 1.0 / np.maximum(singular, least))) @ left.T @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative belongs to a state with this error: along the orbit's least certain direction.
     weakest = size * np.linalg.svd(scaled)[2][-1]
