@@ -191,13 +191,11 @@ def multipliers(
             result = replace(result, values=result.values[:count], half_period=half, error_bounds=bounds)
     if result.values.size == system.dimension - (system.period is None):
         return result
-    alone = result.values.size == 1
-    which = "multiplier of largest modulus was" if alone else "multipliers of largest modulus were"
-    decide = "" if result.stable is None else f"{'it decides' if alone else 'they decide'} whether the orbit is stable; "
-    remark = (
-        f"only the {'' if alone else f'{result.values.size} '}{which} computed; {decide}the next one has a modulus of "
-        f"about {next_one:.3g}"
-    )
+    several = result.values.size > 1
+    which = f"{result.values.size} multipliers of largest modulus were" if several else "largest multiplier was"
+    deciding = "they decide" if several else "it decides"
+    decide = "" if result.stable is None else f"{deciding} whether the orbit is stable; "
+    remark = f"only the {which} computed; {decide}the next one has a modulus of about {next_one:.3g}"
     return replace(result, remarks=(remark,))
 
 
