@@ -158,7 +158,7 @@ def test_half_period_squares_to_the_full_period():
 @pytest.mark.parametrize(
     ("symmetry", "message"),
     [
-        (np.eye(3), "wrong shape"),
+        (np.eye(3), r"wrong shape \(3, 3\)"),
         ([1.0, -1.0], "wrong shape"),
         ([[0.0, 1.0], [-1.0, 0.5]], "must have a finite order"),
         ([[1.0, 1.0], [0.0, 1.0]], "must have a finite order"),

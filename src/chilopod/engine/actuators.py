@@ -217,7 +217,7 @@ class Actuators:
             return None
         array, shape = as_array(f"command.{name}", value), (len(walking), columns)
         if array.ndim == 0 or array.shape not in (shape, (1, columns), (columns,)):
-            raise ParameterError("has the wrong shape", field=f"command.{name}", value=array.shape, allowed=str(shape))
+            raise ParameterError(f"has the wrong shape {array.shape}", field=f"command.{name}", allowed=str(shape))
         rows = np.empty(shape)
         rows[:] = array
         if not ((np.abs(rows) <= LARGEST) | ~walking[:, None]).all():

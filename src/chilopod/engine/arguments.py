@@ -97,7 +97,7 @@ def standing(
     ):
         if not fits:
             raise ParameterError(
-                "has the wrong shape", field=name, value=array.shape, allowed=f"{allowed}, or one for each walk"
+                f"has the wrong shape {array.shape}", field=name, allowed=f"{allowed}, or one for each walk"
             )
         if not (np.abs(array) <= LARGEST).all():
             raise ParameterError("must be finite", field=name, allowed=f"numbers up to {LARGEST:g}")
@@ -143,7 +143,7 @@ def rows_of(
         array = as_array(name, argument)
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
             allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
-            raise ParameterError("has the wrong shape", field=name, value=array.shape, allowed=allowed)
+            raise ParameterError(f"has the wrong shape {array.shape}", field=name, allowed=allowed)
         largest = (
             np.finfo(float).max if name == "initial" else LARGEST
         )  # the state of a walk that diverges may be larger

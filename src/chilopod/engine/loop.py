@@ -151,7 +151,7 @@ def steer(
         noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
         if noise.ndim != 2 or len(noise) != walks or noise.shape[1] < events:
             allowed = f"({walks}, {events} or more)"
-            raise ParameterError("has the wrong shape", field="bearing_noise", value=noise.shape, allowed=allowed)
+            raise ParameterError(f"has the wrong shape {noise.shape}", field="bearing_noise", allowed=allowed)
 
     def tell() -> None:
         # Without a target a referee ends the walk before it begins.

@@ -54,7 +54,7 @@ class Targets:
         """
         given, shape = as_array("target", target), self.present.shape
         if given.shape not in (shape, (2,)):
-            raise ParameterError("has the wrong shape", field="target", value=given.shape, allowed=f"(2,) or {shape}")
+            raise ParameterError(f"has the wrong shape {given.shape}", field="target", allowed=f"(2,) or {shape}")
         none = np.isnan(given)
         if (np.abs(given) > LARGEST).any() or (none[..., 0] != none[..., 1]).any():
             allowed = f"x and y in m, up to {LARGEST:g}, or NaN for both without a target"

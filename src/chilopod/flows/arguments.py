@@ -76,7 +76,7 @@ def finite_array(value: Any, shape: tuple[int, ...] | None, field: str) -> Array
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(what, field=field, value=value) from None
     if shape is not None and array.shape != shape:
-        raise ParameterError("has the wrong shape", field=field, value=array.shape, allowed=str(shape))
+        raise ParameterError(f"has the wrong shape {array.shape}", field=field, value=value, allowed=str(shape))
     if not np.isfinite(array).all():
         raise ParameterError("must be finite", field=field, value=value)
     return array

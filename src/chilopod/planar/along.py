@@ -110,7 +110,7 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     _check_one_each(models, orbits, "orbits")
     if any(orbits.shape[1:] != (model.dimension,) for model in models):
         allowed = f"(walks, {models[0].dimension})"
-        raise ParameterError("has the wrong shape", field="orbits", value=orbits.shape, allowed=allowed)
+        raise ParameterError(f"has the wrong shape {orbits.shape}", field="orbits", allowed=allowed)
     at_once = _AT_ONCE if _alike(models) else 1
     if len(orbits) > at_once:
         starts = range(0, len(orbits), at_once)

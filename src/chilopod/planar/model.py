@@ -246,7 +246,7 @@ class PlanarModel(ReadOnlyArrays):
         states = np.array(given, dtype=np.float64, order="C")
         if states.ndim != 1 + several or states.shape[-1] != self.dimension:
             allowed = f"(any number, {self.dimension})" if several else f"({self.dimension},)"
-            raise ParameterError("has the wrong shape", field=field, value=states.shape, allowed=allowed)
+            raise ParameterError(f"has the wrong shape {states.shape}", field=field, allowed=allowed)
         if not np.isfinite(states).all():
             raise ParameterError("must be finite", field=field)
         return states
@@ -322,8 +322,8 @@ def carry(
     first, (count, size) = models[0], states.shape
     n, parts = first.dimension, np.append(nodes, 1.0)
     if size not in (n, n + 3) or len(models) not in (1, count):
-        problem, allowed = "has the wrong shape", f"({len(models)} or any number, {n} or {n + 3})"
-        raise ParameterError(problem, field="states", value=states.shape, allowed=allowed)
+        allowed = f"({len(models)} or any number, {n} or {n + 3})"
+        raise ParameterError(f"has the wrong shape {states.shape}", field="states", allowed=allowed)
     starts, widths, interval = first._pieces(t0, t1)
     ends = widths[:, None] * parts
     begins = np.hstack([np.zeros((widths.size, 1)), ends[:, :-1]])

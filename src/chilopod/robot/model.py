@@ -145,7 +145,7 @@ class Robot(Description):
         angles, joints = np.asarray(joint_angles, dtype=np.float64), self.body.modules - 1
         if angles.shape[-1:] != (joints,):
             allowed = f"(..., {joints}), one for each joint"
-            raise ParameterError("has the wrong shape", field="joint_angles", value=angles.shape, allowed=allowed)
+            raise ParameterError(f"has the wrong shape {angles.shape}", field="joint_angles", allowed=allowed)
         bent = np.abs(angles).sum(-1)
         with np.errstate(divide="ignore", over="ignore"):  # a negligible bend is straight
             return np.asarray(joints * self.module_length / bent)

@@ -118,7 +118,7 @@ class PeriodicSystem(ReadOnlyArrays):
         n = self.dimension
         single = matrices.ndim == 2
         if matrices.shape[-2:] != (n, n) or matrices.ndim > 3 or (name == "symmetry" and not single):
-            raise ParameterError("has the wrong shape", field=name, value=matrices.shape, allowed=f"({n}, {n})")
+            raise ParameterError(f"has the wrong shape {matrices.shape}", field=name, allowed=f"({n}, {n})")
         matrices = matrices.reshape(-1, n, n)
         for matrix in matrices:
             if _order(matrix.tobytes(), n) == 0:

@@ -97,7 +97,7 @@ class ImplicitFlow(ReadOnlyArrays):
         x, params = np.array(x, dtype=np.float64), self.params.copy()
         if x.shape != (n,):
             # Compiled code would read out of bounds.
-            raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
+            raise ParameterError(f"has the wrong shape {x.shape}", field="x", allowed=f"({n},)")
         if not np.isfinite(x).all():
             raise AnalysisError("the state is not finite", field="rhs")
         units, near = self._coupling(x, 0.5 * sum(span))

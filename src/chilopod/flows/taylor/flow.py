@@ -140,7 +140,7 @@ class TaylorFlow:
         fits = x.shape[several:] == derivative.shape[:1] == (n,)
         if not (fits and params.shape == (self.tape.parameters,)):
             # Compiled code would read out of bounds.
-            raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
+            raise ParameterError(f"has the wrong shape {x.shape}", field="x", allowed=f"({n},)")
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
         # A pulse in time makes steps short, too.
         shortest = _SHORTEST if self.patience and not self.tape.clocks.size else 0.0
