@@ -58,7 +58,7 @@ def test_a_list_groups_what_differs_in_robots_and_seeds(folder, printed):
     assert " ".join(lines[1].split()).startswith("aoi2022-planar planar 0.5 s 28.65 deg, 2 m LegYawController 1 - 1 ")
     assert " 2       1-2, 4  6 " in lines[2]
     assert lines[3].startswith("7 trials, ")
-    assert lines[4] == "1 file not written by chilopod"
+    assert lines[4] == "1 file of no trial"
     groups = [(group["robots"], group["seeds"], group["trials"]) for group in found["groups"]]
     assert groups == [(1, "", 1), (2, "1-2, 4", 6)]
     assert found["foreign"] == ["notes.txt"]

@@ -9,6 +9,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.analysis import cycle_multipliers, walk_multipliers
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
+from chilopod.analysis.cycle_multipliers import AMPLITUDE
 from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, start, walk_cycle
@@ -29,12 +30,13 @@ def straight():
     return walk_multipliers(STIFF)
 
 
-def test_a_cart_and_a_spring_have_the_multipliers_of_their_steps():
+@pytest.mark.parametrize("amplitude", [AMPLITUDE, 1e-5])
+def test_a_cart_and_a_spring_have_the_multipliers_of_their_steps(amplitude):
     steps = 100
     control = np.sin(2.0 * np.pi * np.arange(steps) / steps)[:, None] * [1.0, 0.5]
     cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), control, travel=("x",))
     assert cycle.names == ("y", "rate of x", "rate of y")
-    found = cycle_multipliers("cart", cycle, np.zeros(3), ["y"])
+    found = cycle_multipliers("cart", cycle, np.zeros(3), ["y"], amplitude)
     # Euler's step with the damper at its end: v' = (v - h k x / m) / (1 + h d / m), x' = x + h v'.
     step = np.array([[1.0 - 2e-4 / 1.001, 0.01 / 1.001], [-0.02 / 1.001, 1.0 / 1.001]])
     pair = np.linalg.eigvals(step)[0] ** steps
@@ -372,6 +374,25 @@ def test_modes_decay_each_within_its_own_error():
     modes = tuple(CycleMode(complex(value), error, np.ones(2)) for value, error in ((0.986, 2e-4), (0.258, 0.064)))
     found = CycleMultipliers("three", 0.6, np.zeros(2), 1e-3, (), None, 0.02, modes, np.zeros(2), ())
     assert found.title == "three: bends of 1.15° decay; no periodic motion was found"
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "error", "shown", "shape", "turns"),
+    [
+        (0.17 + 2e-12j, 5e-10, "0.17 twice", "undulation", 0.0),
+        (-0.17 + 2e-12j, 5e-10, "-0.17 twice", "undulation of 2 cycles", 0.5),
+        (-0.17 + 0.2j, 1.0, "-0.17 twice", "undulation", 0.0),
+        (-2e-10 + 0.0j, 5e-10, "-2e-10", "undulation", 0.0),
+        (0.2j, 5e-10, "0 ± 0.2j", "undulation of 4 cycles", 0.25),
+    ],
+)
+def test_a_pair_turns_only_beyond_its_error(multiplier, error, shown, shape, turns):
+    mode = CycleMode(multiplier, error, np.array([-0.2 + 0.8j, 1.0, 0.2 - 0.8j, -1.0]))
+    _, value, _, modulus, *said = mode.cells("smallest")
+    assert [value, said[0]] == [shown, shape]
+    assert said[1] == ("-0.2+0.8j  1  0.2-0.8j  -1" if turns == 0.25 else "-0.2  1  0.2  -1")
+    assert mode.as_json(2.0)["frequency_rad_s"] == pytest.approx(turns * np.pi)
+    assert float(modulus) == pytest.approx(abs(complex(shown.split()[0]) if turns != 0.25 else multiplier), abs=1e-6)
 
 
 @pytest.mark.parametrize(

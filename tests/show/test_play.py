@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,24 @@ from helpers.command_line import run
 BENT = (0.03, -0.01, 0.02, 0.0, 0.01)  # rad
 BEHIND = (-0.9, 0.9)  # m: out of the scanner's view at first
 END = 20.0  # s
+PAGE_OF_DOCS = Path(__file__).parents[2] / "docs" / "play.md"
+LAG = """new Promise((done) => {{
+  const usual = window.requestAnimationFrame, by = (id) => document.getElementById(id);
+  by("speed").value = "4";
+  by("restart").click();
+  play.robot.setSpring(0, 40 * play.data.unit);
+  window.requestAnimationFrame = (frame) => {{
+    let now = performance.now();
+    window.requestAnimationFrame = () => 0;
+    for (let left = 6; left > 0; left -= {0}) frame(now += 1000 * {0});
+    // The first arrow key sets the target beside the middle of the picture.
+    by("floor").dispatchEvent(new KeyboardEvent("keydown", {{ key: "ArrowUp" }}));
+    const [x, y] = play.robot.target, [mx, my] = play.robot.place()[play.data.modules >> 1];
+    window.requestAnimationFrame = usual;
+    usual(frame);
+    done(Math.hypot(mx - x, my - y + 0.1));
+  }};
+}})"""
 
 
 @dataclass(frozen=True)
@@ -98,6 +117,12 @@ def test_the_page_is_used_without_eyes_and_without_a_mouse(browser):
     browser.run("document.getElementById('none').click()")
 
 
+def test_the_picture_follows_alike_at_any_rate_of_frames(browser):
+    often, rarely = (browser.run(LAG.format(pause)) for pause in (1.0 / 60.0, 0.1))
+    assert 0.02 < rarely < 0.15
+    assert rarely == pytest.approx(often, abs=0.03)
+
+
 def test_what_the_page_says(browser):
     say = "(() => {{ {} return play.words(); }})()"
     by = "document.getElementById"
@@ -130,6 +155,9 @@ def test_the_command_writes_one_file_and_replaces_none(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run("play", "--json")[0] == 0
     assert (tmp_path / "play.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    size = f"about {(tmp_path / 'play.html').stat().st_size / 1000:.0f} kB"
+    for said in (run("play", "--help")[1], PAGE_OF_DOCS.read_text(encoding="utf-8")):
+        assert size in " ".join(said.split())
     code, _, err = run("play")
     assert code == 2
     assert "play.html" in err

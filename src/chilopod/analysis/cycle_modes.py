@@ -28,10 +28,23 @@ class CycleMode(ReadOnlyArrays):
     angles: ComplexArray
 
     @property
+    def _seen(self) -> tuple[complex, ComplexArray]:
+        """Multiplier and joints; if the error leaves open that a pair turns, the real multiplier that counts twice."""
+        turns = abs(self.multiplier.imag) > self.error
+        return (self.multiplier, self.angles) if turns else (complex(self.multiplier.real), self.angles.real)
+
+    @property
+    def turn(self) -> float:
+        """Angle by which the mode turns in a cycle, rad; 0 where the error leaves it open."""
+        value, _ = self._seen
+        return abs(float(np.angle(value))) if abs(value) > self.error else 0.0
+
+    @property
     def shape(self) -> str:
         """``bend`` if all yaw joints turn to one side at a time, ``undulation`` if not, ``other`` if none turns."""
-        turned = self.angles * np.conj(self.angles.sum())
-        return ("bend" if (turned.real > 0.0).all() else "undulation") if self.angles.any() else "other"
+        _, angles = self._seen
+        turned = angles * np.conj(angles.sum())
+        return ("bend" if (turned.real > 0.0).all() else "undulation") if angles.any() else "other"
 
     def as_json(self, period: float) -> dict[str, Any]:
         """The mode as plain numbers, for a period of the gait in s."""
@@ -39,17 +52,17 @@ class CycleMode(ReadOnlyArrays):
             "multiplier": [self.multiplier.real, self.multiplier.imag],
             "error": self.error if math.isfinite(self.error) else None,
             "shape": self.shape,
-            "frequency_rad_s": abs(float(np.angle(self.multiplier))) / period,
+            "frequency_rad_s": self.turn / period,
             "joint_components": [[angle.real, angle.imag] for angle in self.angles.tolist()],
         }
 
     def cells(self, which: str) -> Sequence[str]:
         """A row of the table."""
-        turn = abs(float(np.angle(self.multiplier)))
-        shown = number(self.multiplier, 6).replace("+", " ± ")
+        (value, joints), turn = self._seen, self.turn
+        shown = number(value, 6).replace("+", " ± ") + " twice" * (value != self.multiplier)
         shape = self.shape + (f" of {2.0 * math.pi / turn:.3g} cycles" if turn else "")
-        angles = "  ".join(number(angle, 2) for angle in np.round(self.angles, 12))
-        return which, shown, f"{self.error:.1e}", f"{abs(self.multiplier):.6f}", shape, angles
+        angles = "  ".join(number(angle, 2) for angle in np.round(joints, 12).tolist())
+        return which, shown, f"{self.error:.1e}", f"{abs(value):.6f}", shape, angles
 
 
 _GROWTH = {True: "decay", False: "grow", None: "neither decay nor grow for certain"}

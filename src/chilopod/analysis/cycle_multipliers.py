@@ -121,7 +121,7 @@ def cycle_multipliers(
             break
     exact = _exact(cycle, x, basis, dual, at, step) if closes and not len(beside) else ()
     try:
-        finite, seen = _finite(cycle, x, amplitude * basis, dual / amplitude, at, cycles)
+        finite, seen = _finite(cycle, x, basis, dual, at, amplitude, cycles)
     except AnalysisError:  # so large bends fall
         if not exact:
             raise
@@ -262,22 +262,25 @@ def _exact(cycle: CycleMap, x: Array, basis: Array, dual: Array, at: _Indices, s
     return _modes(np.concatenate([each[0] for each in tiny]), basis[at], 1, rounding, kink)
 
 
-def _finite(cycle: CycleMap, x: Array, bends: Array, dual: Array, at: _Indices, cycles: int) -> tuple[_Modes, Array]:
+def _finite(
+    cycle: CycleMap, x: Array, basis: Array, dual: Array, at: _Indices, amplitude: float, cycles: int
+) -> tuple[_Modes, Array]:
     """Modes of bends of a size, and states before each cycle. Contacts do not add up, and differ to both sides: a bend
     along a single mode, to one side, grows by another factor. The error contains the changes to both sides."""
+    bends, dual = amplitude * basis, dual / amplitude
     matrices, seen, _ = (each[_FORGOTTEN:] for each in _followed(cycle, x, bends, dual, _FORGOTTEN + cycles))
     values, right, _ = eigensystem(matrices.mean(axis=0))
     turn = np.where(values.imag < 0.0, right.imag, right.real)
     turn *= np.abs(_largest(bends, at) / _largest(bends @ turn, at))
     back = np.linalg.pinv(turn)
     sides = _followed(cycle, x, bends @ turn, back @ dual, _FORGOTTEN + cycles)[2][_FORGOTTEN:].mean(axis=0)
-    return _modes(matrices, bends[at], _BLOCK, apart=turn @ sides @ back - matrices.mean(axis=0)), seen
+    return _modes(matrices, basis[at], _BLOCK, apart=turn @ sides @ back - matrices.mean(axis=0)), seen
 
 
 def _modes(matrices: Array, angles: Array, block: int, least: float = _ROUNDING, apart: Array | None = None) -> _Modes:
     """Modes of the mean of matrices (m, r, r), with half their intervals of 95 % by Student's t, from means over blocks
     of some of them in turn, at ``least`` relative to the norm of a matrix, and with the changes by matrices that lie
-    ``apart`` from the mean, (k, r, r); rows of ``angles`` (joints, r) are yaw joints."""
+    ``apart`` from the mean, (k, r, r); rows of ``angles`` (joints, r) are yaw joints of the basis."""
     values, right, left = eigensystem(matrices.mean(axis=0))
     # To first order, a matrix changes an eigenvalue by left^H (M - mean) right.
     each = np.einsum("ji,kjl,li->ik", left.conj(), matrices, right)

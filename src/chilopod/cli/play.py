@@ -24,7 +24,7 @@ def play(
 ) -> None:
     """Write a page in which the planar robot walks in any browser: drag its first spring, click the floor.
 
-    The page is one file of some 50 kB. It computes the planar model itself, loads nothing, and opens from disk.
+    The page is one file of about 44 kB. It computes the planar model itself, loads nothing, and opens from disk.
 
     The address sets the first spring and the seed: play.html?k1=8&seed=2.
 

@@ -57,7 +57,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
         ("unreadable", [path for path, _ in wrong], "that cannot be read (chilopod trials check says why)"),
         ("set_aside", there.aside, aside),
         ("unfinished", there.unfinished, left),
-        ("foreign", there.foreign, "not written by chilopod"),
+        ("foreign", there.foreign, "of no trial"),
     ):
         found[key] = [path.name for path in paths]
         lines += [f"{len(paths)} file{'s' * (len(paths) > 1)} {words}"] * bool(paths)
@@ -129,7 +129,7 @@ def clean(
 ) -> None:
     """Remove useless files from a folder of trials: those set aside, and those that killed processes left unfinished.
 
-    Files that chilopod has not written, and those that a process is writing, stay and are listed. A damaged file stays
+    Files that are no trials, and those that a process is writing, stay and are listed. A damaged file stays
     until its trial is walked again, which sets it aside.
 
     Example: chilopod trials clean report/trials --dry-run

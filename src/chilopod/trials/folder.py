@@ -31,7 +31,7 @@ Wrong = list[tuple[Path, str]]  # fault of each
 
 class Contents(NamedTuple):
     """Names in a folder: records of trials, files set aside, unfinished files of running or killed processes, and files
-    that chilopod did not write."""
+    that are none of these."""
 
     trials: tuple[Path, ...]
     aside: tuple[Path, ...]
@@ -88,7 +88,7 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
     """
     found = contents(folder)
     remove = list(found.aside)
-    left = [(path, "not written by chilopod") for path in found.foreign]
+    left = [(path, "not a trial") for path in found.foreign]
     if nobody_in(folder):
         remove += found.unfinished
     else:

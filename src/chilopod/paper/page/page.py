@@ -46,6 +46,14 @@ _COUNTED: Final = {
 }
 """Words under which verdicts are counted, by class."""
 
+_MET: Final = {
+    Verdict.WITHIN: "met",
+    Verdict.OUTSIDE: "not met",
+    Verdict.UNDECIDED: "undecided by the scatter of its trials",
+    Verdict.NOT_DETERMINED: "not determined by its trials",
+}
+"""Words of the summary for verdicts on the robot in three dimensions."""
+
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
 
@@ -173,13 +181,10 @@ def summary(results: Found) -> str:
         )
     predicted = [row.verdict for row in results.robot_rows() if row.twin and row.kind == Kind.PREDICTED.value]
     if predicted:
-        open_, none = predicted.count(Verdict.UNDECIDED), predicted.count(Verdict.NOT_DETERMINED)
-        left = f"; {open_} of the others {'is' if open_ == 1 else 'are'} left open by the scatter" if open_ else ""
-        left += f"; of {none} its trials determine nothing" if none else ""
+        count, met = len(predicted), [f"{predicted.count(each)} {said}" for each, said in _MET.items() if each in predicted]
         parts.append(
             "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
-            f"their speed alone, meets {predicted.count(Verdict.WITHIN)} of {len(predicted)} further statements about "
-            f"the robot that it was not fitted to{left}."
+            f"their speed alone, is compared with {count} other statement{'s' * (count != 1)} about it: {listing(met)}."
         )
     return " ".join(parts)
 

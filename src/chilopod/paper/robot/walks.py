@@ -184,9 +184,9 @@ def uniform_modes(
     Returns
     -------
     Dataset over mode and spring (N*mm/deg): ``modulus`` of the multiplier of bends of :data:`AMPLITUDE`, half its
-    interval of 95 % ``modulus_error``, and ``period`` of the mode (s, infinite for a real multiplier), NaN where the
-    mode does not lead or the straight walk is lost; over mode ``end``, at which the modulus passes 1, and its standard
-    error ``end_error`` (N*mm/deg), NaN if it does not.
+    interval of 95 % ``modulus_error``, and ``period`` of the mode (s, infinite where the multiplier may be real), NaN
+    where the mode does not lead or the straight walk is lost; over mode ``end``, at which the modulus passes 1, and its
+    standard error ``end_error`` (N*mm/deg), NaN if it does not.
     """
 
     def compute() -> list[Any]:
@@ -226,7 +226,7 @@ def uniform_modes(
 def _leading(mode: CycleMode | None) -> tuple[float, float, float]:
     """Modulus of a mode, its error, and the angle by which it turns in a gait cycle, rad."""
     nan = float("nan")
-    return (nan,) * 3 if mode is None else (abs(mode.multiplier), mode.error, abs(float(np.angle(mode.multiplier))))
+    return (nan,) * 3 if mode is None else (abs(mode.multiplier), mode.error, mode.turn)
 
 
 def _passes_one(springs: Sequence[float], modulus: Array, error: Array) -> tuple[float, float]:

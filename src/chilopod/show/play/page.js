@@ -2,7 +2,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const by = (id) => document.getElementById(id);
-  const TOLERANCE = 1e-8, NUDGE = 0.001, DEGREE = Math.PI / 180, LONGEST_FRAME = 0.1, FINEST = 2;
+  const TOLERANCE = 1e-8, NUDGE = 0.001, DEGREE = Math.PI / 180, LONGEST_FRAME = 0.1, FOLLOWING = 0.4, FINEST = 2;
   const [softest, stiffest] = data.range.map((each) => each / data.unit);
   const asked = new URLSearchParams(location.search);
   const robot = planarRobot(data, TOLERANCE);
@@ -155,10 +155,10 @@
     return { left: camera.x - 0.5 * width / zoom, top: camera.y + 0.5 * height / zoom, zoom };
   }
 
-  function drawFloor() {
+  function drawFloor(passed) {
     const canvas = by("floor"), modules = robot.place();
     const middle = modules[Math.floor(data.modules / 2)];
-    const far = Math.hypot(middle[0] - camera.x, middle[1] - camera.y) > 0.8, share = far ? 1 : 0.04;
+    const far = Math.hypot(middle[0] - camera.x, middle[1] - camera.y) > 0.8, share = far ? 1 : 1 - Math.exp(-passed / FOLLOWING);
     camera.x += share * (middle[0] - camera.x);
     camera.y += share * (middle[1] - camera.y);
     const { context, width, height } = prepared(canvas), { left, top, zoom } = view(canvas);
@@ -332,7 +332,7 @@
     last = now;
     if (!paused) walk(passed * Number(by("speed").value));
     const said = words();
-    drawFloor();
+    drawFloor(passed);
     drawFork();
     by("pause").textContent = paused ? "Go on" : "Pause";
     by("value").textContent = `${(robot.springs[0] / data.unit).toFixed(1)} N·mm/deg`;

@@ -81,7 +81,9 @@ class _Measured(Quantity):
                 numbers = replace(Quantity(self.si, self.display), each=True).read_field(pair)
                 if len(numbers) != 2:
                     raise ParameterError("must be a number and its standard error", value=pair)
-                found[_STIFFNESS.read(spring)] = numbers
+                if (stiffness := _STIFFNESS.read(spring)) in found:
+                    raise ParameterError("must name every spring once", value=spring)
+                found[stiffness] = numbers
             except ChilopodError as error:
                 error.field = f"[{spring}]{error.field or ''}"
                 raise
@@ -136,8 +138,12 @@ class BaseSeries(Description):
     @model_validator(mode="after")
     def _is_a_series(self) -> Self:
         for name, least in (("curved", 3), ("straight", 1), ("radii", 1)):
-            if (count := len(set(getattr(self, name)))) < least:
-                raise ParameterError(f"must have {least} springs or more, not {count}", field=name)
+            springs = [*getattr(self, name)]
+            if twice := next((each for each in springs if springs.count(each) > 1), 0.0):
+                shown = units.format(twice, PAPER_UNIT, digits=6)
+                raise ParameterError("must name every spring once", field=name, value=shown)
+            if len(springs) < least:
+                raise ParameterError(f"must have {least} springs or more, not {len(springs)}", field=name)
         for name, allowed in (("onset", (2,)), ("law", (0, 2))):
             if len(given := getattr(self, name)) not in allowed:
                 shown = [units.format(each, PAPER_UNIT if name == "onset" else "1", digits=6) for each in given]
