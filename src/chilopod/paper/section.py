@@ -67,7 +67,7 @@ class Context:
     robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))  # of the planar model
     whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))  # of the sections in three dimensions
     size: Size = Size.FULL  # amount of every computation
-    folder: Path | None = None  # of the records of trials, by which a stopped computation is resumed
+    folder: Path | None = None  # of the records of trials, which are not walked again
 
 
 @dataclass(frozen=True, eq=False)

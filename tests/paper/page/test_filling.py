@@ -32,6 +32,7 @@ THERE = """new Promise((done) => {
 })"""
 HASTE = "const wait = setTimeout; window.setTimeout = (call, time) => wait(call, time / 10)"
 CONTEXT = Context()
+AGAIN = "The same command begins the page anew: it reads the kept trials and computes the rest again, in a few minutes."
 
 
 def rows(value):
@@ -153,6 +154,7 @@ def test_a_page_whose_computation_was_killed_says_so(browser, tmp_path):
     assert browser.run(THERE % "document.querySelector('#status .failed')")
     said = browser.run("document.getElementById('status').innerText")
     assert "The computation has ended: there is no sign of life of it since Sep" in said
+    assert AGAIN in said
 
 
 def test_films_wait_while_there_is_anything_else_to_draw(monkeypatch, tmp_path):
@@ -221,7 +223,7 @@ def test_one_that_is_stopped_says_so(tmp_path):
     with pytest.raises(KeyboardInterrupt), Report([ONE, TWO], CONTEXT, tmp_path) as report:
         raise KeyboardInterrupt
     assert RUNNING not in text(report)
-    assert "Stopped: 0 of 2 sections" in text(report)
+    assert f"Stopped: 0 of 2 sections are there. {AGAIN}" in text(report)
     assert "Not computed:</b> the second" in text(report)
 
 

@@ -1,6 +1,7 @@
 "use strict";
 (() => {
   const POLL = 4, SILENT = 45;  // s between looks for news; without a sign of life the computation has ended
+  const AGAIN = "The same command begins the page anew: it reads the kept trials and computes the rest again, in a few minutes.";
   const parts = (root) => [...root.querySelectorAll("[data-part]")];
 
   // A copy of this page in a hidden frame hands its parts to the page that is read.
@@ -165,7 +166,7 @@
   function ended(when) {
     const time = new Date(1000 * when).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
     const said = Object.assign(document.createElement("p"), { className: "failed", textContent:
-      `The computation has ended: there is no sign of life of it since ${time}. The same command goes on where it was.` });
+      `The computation has ended: there is no sign of life of it since ${time}. ${AGAIN}` });
     said.setAttribute("role", "status");
     document.querySelector("#status [role=status]").replaceWith(said);
     texts.delete("status");

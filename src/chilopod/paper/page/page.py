@@ -181,7 +181,8 @@ def summary(results: Found) -> str:
         )
     predicted = [row.verdict for row in results.robot_rows() if row.twin and row.kind == Kind.PREDICTED.value]
     if predicted:
-        count, met = len(predicted), [f"{predicted.count(each)} {said}" for each, said in _MET.items() if each in predicted]
+        count = len(predicted)
+        met = [f"{predicted.count(each)} {words}" for each, words in _MET.items() if each in predicted]
         parts.append(
             "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
             f"their speed alone, is compared with {count} other statement{'s' * (count != 1)} about it: {listing(met)}."

@@ -222,7 +222,7 @@ def _is_preset(robot: Robot) -> bool:
 
 def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *, replace: bool = False) -> None:
     """Check, before any work, that a report of some sections and size can be written into a folder; an existing report
-    with no more sections is resumed.
+    with no more sections is replaced.
 
     Raises an OutputError if the folder cannot be written. Raises one too for a page that is not a report, a report with
     more sections, or files without a page, unless these may be replaced.
