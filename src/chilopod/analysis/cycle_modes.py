@@ -30,8 +30,9 @@ class CycleMode(ReadOnlyArrays):
     @property
     def _seen(self) -> tuple[complex, ComplexArray]:
         """Multiplier and joints; if the error leaves open that a pair turns, the real multiplier that counts twice."""
-        turns = abs(self.multiplier.imag) > self.error
-        return (self.multiplier, self.angles) if turns else (complex(self.multiplier.real), self.angles.real)
+        if abs(self.multiplier.imag) > self.error:
+            return self.multiplier, self.angles
+        return complex(self.multiplier.real), self.angles.real.astype(np.complex128)
 
     @property
     def turn(self) -> float:

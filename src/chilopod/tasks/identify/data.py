@@ -140,8 +140,8 @@ class BaseSeries(Description):
         for name, least in (("curved", 3), ("straight", 1), ("radii", 1)):
             springs = [*getattr(self, name)]
             if twice := next((each for each in springs if springs.count(each) > 1), 0.0):
-                shown = units.format(twice, PAPER_UNIT, digits=6)
-                raise ParameterError("must name every spring once", field=name, value=shown)
+                spring = units.format(twice, PAPER_UNIT, digits=6)
+                raise ParameterError("must name every spring once", field=name, value=spring)
             if len(springs) < least:
                 raise ParameterError(f"must have {least} springs or more, not {len(springs)}", field=name)
         for name, allowed in (("onset", (2,)), ("law", (0, 2))):
