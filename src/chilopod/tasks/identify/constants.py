@@ -168,7 +168,7 @@ class Estimates:
     remark
         Words that the provenance of each constant ends with.
     cut
-        Whether the ends of each interval lie where another constant is at the end of its range; by default nowhere.
+        Mask of the constants whose interval ends where another constant is at the end of its range; by default none.
     """
 
     given: Robot
