@@ -67,7 +67,7 @@ def test_nothing_is_overwritten_unless_forced(saved):
     [
         (("--set", "ground.friction=200 N*s/m"), "another robot"),
         (("--parameter", "springs.stiffness[1]"), "springs.stiffness[0]"),
-        (("--left",), "the side to which"),
+        (("--left",), "error: --left: must be left out: the saved branch turns right"),
         (("--between", "15 N*mm/deg", "20 N*mm/deg"), "last point"),
     ],
 )
@@ -86,7 +86,8 @@ def test_no_branch_to_resume(saved):
     for folder, missing, more in ((beside, beside / "branch.nc", ""), (misspelt, misspelt, nearest)):
         code, out, err = run(*ROBOT, "--resume", folder)
         assert (code, out, len(err.splitlines())) == (2, "", 1)
-        assert f"{missing}: does not exist{more}" in err
+        assert err.startswith(f"error: {missing}: --resume = ")
+        assert f": does not exist{more}" in err
 
 
 def test_the_interval_is_round_the_pitchfork_of_any_robot():

@@ -65,8 +65,8 @@ def test_the_help_has_all_choices(capsys):
             ["--targets", "slalmo"],
             "--targets = 'slalmo': must be targets, a named course or an existing file; did you mean 'slalom'?",
         ),
-        (["--targets", "1 m, 0 m; 1 m, 0 m"], "target 2 = '1 m, 0 m': must lie apart from target 1"),
-        (["--targets", "0 deg, 1e9 m"], "target 1 = '1e+09 m': must be a distance"),
+        (["--targets", "1 m, 0 m; 1 m, 0 m"], "--targets 2 = '1 m, 0 m': must lie apart from target 1"),
+        (["--targets", "0 deg, 1e9 m"], "--targets 1 = '1e+09 m': must be a distance"),
         (["--targets", "many.txt"], "many.txt: too large for a course"),
         (
             ["--targets", "some.txt"],

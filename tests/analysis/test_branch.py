@@ -16,6 +16,7 @@ from chilopod.planar.along import walk_means
 from chilopod.robot import load_robot
 from chilopod.show import write_branch
 from chilopod.show.figures.branch import panel
+from chilopod.stability import Ending
 from chilopod.stability.branches.branch_points import BranchPoint
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.returns import whole_period
@@ -178,6 +179,16 @@ def test_only_its_own_branch_is_resumed(tmp_path):
     ):
         with pytest.raises(ParameterError, match=match):
             resumed(data, robot, parameter, side=side)
+
+
+def test_a_branch_that_left_its_interval_goes_on_beyond_it():
+    data = curved_walks(ROBOT, K1, (stiffness(7.8), stiffness(20.0)), points=1)
+    end = float(data.parameter_si[-1])
+    data.attrs |= {"lowest_si": end, "ending": Ending.LEFT_INTERVAL.label}
+    for between, said in ((None, "between: "), ((end, stiffness(20.0)), r"between = .*: ")):
+        with pytest.raises(ParameterError, match=f"^{said}must go on beyond .* allowed: a wider interval$"):
+            resumed(data, ROBOT, K1, between)
+    assert resumed(data, ROBOT, K1, (stiffness(7.8), end), points=1).sizes["point"] == data.sizes["point"] + 1
 
 
 def test_a_damaged_or_edited_file_is_refused(tmp_path):

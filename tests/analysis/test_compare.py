@@ -1,5 +1,6 @@
 """Two robots, number by number."""
 
+import importlib
 import itertools
 import re
 
@@ -111,6 +112,45 @@ def test_what_a_robot_in_between_has_not_is_unknown():
     assert "onset none and none, growth -0.235 1/s" in lines[0]
     with pytest.raises(ParameterError, match="radius"):
         compare(ROBOT, ROBOT, quantities=("radios",))
+
+
+def test_robots_far_faster_than_both_are_not_computed(monkeypatch):
+    """With the mass of the small one and the friction of the large one, a robot takes hundreds of times the steps."""
+    asked = []
+    monkeypatch.setattr(Measured, "margin", lambda self, robot: asked.append(robot) or 1.0)
+    small = ROBOT.with_value("body.mass", 1e-3 * ROBOT.body.mass).with_value("ground.friction", 0.25)
+    found = compare(ROBOT, small, quantities=("margin",))
+    numbers = [(robot.body.mass, robot.ground.friction) for robot in asked]
+    assert numbers == [(8.5, 246.5), (8.5e-3, 0.25), (8.5, 0.25)]
+    assert np.isnan(found.effects["margin"].mean).all()
+    assert "or its motion is far faster than theirs" in found.lines()[-1]
+
+
+def test_robots_of_which_no_mean_is_left_are_not_computed(monkeypatch):
+    asked = []
+
+    def margin(self, robot):
+        asked.append(robot)
+        if robot.body.mass != ROBOT.body.mass:
+            raise ParameterError("has none")
+        return 1.0
+
+    monkeypatch.setattr(Measured, "margin", margin)
+    other, paths = ROBOT, ["body.mass", "body.length", "legs.half_width", "legs.forward_offset", "gait.stride"]
+    for count, path in enumerate([*paths, "ground.friction", *(f"springs.stiffness[{at}]" for at in range(1, 5))]):
+        other = other.with_value(path, 1.01 * ROBOT.get(path) + 1e-4 * count)
+    found = compare(ROBOT, other, quantities=("margin",))
+    assert len(found.paths) == 10
+    assert np.isnan(found.effects["margin"].mean).all()
+    assert len(asked) < 80
+
+
+def test_a_long_comparison_is_announced(monkeypatch):
+    monkeypatch.setattr(importlib.import_module("chilopod.analysis.compare"), "_LONG", -1.0)
+    told = []
+    compare(ROBOT, ROBOT.set_from_text(["body.mass=9 kg"]), quantities=("growth",), remark=told.append)
+    assert len(told) == 1
+    assert re.fullmatch(r"a quantity of up to 2 robots in between takes about \S+ minutes", told[0])
 
 
 def test_each_robot_is_compared_at_its_own_spring():

@@ -157,14 +157,17 @@ def resumed(
             said = f"the saved branch belongs to another robot: {name} differs"
             raise ParameterError(said, field="robot", value=robot.name)
     if side is not None and side != data.attrs["side"]:
-        raise ParameterError("must be the side to which the saved branch turns", field="side")
-    between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
+        problem, allowed = "must be the side to which the saved branch turns", str(data.attrs["side"])
+        raise ParameterError(problem, field="side", value=side, allowed=allowed)
+    given, between = between, (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
     (low, high), end = sorted(between), float(data.parameter_si[-1])
-    ended = data.attrs["ending"] == Ending.LEFT_INTERVAL.label and end in (low, high)
+    last = units.format(end, robot.unit_of(parameter), digits=6)
+    ended = end == (low if data.tangent[-1, -1] < 0.0 else high)
     if ended or not low <= end <= high:
-        said, given = "must contain the last point of the saved branch", interval_text(robot, parameter, (low, high))
-        allowed = f"an interval that contains {units.format(end, robot.unit_of(parameter), digits=6)}"
-        raise ParameterError(said, field="between", value=given, allowed=allowed)
+        problem = f"must contain {last}, the last point of the saved branch"
+        problem = f"must go on beyond {last}, where the saved branch left its interval" if ended else problem
+        shown = None if given is None else interval_text(robot, parameter, (low, high))
+        raise ParameterError(problem, field="between", value=shown, allowed="a wider interval")
     start = _branch_of(data, _followed(saved, parameter)(value).scale)
     branch = _follow(saved, parameter, start, between, points, longest, progress)
     kept = {name: data.attrs[name] for name in _VERDICT}

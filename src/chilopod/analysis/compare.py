@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, unit_of
 from chilopod.errors import ChilopodError, ParameterError, known_names
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, finite, tornado
+from chilopod.planar.step_count import steps
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ORDERS = 64  # that are sampled, where all orders take more robots than these can
+_LONG = 60.0  # s: a comparison that takes longer is announced
+_MOST_STEPS, _SLOWER = 1e5, 10.0  # of a robot in between and a gait cycle, or so much more than the two robots take
 _EXACT = 1e-10  # part of a quantity to which it is computed
 _DERIVED = "body.yaw_inertia"
 
@@ -118,7 +122,7 @@ class RobotComparison(Summary):
         orders = f"{_ORDERS} of the orders" if sampled else "all orders"
         said = [f"parts are means over {orders} of the changes, and add up to the difference"]
         if any(np.isnan(found.mean).any() for found in self.effects.values()):
-            said.append("unknown: a robot in between has no such quantity")
+            said.append("unknown: a robot in between has no such quantity, or its motion is far faster than theirs")
         return [], cells, [*said, *tail]
 
     def plot(self, axes: Axes | None = None) -> Axes:
@@ -136,6 +140,7 @@ def compare(
     onset: Onset = Onset(),  # noqa: B008 (frozen)
     quantities: Sequence[str] = ("onset", "growth", "speed"),
     seed: int = 0,
+    remark: Callable[[str], None] = lambda sentence: None,
     progress: Progress = silent,
 ) -> RobotComparison:
     """Compare two robots number by number.
@@ -149,6 +154,8 @@ def compare(
         Some of :data:`chilopod.analysis.quantities.QUANTITIES`.
     seed
         Seed of the 64 orders that are sampled for ten or more differences.
+    remark
+        Function that receives a sentence if a quantity will take long.
     progress
         Function of the fraction done (0 to 1) and a few words.
     """
@@ -164,7 +171,7 @@ def compare(
     effects = {}
     for done, name in enumerate(names):
         show = part(progress, done / len(names), (done + 1) / len(names), name)
-        effects[name] = _effects(one, other, paths, measured.function(name), np.random.default_rng(seed), show)
+        effects[name] = _effects(one, other, paths, measured.function(name), np.random.default_rng(seed), show, remark)
     return RobotComparison(one, other, onset, paths, others, effects)
 
 
@@ -225,10 +232,12 @@ def _effects(
     function: Callable[[Robot], float],
     rng: np.random.Generator,
     show: Progress,
+    remark: Callable[[str], None],
 ) -> Effects:
-    """Effects of the numbers on a function of a robot; robots in between are computed once."""
+    """Effects of the numbers on a function of a robot; each robot is computed once, while a mean needs it."""
     count, known = len(paths), dict[frozenset[int], float]()
     most = min(2**count, max(1, _ORDERS * count))
+    fastest = max(_MOST_STEPS, _SLOWER * max(steps(robot, robot.gait.period) for robot in (first, second)))
 
     def value(changed: frozenset[int]) -> float:
         """The quantity of the first robot with some numbers of the second; NaN where it has none."""
@@ -238,13 +247,20 @@ def _effects(
                 for at in sorted(changed):
                     if _number(robot, paths[at]) is not None:  # a spring of a module that is not there has no effect
                         robot = robot.with_value(paths[at], second.get(paths[at]))
-                known[changed] = function(robot)
+                known[changed] = function(robot) if steps(robot, robot.gait.period) <= fastest else math.nan
             except ChilopodError:
                 known[changed] = math.nan
             show(min(1.0, len(known) / most), f"{len(known)} of up to {most} robots")
         return known[changed]
 
     whole = frozenset(range(count))
+    value(frozenset())  # compiles
+    begun = time.perf_counter()
+    for at in range(count):
+        value(frozenset(range(at + 1)))
+    left = (most - len(known)) * (time.perf_counter() - begun) / max(count, 1)
+    if left > _LONG:
+        remark(f"a quantity of up to {most} robots in between takes about {left / 60.0:.1g} minutes")
     ends = value(frozenset()), value(whole)
     alone = [value(frozenset([at])) - ends[0] for at in whole]
     last = [ends[1] - value(whole - {at}) for at in whole]
@@ -253,14 +269,15 @@ def _effects(
         for size in range(count):
             weight = 1.0 / (count * math.comb(count - 1, size))  # part of the orders in which these come first
             for earlier in map(frozenset, itertools.combinations(range(count), size)):
-                for at in whole - earlier:
+                for at in whole - earlier - {*np.flatnonzero(np.isnan(means)).tolist()}:
                     means[at] += weight * (value(earlier | {at}) - value(earlier))
     else:
         parts = np.zeros((_ORDERS, count))
         for row in parts:
             so_far = frozenset[int]()
             for at in rng.permutation(count).tolist():
-                row[at] = value(so_far | {at}) - value(so_far)
+                known_yet = not np.isnan(parts[:, at]).any()
+                row[at] = value(so_far | {at}) - value(so_far) if known_yet else math.nan
                 so_far |= {at}
         means, scatter = parts.mean(axis=0), parts.std(axis=0, ddof=1) / math.sqrt(_ORDERS)
     return Effects(*ends, np.array(alone), np.array(last), means, scatter)

@@ -12,7 +12,7 @@ from chilopod.errors import ChilopodError, ParameterError
 
 _TYPED_AS = {
     **{"joint_angles": "initial_joints", "spring": "k1", "twin": "engine", "body.modules": "modules"},
-    **{"quantities": "show", "tolerances": "uncertain"},
+    **{"quantities": "show", "tolerances": "uncertain", "target": "targets"},
 }
 """Options that are called otherwise than the argument of the function that they are for."""
 
@@ -84,11 +84,11 @@ def _as_typed(error: ChilopodError, ctx: Any) -> None:
     field, _, part = (error.field or "").partition(" ")
     name = field if error.source else _TYPED_AS.get(field, field)  # a file has names of its own
     for option in ctx.command.params:
-        if option.name != name or option.param_type_name != "option" or option.is_flag:
+        if option.name not in (name, field) or option.param_type_name != "option" or option.is_flag:
             continue
         error.field = f"{max(option.opts, key=len)} {part}".strip()
-        typed = ctx.params[name]
-        if not part and ctx.get_parameter_source(name).name == "COMMANDLINE":
+        typed = ctx.params[option.name]
+        if not part and ctx.get_parameter_source(option.name).name == "COMMANDLINE":
             several = isinstance(typed, tuple | list)
             error.value = typed if not several else error.value if error.value in typed else " ".join(typed)
         if isinstance(error.value, Path):

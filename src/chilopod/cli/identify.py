@@ -14,7 +14,7 @@ import typer
 from chilopod.cli.commands import new_app
 from chilopod.cli.options import RobotOptions, deliver, free, json_text, print_result, with_options
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError, UnitError
 
 if TYPE_CHECKING:
     from chilopod.output import Content
@@ -63,7 +63,11 @@ class _Options(RobotOptions):
         written = self.out / "identification.json", self.out / "identified.toml"
         free([*files_of("identification", self.out), *written], self.force)
         with progress_bar("identification") as progress:
-            found, more = solve(lambda title: partial(progress, title))
+            try:
+                found, more = solve(lambda title: partial(progress, title))
+            except (AnalysisError, ParameterError, UnitError) as error:
+                error.source = error.source or (None if self.data is None else str(self.data))
+                raise
         result = {"robot": self.described.name, **found.as_json()}
         result |= {name: each.as_json() for name, each in more.items()}
         lines = [*found.lines(), *(line for each in more.values() for line in each.lines())]
@@ -114,12 +118,13 @@ def planar(options: _PlanarOptions) -> None:
     data: identify.CriticalMode | identify.RecordedWalks = (
         identify.load_data(given, identify.CriticalMode, identify.RecordedWalks) if given else critical_mode_data()
     )
+    others = {"--next": options.measure, "--check": options.check, "--points": options.points != _POINTS}
+    field = next((name for name, on in others.items() if on), "")
+    if field and isinstance(data, identify.RecordedWalks):
+        raise ParameterError("must not be given with recorded walks", field=field)
 
     def solve(progress: Callable[[str], Progress]) -> tuple[Found, More]:
         if isinstance(data, identify.RecordedWalks):
-            others = {"--next": options.measure, "--check": options.check, "--points": options.points != _POINTS}
-            if field := next((name for name, on in others.items() if on), ""):
-                raise ParameterError("must not be given with recorded walks", field=field)
             folder = given.parent if given else Path()
             return identify.identify_recorded(robot, data, folder, progress("identification")), {}
         found = identify.identify_planar(robot, data, options.points, variants, progress("identification"))

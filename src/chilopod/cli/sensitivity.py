@@ -90,6 +90,8 @@ def compare(
 
     The onset is the value of the number at which the straight walk begins to bend. A part is the mean over all orders
     in which the numbers of the first robot can be changed to those of the second (Shapley value), so parts add up.
+    Robots that differ in ten numbers or more take minutes, and a note says how many; a part is unknown where a robot in
+    between has no such quantity, or moves far faster than both.
 
     Example: chilopod compare aoi2022-planar aoi2022
     """
@@ -98,7 +100,8 @@ def compare(
     from chilopod import analysis
 
     names = show.split(",")
-    options.study("comparison", lambda progress: analysis.compare(first, second, onset, names, seed, progress))
+    how = names, seed, lambda said: typer.echo(f"note: {said}", err=True)
+    options.study("comparison", lambda progress: analysis.compare(first, second, onset, *how, progress))
 
 
 def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, float]:

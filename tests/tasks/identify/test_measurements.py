@@ -44,7 +44,7 @@ def test_the_exact_projection_shrinks_as_predicted_by_the_best_measurement_and_n
 
         with monkeypatch.context() as patch:
             patch.setattr(planar_fit, "_Residuals", Residuals)
-            there = planar_fit.allowed_ranges(ROBOT, DATA, constants)
+            there = planar_fit.allowed_ranges(ROBOT, DATA, constants)[0]
         left = np.ptp(there, axis=1) / np.ptp(found.ranges, axis=1)
         np.testing.assert_allclose(left, [*row["range_left"].values()], atol=0.04)
     assert max(ranked[0]["range_left"].values()) < 0.8
@@ -89,12 +89,12 @@ def test_measurements_of_known_effect(found):
 def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch):
     # Where a range would be found from rounded numbers it is nothing, and everything from scattered ones.
     monkeypatch.setattr(check, "_fitted", lambda robot, data: (data, np.zeros(3)))
-    monkeypatch.setattr(check, "allowed_ranges", lambda robot, data, best: np.full((3, 2), np.nan))
+    monkeypatch.setattr(check, "allowed_ranges", lambda robot, data, best: (np.full((3, 2), np.nan), None))
     seen = []
 
     def everything(robot, data, best):
         seen.append(data)
-        return np.tile([0.0, np.inf], (3, 1))
+        return np.tile([0.0, np.inf], (3, 1)), None
 
     monkeypatch.setattr(check, "confidence_intervals", everything)
     assert check.rounded(DATA.model_copy(update={"k1": 1.02 * DATA.k1})) == DATA
@@ -115,7 +115,7 @@ def test_data_that_leave_a_combination_open_bound_nothing(found):
     spring, mode = planar_fit.searched(robot, far)
     data = DATA.model_copy(update={"k1": spring, "components": tuple(mode), "between": far})
     assert np.isnan(
-        planar_fit.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar_fit.FREE]))
+        planar_fit.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar_fit.FREE]))[0]
     ).all()
     with pytest.raises(AnalysisError, match=r"free = .*: must be bounded by the data"):
         next_measurements(dataclasses.replace(found, given=robot, data=data), [])

@@ -62,23 +62,43 @@ def test_ranges_hold_the_constants_of_a_robot_of_another_size():
         k1=stiffness(round(point.value, 2)), k1_tolerance=stiffness(0.005), between=interval,
         components=np.round(mode, 2), component_tolerance=0.005,
     )  # fmt: skip
-    ranges = planar_fit.allowed_ranges(robot, rounded, true)
+    ranges = planar_fit.allowed_ranges(robot, rounded, true)[0]
     assert ((ranges[:, 0] <= true) & (true <= ranges[:, 1])).all()
+
+
+def test_a_range_that_the_bound_of_another_constant_cuts_says_so(monkeypatch):
+    """Within its own bounds the friction of a robot of three modules ends where the forward offset is at its bound."""
+    settings = ["body.modules=3", "body.length=6 cm", "body.mass=10 g", "springs.stiffness=0.000219 N*m/rad"]
+    settings += ["legs.forward_offset=4.4 mm", "legs.half_width=5.4 mm", "ground.friction=0.92 N*s/m"]
+    settings += ["gait.stride=6 mm", "gait.stance=0.2 s", "gait.swing=0.15 s", "gait.module_phase=90 deg"]
+    data = CriticalMode(
+        k1=4.9e-5, k1_tolerance=5e-7, between=(2.2e-5, 2.2e-4), components=(0.99, 0.15), component_tolerance=0.005
+    )
+    monkeypatch.setattr(planar, "_profile", lambda *_: xr.Dataset())
+    found = planar.identify_planar(ROBOT.set_from_text(settings), data)
+    texts = [each["allowed_text"] for each in found.as_json()["constants"].values()]
+    assert texts[0].endswith("(cut by the range searched)")
+    assert [each.endswith("(left open by the data)") for each in texts[1:]] == [True, True]
+    assert found.lines()[-1].strip() == "too few data for 3 constants: 2 independent numbers, as the mode has norm 1"
 
 
 def test_data_that_contradict_each_other_allow_nothing():
     data = CriticalMode(**{**dict(DATA), "components": DATA.components[::-1]})
-    ranges = planar_fit.allowed_ranges(ROBOT, data, BEST)
+    ranges = planar_fit.allowed_ranges(ROBOT, data, BEST)[0]
     assert np.isnan(ranges).all()
 
 
 def test_data_with_tiny_tolerances_have_a_profile_and_a_figure():
     """Residuals of all constants are large then, and not those of a robot without a pitchfork."""
-    data = CriticalMode(**{**dict(DATA), "component_tolerance": 1e-9})
+    mode = DATA.components / np.linalg.norm(DATA.components)
+    data = CriticalMode(**{**dict(DATA), "components": mode, "component_tolerance": 1e-9})
     found = planar.identify_planar(ROBOT, data, points=3)
     assert np.isnan(found.ranges).all()
     noted = found.estimates.identified("mine.toml").provenance
-    assert all(noted[path].endswith("; no constants meet all data") for path in planar_fit.FREE)
+    assert all(noted[path].endswith("90 %: none found; no constants meet all data") for path in planar_fit.FREE)
+    assert [each["interval_si"] for each in found.as_json()["constants"].values()] == [None] * 3
+    assert found.as_json()["combinations"] == []
+    assert "do not explain these residuals" in found.lines()[-1]
     assert np.isfinite(found.profile.friction).all()
     assert (found.profile.largest_residual > 1e4).all()
     assert identification.panel(found).draw(True).axes
@@ -91,6 +111,17 @@ def test_a_figure_is_drawn_without_any_prediction(found):
         {name: ("forward_offset", row) for name, row in rows.items()}, {"forward_offset": [0.0, 1.0, 2.0]}
     )
     assert identification.panel(replace(found, profile=profile)).draw(False).axes
+
+
+def test_the_axis_of_critical_springs_suits_those_of_a_small_robot(found):
+    names = "friction", "half_width", "largest_residual"
+    rows = dict.fromkeys(names, np.ones(3)) | {name: np.full(3, x) for name, x in planar._no_predictions({}).items()}
+    rows["critical_k1"] = 8.5e-4 * np.array([0.99, 1.0, 1.01])
+    profile = xr.Dataset(
+        {name: ("forward_offset", row) for name, row in rows.items()}, {"forward_offset": [0.0, 1.0, 2.0]}
+    )
+    low, high = identification.panel(replace(found, profile=profile)).draw(False).axes[3].get_ylim()
+    assert 8e-4 < low < 8.5e-4 < high < 9e-4
 
 
 def test_a_search_ends_among_robots_without_a_pitchfork(monkeypatch):
@@ -111,7 +142,7 @@ def test_a_search_ends_among_robots_without_a_pitchfork(monkeypatch):
 
     monkeypatch.setattr(planar_fit, "minimize", minimize)
     bounds = np.array(planar_fit._BOUNDS) * planar_fit.scale_of(ROBOT, DATA)[:, None]
-    np.testing.assert_array_equal(planar_fit.allowed_ranges(ROBOT, DATA, BEST), bounds)  # no end is found
+    np.testing.assert_array_equal(planar_fit.allowed_ranges(ROBOT, DATA, BEST)[0], bounds)  # no end is found
     assert len(tried) <= 7 * (planar_fit._MOST_LOST + 2)
 
 
@@ -120,7 +151,7 @@ def test_every_end_of_a_wide_valley_is_found(tolerance):
     """Linear constraints point among robots without a pitchfork, from which no search comes back."""
     data = CriticalMode(**{**dict(DATA), "component_tolerance": tolerance})
     best = planar_fit.best_of(planar_fit.fits_from_every_start(ROBOT, data))[0]
-    ends = planar_fit.confidence_intervals(ROBOT, data, best)
+    ends = planar_fit.confidence_intervals(ROBOT, data, best)[0]
     assert np.isfinite(ends).all()
     assert (ends[:, 0] < best).all()
     assert (best < ends[:, 1]).all()
@@ -153,12 +184,20 @@ def test_a_profile_ends_where_no_pitchfork_is_left(monkeypatch):
     ("field", "value"),
     [
         ("k1_tolerance", -1.0), ("k1", np.nan), ("component_tolerance", 0.0), ("between", (40.0, 4.0)),
-        ("components", (6.0,) * 5),
+        ("components", (6.0,) * 5), ("components", 0.93 * np.array(DATA.components)),
     ],
 )  # fmt: skip
 def test_data_that_are_none_are_refused(field, value):
     with pytest.raises((ParameterError, UnitError), match=field):
         CriticalMode(**{**dict(DATA), field: value})
+
+
+def test_a_norm_that_no_tolerance_explains_is_refused():
+    """Tolerances may be standard errors, of which the norm has one."""
+    with pytest.raises(ParameterError, match=r"components = .*: must have the norm 1, not 0.936"):
+        CriticalMode(**{**dict(DATA), "components": (0.2, 0.9, 0.16)})
+    mode = np.array(DATA.components) / np.linalg.norm(DATA.components)
+    assert CriticalMode(**{**dict(DATA), "components": (1.0 + 2.9 * DATA.component_tolerance) * mode})
 
 
 def test_a_mode_is_a_direction():
@@ -213,7 +252,7 @@ def test_newtons_method_finds_what_a_search_finds_with_its_derivatives():
 
 def test_an_interval_ends_where_chi_square_of_the_best_others_has_grown_by_its_level():
     scale, (best, off) = planar_fit.scale_of(ROBOT, DATA), planar_fit._fit(ROBOT, DATA, BEST)
-    for constant, ends in enumerate(planar_fit.confidence_intervals(ROBOT, DATA, best)):
+    for constant, ends in enumerate(planar_fit.confidence_intervals(ROBOT, DATA, best)[0]):
         others = [index for index in range(3) if index != constant]
         for end in ends:
 

@@ -205,6 +205,21 @@ def test_a_setting_of_a_walk_cannot_be_free(tmp_path):
         read_recordings(ROBOT, data("walk.csv", free={"springs.stiffness[0]": (0.2, 0.8)}), tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("ground.friction=60 N*s/m", "free[ground.friction]: must not be a setting of a walk too"),
+        ("springs.stiffness[9]=1 N*m/rad", "trajectory.0.settings springs.stiffness[9]: must be the index of a spring"),
+    ],
+)
+def test_a_fault_of_the_data_names_their_file(capsys, tmp_path, monkeypatch, setting, said):
+    monkeypatch.chdir(tmp_path)
+    walk = f'[[trajectory]]\nfile = "walk.csv"\nsettings = ["{setting}"]\n'
+    (tmp_path / "mine.toml").write_text(f'[free]\n"ground.friction" = ["100 N*s/m", "500 N*s/m"]\n{walk}')
+    assert main(["identify", "planar", "--data", "mine.toml"]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"error: mine.toml: {said}")
+
+
 def test_the_command_writes_walks_and_a_robot_with_its_intervals(capsys, tmp_path):
     (tmp_path / "walk.nc").write_bytes(netcdf(walked(SOFT, 9.0).isel(time=slice(20, None))))
     free = '[free]\n"ground.friction" = ["100 N*s/m", "500 N*s/m"]\n'

@@ -182,7 +182,8 @@ def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
     values = np.array([data[name].values for name in names])
     axes.set_ylabel(f"critical k₁ ({SPRING_UNIT})")
     if np.isfinite(values).any():
-        axes.set_ylim(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5)
+        room = 0.04 * np.nanmax(values)  # for the notes
+        axes.set_ylim(np.nanmin(values) - room, np.nanmax(values) + room)
 
 
 def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:

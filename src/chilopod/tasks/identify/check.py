@@ -78,8 +78,8 @@ def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progr
         rng = np.random.default_rng([seed, number])
         other, constants, exact = made_up(robot, data, rng)
         true.append(constants)
-        ranges.append(allowed_ranges(other, *_fitted(other, rounded(exact))))
-        intervals.append(confidence_intervals(other, *_fitted(other, scattered(exact, rng))))
+        ranges.append(allowed_ranges(other, *_fitted(other, rounded(exact)))[0])
+        intervals.append(confidence_intervals(other, *_fitted(other, scattered(exact, rng)))[0])
         progress((number + 1) / count, f"self-test, robot {number + 1} of {count}")
     return SelfTest(np.array(true), np.array(ranges), np.array(intervals))
 

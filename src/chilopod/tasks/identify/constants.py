@@ -167,6 +167,8 @@ class Estimates:
         constants); NaN where it is not known.
     remark
         Words that the provenance of each constant ends with.
+    cut
+        Mask of the constants whose interval ends where another constant is at the end of its range; by default none.
     """
 
     given: Robot
@@ -175,6 +177,7 @@ class Estimates:
     ends: Array
     spread: Array
     remark: str = ""
+    cut: Sequence[bool] = ()
 
     @property
     def best(self) -> Robot:
@@ -214,14 +217,15 @@ class Estimates:
         value, known = float(self.values[at]), ends.tolist() if np.isfinite(ends).all() else None
         found = {"value_si": value, "text": self._text(at, value, ends), "interval_si": known}
         none = "none found" if np.isnan(self.ends).all() else "no end found"
-        return {**found, "interval_text": self.between(at, ends) or none}
+        return {**found, "interval_text": self.between(at, ends, at in np.flatnonzero(self.cut)) or none}
 
-    def between(self, at: int, ends: Array) -> str:
+    def between(self, at: int, ends: Array, cut: bool) -> str:
         """Range of a constant in words, and whether the data or the search end it; nothing if it is NaN."""
         (low, high), half = self.free.limits(self.values)[at], float(np.sqrt(self.spread[at, at]))
         if not np.isfinite(ends).all():
             return ""
-        remark = " (cut by the range searched)" if min(ends[0] - low, high - ends[1]) <= _AT * (high - low) else ""
+        cut = cut or min(ends[0] - low, high - ends[1]) <= _AT * (high - low)
+        remark = " (cut by the range searched)" if cut else ""
         # At the end of a range the data ask for values beyond it.
         inside = min(self.values[at] - low, high - self.values[at]) > _AT * (high - low)
         remark = " (left open by the data)" if inside and half > _OPEN * (high - low) else remark

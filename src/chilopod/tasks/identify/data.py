@@ -24,7 +24,7 @@ from chilopod.units import Description, Quantity
 
 _STIFFNESS: Final = Quantity("N*m/rad", PAPER_UNIT)
 _SPRINGS: Final = replace(_STIFFNESS, each=True)
-_UNIT: Final = 0.1  # that rounding may leave of the norm of a mode
+_LEFT: Final = 3.0  # tolerances by which the norm of a mode may differ from 1: one in 300 with standard errors
 _LEAST_BEND: Final = 0.1  # rad in all, at the start of a walk
 
 
@@ -59,8 +59,9 @@ class CriticalMode(Description):
             allowed = f"two rising springs with k1 = {k1} between them; bare numbers are in N*m/rad"
             raise ParameterError("must hold k1", field="between", value=shown, allowed=allowed)
         mode = np.array(self.components)
-        if abs(np.linalg.norm(mode) - 1.0) > _UNIT:
-            said, allowed = "must have the norm 1", "cosines, one for each joint"
+        norm = float(np.linalg.norm(mode))
+        if abs(norm - 1.0) > max(_LEFT, mode.size**0.5) * self.component_tolerance:
+            said, allowed = f"must have the norm 1, not {norm:.3g}", "cosines, one for each joint"
             raise ParameterError(said, field="components", value=self.components, allowed=allowed)
         # A mode is a direction: both signs are the same mode.
         object.__setattr__(self, "components", tuple((mode * np.sign(mode.sum() or 1.0)).tolist()))

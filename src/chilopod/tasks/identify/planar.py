@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from scipy.stats import chi2
 
 from chilopod.analysis.parameters import ALL, PAPER_UNIT
 from chilopod.analysis.straight_walk import first_loss, pitchfork
@@ -31,6 +32,7 @@ from chilopod.tasks.identify.constants import Estimates, Identified
 from chilopod.tasks.identify.data import CriticalMode
 from chilopod.tasks.identify.planar_fit import (
     FREE,
+    NONE,
     allowed_ranges,
     best_of,
     confidence_intervals,
@@ -47,6 +49,7 @@ from chilopod.tasks.identify.planar_fit import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_LIKELY = 0.999  # part of data with standard errors that leave residuals which count as explained
 _BESIDE = 0.25  # of the range of the offset, by which the profile goes beyond it
 # Units of the profile, N*mm/deg where none is given.
 _UNITS = {"friction": "N*s/m", "half_width": "m", "largest_residual": "1", "coefficient": "1/rad^2", "verdict": ""}
@@ -60,9 +63,10 @@ class Identification(Identified):
     ``residuals`` are critical k1 and components of the mode less the data, in units of their tolerance, shape (N,), at
     the best constants, and ``preset_residuals`` those of the given robot. With ``ranges`` every datum is met within its
     tolerance; ``intervals`` are 90 % profiles of chi-square, if tolerances are standard errors: shape (3, 2), SI, NaN
-    where there is none. ``spread`` has squares of the halves of these for linear residuals, and products between them,
-    SI, shape (3, 3). ``profile`` has, over ``forward_offset``, the fitted constants, the largest residual, and
-    predictions of numbers that were not fitted.
+    where there is none. ``cut`` says of both whether the bounds of the search, of any constant, end them, shape (2, 3).
+    ``spread`` has squares of the halves of the intervals for linear residuals, and products between them, SI, shape
+    (3, 3), NaN where standard errors do not explain the residuals. ``profile`` has, over ``forward_offset``, the fitted
+    constants, the largest residual, and predictions of numbers that were not fitted.
     """
 
     given: Robot
@@ -73,6 +77,7 @@ class Identification(Identified):
     preset_residuals: Array
     ranges: Array
     intervals: Array
+    cut: Array
     spread: Array
     profile: xr.Dataset
 
@@ -94,7 +99,7 @@ class Identification(Identified):
         """The constants with their intervals."""
         free = free_constants(self.given, self.data)
         remark = "; no constants meet all data" if np.isnan(self.ranges).any() else ""
-        return Estimates(self.given, free, self.constants, self.intervals, self.spread, remark)
+        return Estimates(self.given, free, self.constants, self.intervals, self.spread, remark, tuple(self.cut[1]))
 
     def as_json(self) -> dict[str, Any]:
         """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
@@ -116,7 +121,8 @@ class Identification(Identified):
         return f"{self.given.name}: largest residual {largest:.2f}; 1 is what the tolerances of the data allow"
 
     def _columns(self) -> dict[str, list[str]]:
-        texts = [self.estimates.between(at, ends) or "nothing" for at, ends in enumerate(self.ranges)]
+        ranges = enumerate(zip(self.ranges, self.cut[0], strict=True))
+        texts = [self.estimates.between(at, ends, cut=is_cut) or "nothing" for at, (ends, is_cut) in ranges]
         return {"allowed by the data": texts}
 
     def _remarks(self) -> list[str]:
@@ -125,6 +131,10 @@ class Identification(Identified):
             names = ["k1", *(f"component {joint}" for joint in range(1, len(self.residuals)))]
             off = ", ".join(f"{name} {each:+.1f}" for name, each in zip(names, self.residuals, strict=True))
             said.append(f"no constants meet all data; the best are off by, in tolerances: {off}")
+        if np.isnan(self.spread).any():
+            said.append("no intervals: as standard errors the tolerances do not explain these residuals")
+        if (count := len(self.data.components)) < len(FREE):
+            said.append(f"too few data for {len(FREE)} constants: {count} independent numbers, as the mode has norm 1")
         return said
 
     def plot(self, axes: Axes | None = None) -> Axes:
@@ -148,8 +158,10 @@ def identify_planar(
     or no pitchfork with any constants."""
     fits = fits_from_every_start(robot, data, progress)
     best = best_of(fits)
-    ranges = allowed_ranges(robot, data, best[0])
+    ranges, cut = allowed_ranges(robot, data, best[0])
     progress(0.4, "ranges")
+    explained = (best[1] ** 2).sum() <= chi2.ppf(_LIKELY, max(best[1].size - len(FREE), 1))
+    intervals, also_cut = confidence_intervals(robot, data, best[0]) if explained else NONE
     return Identification(
         given=robot,
         data=data,
@@ -158,8 +170,9 @@ def identify_planar(
         starts=np.array([fit[0] for fit in fits]),
         preset_residuals=residuals(robot, data),
         ranges=ranges,
-        intervals=confidence_intervals(robot, data, best[0]),
-        spread=spread(robot, data, best[0]),
+        intervals=intervals,
+        cut=np.array([cut, also_cut]),
+        spread=(1.0 if explained else np.nan) * spread(robot, data, best[0]),
         profile=_profile(robot, data, best[0], ranges[2], points, variants, progress),
     )
 

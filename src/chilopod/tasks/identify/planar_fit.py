@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
 from scipy.stats import chi2
 
@@ -44,6 +45,12 @@ _MOST, _FOUND = 12, 1e-12  # steps of Newton's method for a critical spring, and
 _FARTHEST = 0.3  # relative step, and distance of the multiplier, at which it gives up
 _MOST_LOST = 20  # robots without a pitchfork, in one search for an end
 
+
+Ends = tuple[Array, NDArray[np.bool_]]
+"""Least and largest value of each constant in a set of constants, shape (3, 2), SI, and whether the bounds of the
+search, of this or another constant, end it there, shape (3,)."""
+
+NONE: Ends = np.full((len(FREE), 2), np.nan), np.zeros(len(FREE), dtype=bool)
 
 Critical = tuple[float, Array]
 """Critical k1, N*m/rad, and joint angles of the mode, of unit norm and positive sum, shape (N-1,)."""
@@ -183,38 +190,36 @@ def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
     return np.append((found[0] - data.k1) / data.k1_tolerance, components)
 
 
-def allowed_ranges(robot: Robot, data: CriticalMode, best: Array) -> Array:
-    """Projections of the set {max |residual| <= 1}, shape (3, 2), SI; NaN if it is empty. Where no end is found, the
-    search ends the range."""
+def allowed_ranges(robot: Robot, data: CriticalMode, best: Array) -> Ends:
+    """Projections of the set {max |residual| <= 1}; NaN if it is empty. Where no end is found, the search ends the
+    range."""
 
     def largest(constants: Array) -> float:
         return float(np.abs(residuals(with_constants(robot, constants), data)).max())
 
     start = min(best, least_largest(robot, data, best, fixed=()), key=largest)
     if largest(start) > 1.0 + _ROOM:
-        return np.full((len(FREE), 2), np.nan)
-    found = _ends(robot, data, start, lambda off: 1.0 - _both_signs(off), lambda _, slopes: -_both_signs(slopes))
-    return np.where(np.isnan(found), np.array(_BOUNDS) * scale_of(robot, data)[:, None], found)
+        return NONE
+    found, cut = _ends(robot, data, start, lambda off: 1.0 - _both_signs(off), lambda _, slopes: -_both_signs(slopes))
+    return np.where(np.isnan(found), np.array(_BOUNDS) * scale_of(robot, data)[:, None], found), cut
 
 
-def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Array:
-    """Least and largest value of each constant where chi-square is at most so much above its least value as the level
-    :data:`CONFIDENCE` of one constant allows, shape (3, 2), SI; NaN where no such end is found, as where the data leave
-    a combination of constants open."""
+def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Ends:
+    """Ends of the set where chi-square is at most so much above its least value as the level :data:`CONFIDENCE` of one
+    constant allows; NaN where no such end is found, as where the data leave a combination of constants open."""
     off = _Residuals(robot, data)
     here = best / scale_of(robot, data)
     if not determined(off.jacobian(here)):
-        return np.full((len(FREE), 2), np.nan)
+        return NONE
     most = float((off(here) ** 2).sum() + _RISE)
     return _ends(robot, data, best, lambda off: most - np.sum(off**2), lambda off, slopes: -2.0 * off @ slopes)
 
 
 def _ends(
     robot: Robot, data: CriticalMode, start: Array, room: Callable[[Array], Any], slope: Callable[[Array, Array], Array]
-) -> Array:
-    """Least and largest value of each constant in a set that contains some constants, shape (3, 2), SI; NaN where none
-    is found. In the set no component of ``room(residuals)`` is negative; ``slope(residuals, their derivatives)`` is its
-    derivative.
+) -> Ends:
+    """Ends of a set that contains some constants; NaN where none is found. In the set no component of
+    ``room(residuals)`` is negative; ``slope(residuals, their derivatives)`` is its derivative.
 
     The set is a curved valley, so each end is searched from that of the ends before which is nearest to it too. The
     residuals at an end are searched anew. It lies on the edge of the set or of the search.
@@ -234,7 +239,8 @@ def _ends(
             at_limit = np.abs(found[constant] - limits[constant]).min() <= _STEP  # to rounding
             if left >= -_ROOM and (left <= _EDGE or at_limit):
                 ends[constant, side] = found
-    return np.array([ends[i, :, i] for i in range(len(FREE))]) * scale[:, None]
+    cut = (np.abs(ends[..., None] - limits) <= _STEP).any(axis=(1, 2, 3))
+    return np.array([ends[i, :, i] for i in range(len(FREE))]) * scale[:, None], cut
 
 
 def _both_signs(off: Array) -> Array:
