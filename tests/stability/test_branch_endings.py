@@ -233,6 +233,38 @@ def test_time_0_of_an_autonomous_orbit_is_moved_away_from_an_event():
     assert again.period == pytest.approx(branch.points[-1].period, rel=1e-9)
 
 
+def test_time_0_is_moved_also_where_it_comes_to_lie_just_after_an_event():
+    """A resonate-and-fire neuron: its reset comes to lie within rounding of the end of a return."""
+    fires = Event(lambda t, x, i: x[1] - 1.0, lambda t, x, i: [0.3 * x[0], -0.6], 1)
+
+    def family(i):
+        def rhs(t, x, i):
+            return [-0.1 * x[0] - x[1] + i, x[0] - 0.1 * x[1]]
+
+        return from_rhs(rhs, 2, None, args=(i,), events=[fires], guess_period=0.82)
+
+    branch = follow(family, [0.8576316, -0.59838556], (2.71, 2.8))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert any("time 0 was moved along the orbit, away from an event" in remark for remark in branch.remarks)
+
+
+@pytest.mark.parametrize("guessed", [1.580038384587912, 2.0])
+def test_a_branch_begins_at_an_impact(guessed):
+    """A leaky neuron with adaptation, just after it fires: the orbit begins further along the motion."""
+    fires = Event(lambda t, x, i: x[0] - 1.0, lambda t, x, i: [0.0, x[1] + 0.2], 1)
+
+    def family(i):
+        return from_rhs(
+            lambda t, x, i: [i - x[0] - x[1], -0.1 * x[1]], 2, None, args=(i,), events=[fires], guess_period=guessed
+        )
+
+    start = begin(family, 2.5, [0.0, 1.3684243358403948])
+    assert start.orbit[0] > 0.1
+    branch = follow(family, start, (2.5, 2.6))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert branch.remarks == ()
+
+
 def test_the_end_of_a_map_is_no_event():
     """Images are taken at whole times, and so at time 0."""
 
