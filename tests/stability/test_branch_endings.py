@@ -16,6 +16,7 @@ from chilopod.stability import (
     from_rhs,
 )
 from chilopod.stability.returns import jumps_at_ends
+from chilopod.stability.search.samples import Samples
 
 
 def of_map(function, dimension, size=1.0):
@@ -231,6 +232,66 @@ def test_time_0_of_an_autonomous_orbit_is_moved_away_from_an_event():
     assert any("time 0 was moved along the orbit, away from an event" in remark for remark in branch.remarks)
     again = find_orbit(family(0.6), branch.points[-1].orbit)
     assert again.period == pytest.approx(branch.points[-1].period, rel=1e-9)
+
+
+def test_time_0_is_moved_also_where_it_comes_to_lie_just_after_an_event():
+    """A resonate-and-fire neuron: its reset comes to lie within rounding of the end of a return."""
+    fires = Event(lambda t, x, i: x[1] - 1.0, lambda t, x, i: [0.3 * x[0], -0.6], 1)
+
+    def family(i):
+        def rhs(t, x, i):
+            return [-0.1 * x[0] - x[1] + i, x[0] - 0.1 * x[1]]
+
+        return from_rhs(rhs, 2, None, args=(i,), events=[fires], guess_period=0.82)
+
+    branch = follow(family, [0.8576316, -0.59838556], (2.71, 2.8))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert any("time 0 was moved along the orbit, away from an event" in remark for remark in branch.remarks)
+
+
+@pytest.mark.parametrize("guessed", [1.580038384587912, 2.0])
+def test_a_branch_begins_at_an_impact(guessed):
+    """A leaky neuron with adaptation, just after it fires: the orbit begins further along the motion."""
+    fires = Event(lambda t, x, i: x[0] - 1.0, lambda t, x, i: [0.0, x[1] + 0.2], 1)
+
+    def family(i):
+        return from_rhs(
+            lambda t, x, i: [i - x[0] - x[1], -0.1 * x[1]], 2, None, args=(i,), events=[fires], guess_period=guessed
+        )
+
+    start = begin(family, 2.5, [0.0, 1.3684243358403948])
+    assert start.orbit[0] > 0.1
+    branch = follow(family, start, (2.5, 2.6))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert branch.remarks == ()
+
+
+def chattering(current, kick):
+    """Izhikevich's neuron, which fires several times in a row."""
+    fires = Event(lambda t, x, i, d: x[0] - 30.0, lambda t, x, i, d: [-50.0, x[1] + d], 1)
+
+    def rhs(t, x, i, d):
+        return [0.04 * x[0] ** 2 + 5.0 * x[0] + 140.0 - x[1] + i, 0.02 * (0.2 * x[0] - x[1])]
+
+    return from_rhs(rhs, 2, None, args=(current, kick), events=[fires], guess_period=66.4)
+
+
+@pytest.mark.parametrize("high", [0.72, 1.5])
+def test_a_step_does_not_land_on_an_orbit_of_another_period(high):
+    """Five spikes up to a fold at 0.712744; orbits with four have nearly the same states between their rows."""
+
+    def family(s):
+        return chattering(10.0 - s, 2.0)
+
+    branch = follow(family, begin(family, 0.7101, [-69.1237, -5.5106]), (0.0, high), points=1)
+    assert branch.points[-1].value < 0.71275
+    assert branch.points[-1].period > branch.points[0].period > 66.0
+
+
+def test_a_search_does_not_go_on_along_an_orbit_of_another_period():
+    """The orbit ends in a fold at 2.056806395."""
+    samples = Samples(lambda d: chattering(10.0, d), [-60.0, -0.2], 2.056, 2.058, 1000, np.inf)
+    assert 2.0568 < samples.end < 2.056806395
 
 
 def test_the_end_of_a_map_is_no_event():

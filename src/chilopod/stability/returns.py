@@ -44,6 +44,8 @@ _BENT = 0.5  # largest part of a correction of the time that the change of the s
 _LAST_MOVE = 1e-10  # correction of the crossing's time, relative to a return, whose own error is its square
 _END, _NEAR_END = 1e-4, 1e-3  # parts of a return, at its ends
 _LEAST_JUMP, _CLOSER = 1e-3, 30  # least jump of the derivative there, relative to it, and halvings to its place
+_JUST_PAST = 1e-3  # part of these parts beyond the end in which a jump is sought too
+_HIDDEN = 1e-3  # change in both halves, relative to that in the whole, that shows a jump at the middle, within rounding
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _NEIGHBOURS = 1e-10 * np.cos(np.arange(9.0))  # uneven distances of neighbours, relative to the sizes of the states
@@ -304,16 +306,24 @@ def jumps_at_ends(system: SystemLike, x: Array, duration: float, part: float = _
 
     def jump(low: float, high: float) -> float:
         there = at(x, 0.0, low)
+        most = change(there, low, high)
         for _ in range(_CLOSER):
+            if most <= _LEAST_JUMP:
+                break
             middle = 0.5 * (low + high)
             between = at(there, low, middle)
             before, after = change(there, low, middle), change(between, middle, high)
+            if max(before, after) < _HIDDEN * min(1.0, most):
+                break
             low, high, there = (low, middle, there) if before > after else (middle, high, between)
-        return max(before, after)
+            most = max(before, after)
+        return most
 
     if any(change(at(x, 0.0, each), each, each + part) == 0.0 for each in _PARTS):
         return False  # a map has no parts, but over several periods is applied within them too
-    return max(jump(0.0, part), jump(1.0 - part, 1.0)) > _LEAST_JUMP
+    # Round-off decides whether a state at a jump is before it or after it.
+    end = 1.0 + _JUST_PAST * part * is_autonomous(system)
+    return max(jump(0.0, part), jump(1.0 - part, end)) > _LEAST_JUMP
 
 
 def starts(system: SystemLike, x: Array, duration: float) -> Iterator[Array]:

@@ -9,7 +9,7 @@ confined between two places, which are at most a fifth of a step apart, is misse
 
 A determinant that changes its sign without a branch point shows that a step landed on another curve. So do one that
 was to change it and does not, a multiplier that only touches +1, and orbits that are missing within a step, unless
-shorter steps confirm them.
+shorter steps confirm them. A period that jumps within a step shows it too.
 """
 
 from __future__ import annotations
@@ -43,6 +43,8 @@ _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a 
 _DIP = 0.3  # the same, relative to the larger one at the ends of the step
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
 _SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
+_FORESEEN = 5e-3  # error of the predicted period, relative to it, that needs no other orbits within the step
+_ROUGH = 0.03  # error of a polynomial through the period, relative to its change, that shows a jump
 _TELLING = 1e-3  # step, in units, that is short enough to tell a branch from another one near by
 
 
@@ -65,6 +67,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
     foreseen = leaving or _sign(predicted(step.start, step.size).matrix) == _sign(step.matrix)
     if not foreseen and not flipped and step.size > _TELLING:
         raise AnalysisError("the step may have landed on another curve", field="step")
+    _check_period(within)
     crossed = _crossed_within(within) if closely else _crossed_between_ends(within, turned)
     if not (crossed or turned or flipped):
         return Inspected()
@@ -227,14 +230,31 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
     return [(block, crossings_in(block, matrices, search)) for block in within.blocks]
 
 
+def _check_period(within: Within) -> None:
+    """AnalysisError if the period jumps within a step: on its section another orbit may be near by."""
+    start = within.step.start
+    if start.section is None:
+        return
+    first, last = start.section.duration, within.step.found.image.duration
+    if abs(last - first * (1.0 + start.lengthening * float(np.linalg.norm(within.step.moved)))) <= _FORESEEN * first:
+        return
+    for parts in (FEW_PLACES, PLACES):
+        times = np.array([[within.near(place)[1]] for place in _at(within, parts)])
+        if float(interpolated(times, parts)[1][0]) <= _ROUGH * float(np.ptp(times)):
+            return
+    raise AnalysisError("the period jumps within the step", field="step")
+
+
+def _at(within: Within, parts: Array) -> list[float]:
+    """Places within a step at parts of it from -1 to 1."""
+    low, size = within.low, within.step.size
+    return np.where(parts == 1.0, size, low + 0.5 * (1.0 + parts) * (size - low)).tolist()
+
+
 def _crossed_within(within: Within) -> bool:
     """True unless polynomials through the test functions at the places, few or all, stay clear of zero."""
-    low, size = within.low, within.step.size
-    known: dict[float, Array] = {}
     for parts in (FEW_PLACES, PLACES):
-        places = np.where(parts == 1.0, size, low + 0.5 * (1.0 + parts) * (size - low)).tolist()
-        known |= {place: within.near_jacobian(place) for place in places if place not in known}
-        nu = np.linalg.eigvals(np.array([known[place] for place in places])).astype(np.complex128)
+        nu = np.linalg.eigvals(np.array([within.near(place)[0] for place in _at(within, parts)])).astype(np.complex128)
         with np.errstate(all="ignore"):  # test functions, which change sign at the events
             tests = np.stack([factors(nu, event).prod(axis=1).real for event in CircleEvent], axis=1)
         outside = (np.abs(nu) > 1.0).sum(axis=1)

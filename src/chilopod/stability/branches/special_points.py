@@ -47,6 +47,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         super().__init__(closer, step)
         self.curve = curve
         self.low = _LEAVING * step.size if step.start.leaving else 0.0
+        self._near: dict[float, tuple[Array, float]] = {}
 
     @functools.cached_property
     def blocks(self) -> tuple[Block | None, ...]:
@@ -71,11 +72,20 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         sizes = self.curve.state_units
         return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
 
-    def near_jacobian(self, place: float) -> Array:
-        """Derivative at a place, by the cubic through the ends of the step, corrected until it is close enough."""
+    def near(self, place: float) -> tuple[Array, float]:
+        """Derivative and duration of the return at a place, computed once, by the cubic through the ends of the step,
+        corrected until it is close enough."""
+        if place not in self._near:
+            if place == 0.0:
+                section = self.step.start.section
+                self._near[place] = self.jacobian(place), np.nan if section is None else section.duration
+            else:
+                image = self.step.found.image if place == self.step.size else self._near_image(place)
+                self._near[place] = image.jacobian, image.duration
+        return self._near[place]
+
+    def _near_image(self, place: float) -> ReturnMap:
         step, start = self.step, self.step.start
-        if place in (0.0, step.size):
-            return self.jacobian(place)
         guess, matrix = step.between(place)
         matrix[-1], moved = start.tangent, guess
         try:
@@ -85,7 +95,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
                 off = np.append((image.state - x) / self.curve.state_units, 0.0)
                 correction = np.linalg.solve(matrix, off)
                 if float(np.abs(correction).max()) <= _OFF * step.size:
-                    return image.jacobian
+                    return image
                 moved = moved - correction
                 if not float(np.linalg.norm(moved - guess)) <= AWAY * step.size:
                     break
@@ -94,7 +104,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         exact = self.at(place)
         if not float(np.linalg.norm(exact.moved - guess)) <= AWAY * step.size:
             raise AnalysisError("the curve is not smooth within the step", field="step")
-        return exact.found.image.jacobian
+        return exact.found.image
 
     def ordinary(self, place: float) -> BranchPoint:
         """An ordinary point of the branch."""

@@ -179,7 +179,7 @@ class Samples:
             found = self._sampled(value, guess := self._predicted(around, value), around[0])
             passes = found.passes(around[0]) and found.passes(around[1])
             other = not self._on_its_side(around, guess, found) or (passes and not self._goes_through(around[0], found))
-            if other or not self._continues(around[0], guess, found):
+            if other or not self._continues(around, guess, found):
                 raise AnalysisError("is another orbit", field="orbit")
             return found
         except AnalysisError:
@@ -287,7 +287,7 @@ class Samples:
                     not self.jumped(found.orbit, guess)
                     and (not sided or self._on_its_side(recent, guess, found))
                     and (not passes or self._goes_through(last, found))
-                    and self._continues(last, guess, found, _SAME if passes else _SMALL)
+                    and self._continues(recent, guess, found, _SAME if passes else _SMALL)
                     and not self._turns_back(path[-2:], found)
                 )
             except SpentError:
@@ -330,12 +330,14 @@ class Samples:
         ahead = [float(through(places[:count], sides[:count], found.value)) for count in (2, 3)]
         return max(abs(side - found.side) for side in ahead) <= abs(found.side)
 
-    def _continues(self, last: Sample, guess: Array, found: Sample, small: float = _SMALL) -> bool:
-        """True if an orbit was predicted, or another lies about halfway between it and the last one: in a fold at the
-        square root of a half, while towards another branch a jump remains."""
+    def _continues(self, samples: list[Sample], guess: Array, found: Sample, small: float = _SMALL) -> bool:
+        """True if an orbit was predicted by samples, or another lies about halfway between it and the first of them: in
+        a fold at the square root of a half, while towards another branch a jump remains."""
+        last = samples[0]
         change = found.orbit - last.orbit
         size = self.size * float((np.abs(change) / self.size).max())
-        if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, small * self.size)).all():
+        near = (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, small * self.size)).all()
+        if near and _in_time(samples, found):
             return True
         try:
             middle = self._sampled(0.5 * (last.value + found.value), last.orbit + 0.5 * change, last)
@@ -343,6 +345,7 @@ class Samples:
             return False
         connected = bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
         connected = connected and self._on_its_side([last, found], last.orbit + 0.5 * change, middle)
+        connected = connected and _in_time([last, found], middle)
         if connected and middle.value not in self._by_value:
             self._keep(middle)  # no orbit is left out of the counts
         return connected
@@ -361,6 +364,14 @@ class Samples:
                 return bool(np.isfinite(before))
             left, right = (left, middle) if middle.passes(left) else (middle, right)
         return True
+
+
+def _in_time(samples: list[Sample], found: Sample) -> bool:
+    """True if the period of an orbit is the one predicted by samples: at time 0 another orbit may be near by."""
+    times = np.array([each.image.duration for each in samples])
+    places, duration = np.array([each.value for each in samples]), found.image.duration
+    off = min(abs(float(through(places[:count], times[:count], found.value)) - duration) for count in (2, 3))
+    return off <= max(_FORESEEN * float(np.ptp([*times[:2], duration])), _SMALL * duration)
 
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
