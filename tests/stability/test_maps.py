@@ -55,6 +55,7 @@ def test_the_derivative_is_within_its_bound():
     [
         (lambda: from_map(3, 1), r"image = 3: must be a function"),
         (lambda: from_map(lambda x: x, 0), r"dimension = 0: must be a whole number"),
+        (lambda: multipliers(logistic(3.2), [0.5], leading=2), r"leading = 2: is too large; allowed: 1$"),
         (lambda: multipliers(from_map(lambda x: x, 1), [0.5]), r"image = 'ndarray': must return a pair"),
         (lambda: multipliers(from_map(lambda x: (x, x), 1), [0.5]), r"image: returns an array of shape \(1,\)"),
         (lambda: switch(logistic, 3), r"point = 3: must be a located point"),
@@ -177,7 +178,7 @@ def test_a_wrong_derivative_is_refused_whatever_came_before():
         locate(wrong, (0.1, 0.8))
     with pytest.raises(ParameterError, match=refused):
         multipliers(wrong(0.2))
-    with pytest.raises(ParameterError, match=refused):  # each of several systems
+    with pytest.raises(ParameterError, match=r"^systems\[2\]\.image = "):  # each of several systems
         sweep([right(0.2), right(0.3), wrong(0.2)])
     branch = follow(_henon(1.7, wrong_from=0.25), None, (0.1, 0.8))  # at every point
     assert branch.points[-1].value == pytest.approx(0.25, abs=1e-3)

@@ -300,7 +300,7 @@ def from_map(
     ----------
     image
         Function ``image(x)`` -> state after one iteration, shape (n,), and its derivative by x, shape (n, n); refused
-        if that contradicts differences of the states at the first point.
+        if that contradicts differences of the states at the first point or at one with error bounds.
     dimension
         Number of states n.
     orbit, spatial_symmetry, scale
