@@ -215,7 +215,7 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
     with Deadline(seconds):
         if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
             with ThreadPoolExecutor(cores()) as threads:  # which share the time limit
-                jobs = [threads.submit(copy_context().run, _at, *each) for each in enumerate(systems)]
+                jobs = [threads.submit(copy_context().run, _at, i, each) for i, each in enumerate(systems)]
                 return [job.result() for job in jobs]
         if any(is_autonomous(system) or not offers(system, "flow_many") for system in systems):
             return [_at(*each) for each in enumerate(systems)]
