@@ -407,3 +407,15 @@ def test_bounds_along_a_doubled_branch_do_not_grow_with_the_width_of_the_interva
     twice = from_rhs(lambda t, x: [x[1], -0.4 * x[1] - np.sin(x[0]) + 0.3 + force * np.cos(0.7 * t)], 2, 2.0 * period)
     own = np.abs(multipliers(twice, last.orbit).values)
     assert np.abs(np.sort(np.abs(last.multipliers)) - np.sort(own)).max() < last.error_bound < 1e-2
+
+
+def test_the_size_of_a_rest_is_where_a_bounded_nonlinearity_acts():
+    """Far from x = 0 a pendulum rotates freely, so its return is nearly linear again, and takes many steps."""
+
+    def family(a):
+        return from_rhs(lambda t, x: [x[1], -0.1 * x[1] + (0.05 - a * np.cos(t)) * np.sin(x[0])], 2, 2.0 * np.pi)
+
+    branch = follow(family, [0.0, 0.0], (0.01, 0.6))
+    assert [point.special for point in branch.special_points] == [Kind.PITCHFORK, Kind.PERIOD_DOUBLING]
+    assert branch.special_points[0].value == pytest.approx(0.3245234776, abs=1e-9)  # that of `locate`
+    assert ((branch.units[:-1] > 0.1) & (branch.units[:-1] < 5.0)).all()

@@ -194,3 +194,24 @@ def test_a_flow_of_wrong_shapes():
     )
     with pytest.raises(AnalysisError, match="flow_tangents: gives shapes"):
         leading_multipliers(tangent_map(system, np.zeros(100)), np.ones(100), 3)
+
+
+def test_one_more_than_a_subspace_resolves():
+    """Advection and diffusion, u_t = D u_xx - u_x + 11 u: the eigenvalues of its matrix are known, its eigenvectors lie
+    almost along each other."""
+    n, diffusion = 120, 0.02
+    back, ahead = diffusion * (n + 1) ** 2 + 0.5 * (n + 1), diffusion * (n + 1) ** 2 - 0.5 * (n + 1)
+    decay, units = 11.0 - back - ahead, np.sqrt(back / ahead) ** np.arange(n)
+    beside = np.diag([np.sqrt(back * ahead)] * (n - 1), 1)
+
+    def moves(t0, t1):
+        return units[:, None] * expm((t1 - t0) * (beside + beside.T + decay * np.eye(n))) / units
+
+    def flow_tangents(x, directions, t0, t1):
+        return moves(t0, t1) @ x, moves(t0, t1) @ directions
+
+    found = multipliers(systems.linear(moves, n, flow_tangents=flow_tangents, orbit=np.zeros(n)), leading=8)
+    right = np.exp(decay + 2.0 * np.sqrt(back * ahead) * np.cos(np.pi * np.arange(1, 9) / (n + 1)))
+    assert found.stable
+    assert (np.abs(found.values - right) <= found.error_bounds).all()
+    np.testing.assert_allclose(found.values, right, atol=1e-6)  # the own bounds of matrix exponentials are wide

@@ -55,6 +55,7 @@ def test_the_derivative_is_within_its_bound():
     [
         (lambda: from_map(3, 1), r"image = 3: must be a function"),
         (lambda: from_map(lambda x: x, 0), r"dimension = 0: must be a whole number"),
+        (lambda: multipliers(logistic(3.2), [0.5], leading=2), r"leading = 2: is too large; allowed: 1$"),
         (lambda: multipliers(from_map(lambda x: x, 1), [0.5]), r"image = 'ndarray': must return a pair"),
         (lambda: multipliers(from_map(lambda x: (x, x), 1), [0.5]), r"image: returns an array of shape \(1,\)"),
         (lambda: switch(logistic, 3), r"point = 3: must be a located point"),
@@ -131,7 +132,7 @@ def test_a_multiplier_that_only_touches_the_circle_is_a_remark(family):
     assert float(remark.split()[1]) == pytest.approx(0.5, abs=1e-5)
 
 
-def test_a_wrong_derivative_is_refused_once_and_in_one_line():
+def test_a_wrong_derivative_is_refused_in_one_line():
     calls = []
 
     def henon(x, entry=0.3):
@@ -149,8 +150,39 @@ def test_a_wrong_derivative_is_refused_once_and_in_one_line():
     system = from_map(henon, 2)
     calls.clear()
     assert system.flow(np.zeros(2), 0.0, 1.0)[1][0, 1] == 1.0
-    system.flow(np.zeros(2), 0.0, 1.0)
-    assert len(calls) == 4  # two for the check, which is made once
+    assert len(calls) == 3  # two for the check
+
+
+def _henon(slope, wrong_from=0.0):
+    """Henon maps over their first parameter, whose derivative has a factor ``slope`` from a value on."""
+
+    def family(a):
+        factor = slope if a >= wrong_from else 2.0
+        start = 0.5 * (math.sqrt(0.49 + 4.0 * a) - 0.7) / a
+        return from_map(
+            lambda x: ([1.0 - a * x[0] ** 2 + x[1], 0.3 * x[0]], [[-factor * a * x[0], 1.0], [0.3, 0.0]]),
+            2,
+            orbit=[start, 0.3 * start],
+        )
+
+    return family
+
+
+def test_a_wrong_derivative_is_refused_whatever_came_before():
+    """The check has no memory between calls: maps of one family share their code."""
+    right, wrong = _henon(2.0), _henon(1.7)
+    (point,) = locate(right, (0.1, 0.8))
+    assert point.value == pytest.approx(0.3675, abs=1e-12)
+    refused = r"^image = .*: derivative entry \(0, 0\) is .*, but a difference gives"
+    with pytest.raises(ParameterError, match=refused):
+        locate(wrong, (0.1, 0.8))
+    with pytest.raises(ParameterError, match=refused):
+        multipliers(wrong(0.2))
+    with pytest.raises(ParameterError, match=r"^systems\[2\]\.image = "):  # each of several systems
+        sweep([right(0.2), right(0.3), wrong(0.2)])
+    branch = follow(_henon(1.7, wrong_from=0.25), None, (0.1, 0.8))  # at every point
+    assert branch.points[-1].value == pytest.approx(0.25, abs=1e-3)
+    assert "derivative entry (0, 0)" in branch.reason
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,8 @@ def checked_count(field: str, value: object, most: int) -> int:
     except TypeError:
         count = 0
     if not 1 <= count <= most:
-        raise ParameterError("must be a whole number", field=field, value=value, allowed=f"1 to {most}")
+        said = "is too large" if count > most else "must be a whole number"
+        raise ParameterError(said, field=field, value=value, allowed=f"1 to {most}" if most > 1 else "1")
     return count
 
 

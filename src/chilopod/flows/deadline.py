@@ -18,7 +18,7 @@ from chilopod.errors import ChilopodError, ParameterError
 from chilopod.frozen import Array
 
 _LIMIT: ContextVar[Deadline | None] = ContextVar("limit", default=None)
-_SAID: ContextVar[set[str] | None] = ContextVar("said", default=None)
+_SAID: ContextVar[set[object] | None] = ContextVar("said", default=None)
 MORE = 0.3
 """Time, s, after the limit of a search in which errors of known matrices are still computed."""
 _PACKAGE = __name__.partition(".")[0]
@@ -38,7 +38,7 @@ class Deadline:
             raise ParameterError("must be a number of seconds", field="seconds", value=seconds, allowed="0 or more")
         self._ends = _now() + (seconds if seconds < threading.TIMEOUT_MAX else math.inf)
         self._stop = np.zeros(1)
-        self._said: set[str] = set()
+        self._said: set[object] = set()
         self._left = contextlib.ExitStack()
         self._timer: threading.Timer | None = None
 
@@ -120,13 +120,20 @@ def check(more: float = 0.0) -> None:
         raise over()
 
 
+def is_first(what: object) -> bool:
+    """True the first time within the outermost limit, as within a call of an analysis, and always outside of limits."""
+    said = _SAID.get()
+    if said is None:
+        return True
+    known = what in said
+    said.add(what)
+    return not known
+
+
 def warn(message: str, category: type[Warning]) -> None:
     """Show a warning at the user's line that led to it, once within the outermost limit."""
-    said = _SAID.get()
-    if said is not None:
-        if message in said:
-            return
-        said.add(message)
+    if not is_first(message):
+        return
     level = 2
     with contextlib.suppress(ValueError):  # beyond the first frame
         while sys._getframe(level - 1).f_globals.get("__name__", "").startswith(f"{_PACKAGE}."):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.cores import cores
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
@@ -176,12 +177,14 @@ def multipliers(
             return _multipliers(find_orbit(system, orbit))
         check_system(system)
         count = checked_count("leading", leading, max(1, system.dimension - (system.period is None)))
+        result = None
         if offers(system, "flow_tangents") and system.dimension >= LARGE:
             image, size = find_large_orbit(system, orbit)
-            found, error, following = leading_multipliers(image, size, count)
-            result = full_period(found, error, image.returns, image.point, image.returns * image.duration)
-            next_one = following**image.returns
-        else:
+            with suppress(ContractionError):
+                found, error, following = leading_multipliers(image, size, count)
+                result = full_period(found, error, image.returns, image.point, image.returns * image.duration)
+                next_one = following**image.returns
+        if result is None:
             result = _multipliers(find_orbit(system, orbit))
             half, moduli = result.half_period, np.abs(result.values)
             count = whole_pairs(result.values if half is None else half, count)
@@ -195,7 +198,9 @@ def multipliers(
     which = f"{result.values.size} multipliers of largest modulus were" if several else "largest multiplier was"
     deciding = "they decide" if several else "it decides"
     decide = "" if result.stable is None else f"{deciding} whether the orbit is stable; "
-    remark = f"only the {which} computed; {decide}the next one has a modulus of about {next_one:.3g}"
+    least = float(result.error_bounds.max())
+    modulus = f"of about {next_one:.3g}" if next_one > least else f"below about {least:.1g}"
+    remark = f"only the {which} computed; {decide}the next one has a modulus {modulus}"
     return replace(result, remarks=(remark,))
 
 
@@ -210,13 +215,22 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
     with Deadline(seconds):
         if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
             with ThreadPoolExecutor(cores()) as threads:  # which share the time limit
-                jobs = [threads.submit(copy_context().run, multipliers, system) for system in systems]
+                jobs = [threads.submit(copy_context().run, _at, i, each) for i, each in enumerate(systems)]
                 return [job.result() for job in jobs]
-        if any(is_autonomous(system) for system in systems):
-            return [multipliers(system) for system in systems]
+        if any(is_autonomous(system) or not offers(system, "flow_many") for system in systems):
+            return [_at(*each) for each in enumerate(systems)]
         states = [known_state(system) for system in systems]
         known = zip(systems, states, return_maps(systems, states), strict=True)
         return [_multipliers(from_known(system, state, image=image)) for system, state, image in known]
+
+
+def _at(index: int, system: SystemLike) -> Multipliers:
+    """Multipliers of one of several systems, whose index an error names."""
+    try:
+        return multipliers(system)
+    except (AnalysisError, ParameterError) as error:
+        error.field = ".".join(filter(None, (f"systems[{index}]", error.field)))
+        raise
 
 
 def exponents(

@@ -130,8 +130,11 @@ def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[Capabil
     return offers(system, "flow_volume") and offers(system, "is_stiff") and system.is_stiff(x, 0.0, duration)
 
 
-def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error: bool = False) -> Any:
-    """The flow and its derivative, checked, with the bound on its error if wanted; a SpentError after a limit."""
+def checked_flow(
+    system: SystemLike, x: Array, t0: float, t1: float, with_error: bool = False, compared: bool | None = None
+) -> Any:
+    """The flow and its derivative, checked, with the bound on its error if wanted; a SpentError after a limit. The
+    derivative of a return is ``compared`` with differences, by default the first in a call of an analysis."""
     deadline.check()
     name, n = "flow_with_error" if with_error else "flow", x.size
     function = getattr(system, name)
@@ -146,8 +149,8 @@ def checked_flow(system: SystemLike, x: Array, t0: float, t1: float, with_error:
         state, derivative = numbers(state, (n,), name), numbers(derivative, (n, n), name)
     else:  # the function may return the same arrays at every call
         state, derivative = state.copy(), derivative.copy()
-    if is_new(function) and _is_long(system, t1 - t0):
-        compare(function, lambda x: checked_flow(system, x, t0, t1, with_error)[0], x, state, derivative, name)
+    if compared is not False and _is_long(system, t1 - t0) and is_due(function, with_error or compared is True):
+        compare(lambda x: checked_flow(system, x, t0, t1, with_error, False)[0], x, state, derivative, name)
     if not with_error:
         return state, derivative
     error = numbers(found[2], (n, n) if shape_of(found[2]) else (), name)
@@ -244,7 +247,6 @@ _ROUNDING = 8.0 * float(np.finfo(float).eps)
 _STEPS = 1e-5, 1e-7, 1e-9  # steps of differences, relative to each state
 _CONTRADICTS = 1e-3  # least relative error of a derivative that is refused
 _OWN = __name__.partition(".")[0]
-_COMPARED: dict[int, object] = {}  # code by its identity: a family's functions share it
 
 
 def _code(function: Any) -> object:
@@ -254,23 +256,17 @@ def _code(function: Any) -> object:
     return getattr(function, "__code__", type(function))
 
 
-def is_new(function: Any) -> bool:
-    """True if a user's function was not compared yet."""
-    return id(_code(function)) not in _COMPARED
+def is_due(function: Any, always: bool = False) -> bool:
+    """True if a user's function must be compared: at the first use of its code within an analysis, or ``always``."""
+    own = str(getattr(function, "__module__", "")).partition(".")[0] == _OWN
+    return not own and (deadline.is_first(_code(function)) or always)
 
 
-def compare(
-    function: Any, mapped: Callable[[Array], Array], x: Array, state: Array, derivative: Array, field: str
-) -> None:
-    """Compare a function's derivative with differences: along one direction and, if these contradict it, entry by
-    entry.
+def compare(mapped: Callable[[Array], Array], x: Array, state: Array, derivative: Array, field: str) -> None:
+    """Compare a derivative with differences: along one direction and, if these contradict it, entry by entry.
 
     Those to both sides differ by curvature, noise or a kink: a smaller error is not refused.
     """
-    code = _code(function)
-    _COMPARED[id(code)] = code  # first, as the comparison calls the function
-    if str(getattr(function, "__module__", "")).partition(".")[0] == _OWN:
-        return
     steps = np.where(x != 0.0, np.abs(x), float(np.abs(x).max()) or 1.0)
 
     def compared(shift: Array) -> tuple[NDArray[np.bool_], Array]:
@@ -290,7 +286,6 @@ def compare(
     for j, column in enumerate(columns):
         wrong = np.all([each for each, _ in column], axis=0)
         if wrong.any():
-            del _COMPARED[id(code)]
             i = int(wrong.argmax())
             given, other = derivative[i, j], column[0][1][i] / (_STEPS[0] * steps[j])
             said = f"derivative entry ({i}, {j}) is {given:g}, but a difference gives {other:g}"

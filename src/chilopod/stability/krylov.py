@@ -38,7 +38,7 @@ from chilopod.stability.returns import (
     turned,
     velocity_at,
 )
-from chilopod.stability.spectrum import EPSILON, FIRST_ORDER, eigensystem, eigenvalue_errors
+from chilopod.stability.spectrum import EPSILON, FIRST_ORDER, ContractionError, eigensystem, eigenvalue_errors
 
 LARGE = 100  # number of states from which a few directions are cheaper than the whole derivative
 
@@ -58,6 +58,7 @@ _UNSOLVED = 0.5  # remaining part of a residual, in the whole space, that fails 
 _COARSE, _FINE = 1e-2, 1e-6  # accuracy of linear systems, relative to the residual
 
 _FEWEST, _SPARE = 8, 2  # columns of a block, and those beyond the requested multipliers
+_TELLING = 0.1  # error in the whole space, relative to the largest multiplier, from which none is resolved
 _CONVERGED = 1e-13  # residual, relative to the size of the matrix
 _SAFETY = 4.0  # factor on a norm estimated from eight or more random components
 
@@ -251,7 +252,8 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
 
 def leading_multipliers(image: TangentMap, size: Array, count: int) -> tuple[ComplexArray, Array, float]:
     """The ``count`` multipliers of largest modulus of a return map, or one more to complete a pair, for given sizes of
-    the states, shape (n,); bounds on their errors; and the approximate modulus of the next one.
+    the states, shape (n,); bounds on their errors; and the approximate modulus of the next one. A ContractionError
+    where round-off of a matrix far from normal fills the whole space.
 
     A value theta with the vector y, |y| = 1, has the exact error w^T (H' y - theta y) / w^T y, with w the left
     eigenvector of the multiplier. H' y is computed again, with its error; the components of w in the random directions
@@ -286,6 +288,8 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> tuple[Com
     if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
         wrong = np.full(subspace.matrix.shape, float(residual.max()))
         error = np.minimum(error, eigenvalue_errors(every, subspace.matrix, wrong)[:chosen])
+    if len(subspace.matrix) == n and error.max() > _TELLING * np.abs(values).max():
+        raise ContractionError("its derivative is only resolved in units that balance it", field="flow")
     following = float(np.abs(every[chosen])) if chosen < every.size else 0.0
     return values, error, following
 

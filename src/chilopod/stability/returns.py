@@ -188,7 +188,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     integrator makes independent errors in the two; one with fixed steps should provide its own bound."""
     if offers(system, "flow_with_error"):
         return checked_flow(system, x, t0, t1, with_error=True)
-    state, derivative = checked_flow(system, x, t0, t1)
+    state, derivative = checked_flow(system, x, t0, t1, compared=True)
     check_finite(state, derivative)
     times = [t0 + part * (t1 - t0) for part in CUTS] + [t1]
     passing, product = x, np.eye(x.size)

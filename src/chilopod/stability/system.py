@@ -18,7 +18,7 @@ from chilopod.flows.carrying import REPEATED, numerical_balance
 from chilopod.flows.rhs import TOLERANCE, Event, Method, RightHandSide
 from chilopod.flows.tracing.trace import Opaque, describe
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.interface import compare, is_new, spatial_symmetries
+from chilopod.stability.interface import compare, is_due, spatial_symmetries
 
 Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
@@ -300,7 +300,7 @@ def from_map(
     ----------
     image
         Function ``image(x)`` -> state after one iteration, shape (n,), and its derivative by x, shape (n, n); refused
-        if that contradicts differences of the states at the first point.
+        if that contradicts differences of the states at the first point or at one with error bounds.
     dimension
         Number of states n.
     orbit, spatial_symmetry, scale
@@ -318,18 +318,18 @@ def from_map(
             raise ParameterError(said, field="image", value=type(pair).__name__, allowed="(state, derivative)")
         return numbers(pair[0], (n,), "image"), numbers(pair[1], (n, n), "image")
 
-    def iterated(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
+    def iterated(x: Array, t0: float, t1: float, compared: bool = False) -> tuple[Array, Array, Array]:
         derivative, reach = np.eye(n), np.eye(n)
         for _ in range(math.ceil(t1) - math.ceil(t0)):
             start, (x, factor) = x, applied(x)
-            if is_new(image):
-                compare(image, lambda x: applied(x)[0], start, x, factor, "image")
+            if is_due(image, compared):
+                compare(lambda x: applied(x)[0], start, x, factor, "image")
             with np.errstate(all="ignore"):  # derivatives that are not finite are refused later
                 derivative, reach = factor @ derivative, np.abs(factor) @ reach
         return x, derivative, reach
 
     def flow_with_error(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
-        state, derivative, reach = iterated(x, t0, t1)
+        state, derivative, reach = iterated(x, t0, t1, compared=True)
         shaken = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
         other = iterated(shaken, t0, t1)[1]
         rounding = _ROUNDING * n * max(1, math.ceil(t1) - math.ceil(t0)) * reach

@@ -8,6 +8,7 @@ second of two curves that cross (``_other``).
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass, replace
@@ -45,6 +46,7 @@ _RESTS = 0.01  # distance, relative to each state, within which a failed guess c
 _BESIDE = 1e-3  # step of second differences, in units
 _SINGULAR = 1e-9  # singular value, relative to the largest, below which another curve crosses
 _BENT = 0.3  # relative departure of a map from its linear part that defines the size of a state
+_BOUNDED = 0.03  # such a departure that no longer grows: half of it defines the size
 _PARTS = 2.0**-8, 2.0**-4  # fractions of a return
 _DECADES, _HALVINGS = 12, 12  # range and halvings of the search for the logarithm of a size
 
@@ -262,26 +264,33 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
         state, derivative = checked_flow(system, x, 0.0, time)
         flown.append((time, (state, derivative @ direction)))
 
-    def departs(state: Array, linear: tuple[Array, Array], r: float) -> bool:
-        reach = max(float(np.abs(linear[1] / base).max()), 1.0)
-        return not float(np.abs((state - linear[0] - r * linear[1]) / base).max()) <= _BENT * r * reach
+    def off(state: Array, linear: tuple[Array, Array], r: float) -> float:
+        reach = r * max(float(np.abs(linear[1] / base).max()), 1.0)
+        return float(np.nan_to_num(np.abs((state - linear[0] - r * linear[1]) / base).max() / reach, nan=np.inf))
 
-    def bent(r: float) -> bool:
+    @functools.cache
+    def departure(r: float) -> float:
         try:
             with np.errstate(all="ignore"):
                 there = x + r * direction
-                if departs(returned_states(system, there[None], section)[0], returned, r):
-                    return True
-                # A strongly contracting map forgets its argument: the motion is then nonlinear, not its end.
-                return any(departs(checked_flow(system, there, 0.0, time)[0], linear, r) for time, linear in flown)
+                found = off(returned_states(system, there[None], section)[0], returned, r)
+                for time, linear in flown if found <= _BENT else ():
+                    # A strongly contracting map forgets its argument: the motion is then nonlinear, not its end.
+                    found = max(found, off(checked_flow(system, there, 0.0, time)[0], linear, r))
+                return found
         except (AnalysisError, ArithmeticError, ValueError):
-            return True
+            return np.inf
 
-    step = 0.1 if bent(1.0) else 10.0
+    limit, far = _BENT, [departure(1.0)]
+    while far[-1] <= limit and len(far) <= _DECADES:
+        far.append(departure(10.0 ** len(far)))
+        if _BOUNDED < far[-1] <= min(limit, 2.0 * far[-2]):  # as of a pendulum, which rotates freely far away
+            limit = 0.5 * far[-1]
+    step = 0.1 if far[0] > limit else 10.0
     low = high = 1.0
     for _ in range(_DECADES):
         low, high = high, high * step
-        if bent(high) is (step > 1.0):
+        if (departure(high) > limit) is (step > 1.0):
             break
     else:  # linear: the orbit's change over the interval
         n = x.size
@@ -290,7 +299,7 @@ def _linear_within(curve: Curve, x: Array, value: float, section: Section | None
         return base * max(1.0, float(np.abs(slope).max()))
     for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if bent(middle) is not (step > 1.0) else (low, middle)
+        low, high = (middle, high) if (departure(middle) > limit) is not (step > 1.0) else (low, middle)
     return base * float(np.sqrt(low * high))
 
 
