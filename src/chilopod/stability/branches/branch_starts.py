@@ -9,7 +9,6 @@ second of two curves that cross (``_other``).
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -33,10 +32,9 @@ from chilopod.stability.interface import (
     sizes,
     system_of,
 )
-from chilopod.stability.orbits.orbit import Orbit, known_state, near_orbit, searched_orbit, with_bounds
-from chilopod.stability.orbits.shooting import Nodes
+from chilopod.stability.orbits.orbit import Orbit, known_state, past_event, searched_orbit, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import Section, carried, returned_states, section_at, starts, whole_period
+from chilopod.stability.returns import Section, carried, returned_states, section_at, whole_period
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
@@ -127,8 +125,7 @@ def begin(
         studied = system if symmetric else whole_period(system, periods)
         try:
             found = searched_orbit(studied, guess, with_error=False, shortest=periods == 1)
-            for x in itertools.islice(starts(studied, found.state, found.image.duration), 1):
-                found = near_orbit(studied, Nodes(x[None], found.image.duration), False, None)
+            found = past_event(studied, found.state, found.image.duration) or found
         except AnalysisError:
             _check_moving(system, guess)
             raise

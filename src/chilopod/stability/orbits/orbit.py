@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.flows.arguments import check_arguments, finite_array
 from chilopod.flows.carrying import REPEATED, TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
@@ -320,6 +320,14 @@ def near_orbit(
     else:
         image = returns.on_section(system, section, *end, duration)
     return Orbit(x, image, np.full(x.size, np.nan))
+
+
+def past_event(system: SystemLike, x: Array, duration: float, budget: Budget | None = None) -> Orbit | None:
+    """The orbit through a state with another time 0 if an event passes that; else None."""
+    with contextlib.suppress(ChilopodError):
+        for there in returns.starts(system, x, duration):
+            return near_orbit(system, Nodes(there[None], duration), False, budget)
+    return None
 
 
 def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array, jacobian: Array) -> None:

@@ -15,15 +15,23 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError, ChilopodError
+from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
-from chilopod.stability.orbits.orbit import Orbit, from_known, known_state, near_orbit, rounds_in, searched_orbit
+from chilopod.stability.orbits.orbit import (
+    Orbit,
+    from_known,
+    known_state,
+    near_orbit,
+    past_event,
+    rounds_in,
+    searched_orbit,
+)
 from chilopod.stability.orbits.shooting import Nodes
-from chilopod.stability.returns import return_duration, return_maps, section_at, starts
+from chilopod.stability.returns import return_duration, return_maps, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -93,7 +101,10 @@ class Samples:
             self.path = [] if self.known else self._up_to_merging(self._whole_path())
             self.end = self.path[-1].value if self.path else high
             lost = self.end < high and not (self.spent or self.merges)
-            self.onward = self._past_event() if lost and (self.end > low or not isinstance(guess, Orbit)) else None
+            self.onward = None
+            if lost and (self.end > low or not isinstance(guess, Orbit)):
+                last = self.path[-1]
+                self.onward = past_event(self.family(self.end), last.orbit, last.image.duration, self.budget)
         self.high = high if self.onward is None else self.end
         self.budget.left = allowed
 
@@ -228,14 +239,6 @@ class Samples:
                 self.spent = self.budget.spent or (SPENT if self.count >= self.orbits else "")
                 break
         return path
-
-    def _past_event(self) -> Orbit | None:
-        """The last orbit with another time 0 if an event passes that; else None."""
-        last, system = self.path[-1], self.family(self.end)
-        with contextlib.suppress(ChilopodError):
-            for x in starts(system, last.orbit, last.image.duration):
-                return near_orbit(system, Nodes(x[None], last.image.duration), False, self.budget)
-        return None
 
     def _up_to_merging(self, path: list[Sample]) -> list[Sample]:
         """The path up to a pitchfork where the orbit meets another one: a multiplier comes to +1 and turns back."""

@@ -47,18 +47,19 @@ class Recording:
 def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Recording]:
     """Walks of a robot from files in a folder; RobotFileError or ParameterError, in one line, names file and fault."""
     data.free.check(robot)
+    robots = []
     for at, each in enumerate(data.trajectory):
         fixed = {text.partition("=")[0].strip() for text in each.settings}
         for path in data.free.paths:
             if {path, path.partition("[")[0]} & fixed:
                 raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
         try:
-            robot.set_from_text(each.settings)
+            robots.append(robot.set_from_text(each.settings))
         except ChilopodError as error:
             error.field = f"trajectory.{at}.settings {error.field or ''}".strip()
             raise
     free = {path.partition("[")[0] for path in data.free.paths}
-    walks = [_read(each, robot.set_from_text(each.settings), folder / each.file, free) for each in data.trajectory]
+    walks = [_read(*pair, folder / pair[0].file, free) for pair in zip(data.trajectory, robots, strict=True)]
     for one, other in combinations(walks, 2):
         if np.array_equal(one.times, other.times) and np.array_equal(one.angles, other.angles, equal_nan=True):
             raise ParameterError(f"has the same walk as {one.name}", field="trajectory.file", value=other.name)
