@@ -126,7 +126,7 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
         if variant.gait.stride != robot.gait.stride:
             variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
     springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[1::4], UNIFORM_SPRINGS[:1]))
-    longest = size.cut(_DURATION, 10.0)
+    longest = size.cut(_DURATION, 6.0)
     undisturbed: dict[str, Any] = {"joint_angles": bend, "disturbance": NONE, "rate": 10.0}
     series = {}
     for name, variant in variants.items():
@@ -135,7 +135,7 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
         series[name] = walk_ends(walks, variant, springs)
     base = next(iter(series.values()))
     try:
-        modes = uniform_modes(robot, uniform_springs, folder=folder, engine=engine)
+        modes = uniform_modes(robot, uniform_springs, engine=engine, size=size, folder=folder)
         uniform = float(modes.end.sel(mode=UNDULATION))
     except ParameterError:  # servos that are too stiff for the steps of a derivative
         uniform = np.nan
@@ -171,7 +171,7 @@ def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
     robot, size = context.whole, context.size
     radii, speeds, onsets = [], [], []
     cases = CASES if size is Size.FULL else dict(list(CASES.items())[:2])
-    springs, duration = size.cut((NUMERIC_SPRINGS, DURATION), (NUMERIC_SPRINGS[::2], 10.0))
+    springs, duration = size.cut((NUMERIC_SPRINGS, DURATION), (NUMERIC_SPRINGS[::2], 6.0))
     for index, (name, (step, tolerance)) in enumerate(cases.items()):
         progress(index / len(cases), name)
         finer = robot.with_value("twin.timestep", step)

@@ -142,7 +142,7 @@ def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
     """
     robot, folder, size = context.whole, context.folder, context.size
     data = base_series_data()
-    tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:1], 0, 10.0))
+    tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:1], 0, 6.0))
     law = _law(robot, data, part(progress, 0.0, 0.1)) if rounds else np.empty(0)
     rows: list[Mapping[str, Any]] = []
     for index, each in enumerate(tried):

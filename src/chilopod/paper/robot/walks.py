@@ -51,7 +51,7 @@ SHORTER = (20.0, 30.0, 40.0, 60.0)
 
 _RATE = 50.0
 _EXAMPLES = (41.0, 15.0)
-_CYCLES = 32  # that bends are followed
+_CYCLES, _FEW = 32, 8  # that bends are followed, and those of a tiny report
 _LOST = 0.1  # error of a modulus, beyond which the straight walk is lost
 
 
@@ -79,7 +79,7 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     quick = size is Size.QUICK
     repeats, fewer = size.of((REPEATS, VARIANT_REPEATS), (QUICK_REPEATS, 0), (1, 1))
     springs, uniform_springs = size.cut((VARIANT_SPRINGS, UNIFORM_SPRINGS), (VARIANT_SPRINGS[1::4], (30.0,)))
-    duration = size.cut(DURATION, 12.0)
+    duration = size.cut(DURATION, 6.0)
     share = part(progress, 0.0, 1.0 if quick else 0.31, "as built")
     records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=share)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
@@ -97,9 +97,8 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
         walked = walk_records(variant, springs, fewer, duration=longer, folder=folder, progress=shown)
         found.append(walk_ends(walked, variant, springs))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(strides, found[len(robots) :], strict=True))
-    uniform = uniform_modes(
-        robot, uniform_springs, folder=folder, progress=part(progress, 0.91, 1.0, "uniform springs")
-    )
+    shown = part(progress, 0.91, 1.0, "uniform springs")
+    uniform = uniform_modes(robot, uniform_springs, size=size, folder=folder, progress=shown)
     return RobotWalks(base, durations, variants, lower, examples, uniform)
 
 
@@ -175,6 +174,7 @@ def uniform_modes(
     springs: Sequence[float] = UNIFORM_SPRINGS,
     *,
     engine: str = "twin",
+    size: Size = Size.FULL,
     folder: measures.Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
@@ -189,6 +189,8 @@ def uniform_modes(
     standard error ``end_error`` (N*mm/deg), NaN if it does not.
     """
 
+    cycles = size.cut(_CYCLES, _FEW)
+
     def compute() -> list[Any]:
         known: list[tuple[Array, Any]] = []  # state and leading modes of the last stable walk
         rows = []
@@ -196,7 +198,7 @@ def uniform_modes(
             progress(index / len(springs), f"{spring:g} {PAPER_UNIT}")
             cycle, standing = walker.walk_cycle(robot.with_value(ALL, stiffness(spring)))
             start, basis = known[-1] if known else (standing, None)
-            modes, settled, own = finite_modes(cycle, start, yaw, AMPLITUDE, _CYCLES, basis)
+            modes, settled, own = finite_modes(cycle, start, yaw, AMPLITUDE, cycles, basis)
             if abs(modes[0].multiplier) < 1.0:
                 known.append((settled, own))
             lead = {mode.shape: mode for mode in reversed(modes) if mode.error < _LOST}
@@ -205,7 +207,7 @@ def uniform_modes(
 
     walker: Any = engine_named(engine)
     yaw = [f"yaw{i}" for i in range(1, robot.body.modules)]
-    how = ("uniform", *springs, AMPLITUDE, _CYCLES, engine)
+    how = ("uniform", *springs, AMPLITUDE, cycles, engine)
     modulus, error, turn = np.moveaxis(np.array(measures.kept(folder, robot, how, compute)), 2, 0).swapaxes(1, 2)
     ends = np.array([_passes_one(springs, *each) for each in zip(modulus, error, strict=True)]).T
     with np.errstate(divide="ignore"):

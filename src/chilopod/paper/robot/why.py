@@ -106,7 +106,7 @@ FACTORS = (
 """Factors, in the order of the table."""
 
 _FIRST, _FACTOR = 20.0, 2.0  # N*mm/deg, from where the search goes by this factor until the walk's stability changes
-_CYCLES, _FEWER = 16, 12  # that bends are followed
+_CYCLES, _FEWER, _FEW = 16, 12, 8  # that bends are followed
 _TOLERANCE = 0.005  # of a modulus
 _BENT, _SCATTER = np.deg2rad(5.0), 0.1  # yaw, rad, and error of a modulus, beyond which the straight walk is lost
 _GROWS = 0.1  # excess of a walk that is lost
@@ -283,7 +283,7 @@ def _shares_of(robot: Robot, context: Context, on: NDArray[np.bool_], progress: 
 
 
 def _cycles(size: Size) -> int:
-    return size.of(_CYCLES, _FEWER, _FEWER)
+    return size.of(_CYCLES, _FEWER, _FEW)
 
 
 def shares(on: NDArray[np.bool_], ends: Array) -> xr.Dataset:
