@@ -36,7 +36,7 @@ def panels(found: RobotWalks) -> Iterator[Panel]:
     yield joints(found)
     if found.uniform is not None:
         yield different(found, found.uniform)
-    yield durations(found.durations)
+    yield durations(found)
 
 
 def walks(found: RobotWalks) -> Panel:
@@ -140,8 +140,9 @@ def _all(found: RobotWalks) -> dict[str, xr.Dataset]:
     return {"as built": found.base, **{title: data for title, (_, data) in _variants(found).items()}}
 
 
-def durations(data: xr.Dataset) -> Panel:
+def durations(found: RobotWalks) -> Panel:
     """Onset, radii and shares of curved walks over the duration of the walks."""
+    data, settled = found.durations, number(onset_point(found.base).value, 3)
     times = listing(f"{each:g}" for each in data.duration.values)
     said = "; ".join(f"{row.statement.quantity.partition(',')[0]} {row.result.words}" for row in duration_rows(data))
     return Panel(
@@ -152,8 +153,9 @@ def durations(data: xr.Dataset) -> Panel:
         "share of walks that curve at some springs.",
         text=(
             "The paper does not say how long its robot walked before the angles were averaged. These are the walks of "
-            f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s and judged as before; "
-            f"a bend takes its time, the longer the closer {k(1)} is to the onset.",
+            f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s. A bend takes its "
+            f"time, the longer the closer {k(1)} is to the onset. So all curved walks count here, also those that have not "
+            f"settled, and the last onset may differ from that of the settled walks alone, {settled} {SPRING_UNIT}.",
             f"What the table asks, and whether it is met: {typeset(said)}.",
         ),
         data=data,
