@@ -155,7 +155,7 @@ def durations(found: RobotWalks) -> Panel:
             "The paper does not say how long its robot walked before the angles were averaged. These are the walks of "
             f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s. A bend takes its "
             f"time, the longer the closer {k(1)} is to the onset. So all curved walks count here, also those that have "
-            f"not settled, and the last onset may differ from that of the settled walks alone, {settled} {SPRING_UNIT}.",
+            f"not settled, and the last onset may differ from that of settled walks alone, {settled} {SPRING_UNIT}.",
             f"What the table asks, and whether it is met: {typeset(said)}.",
         ),
         data=data,
