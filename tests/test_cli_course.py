@@ -74,6 +74,7 @@ def test_the_help_has_all_choices(capsys):
         ),
         (["--strategy", "pitchfrok"], "--strategy = 'pitchfrok': must be a strategy; did you mean 'pitchfork'?"),
         (["--k1", "15 N*mm/deg"], "--k1 = '15 N*mm/deg': must not be given: strategy variable sets its own springs"),
+        (["--k1", "15 N*mm/deg", "--targets", "slalmo"], "--k1 = '15 N*mm/deg': must not be given"),
         (["--strategy", "pitchfork"], "--k1: strategy pitchfork needs one stiffness"),
         (["--strategy", "hopf", "--k1", "-3"], "--k1 = '-3': must be positive"),
         (["--patience", "0 s"], "--patience = '0 s': is out of range"),

@@ -151,6 +151,12 @@ def test_turn_with_a_given_spring_and_the_other_strategies():
     assert outcomes["open-loop", "10 N*mm/deg"]["epsilon3_rad2_s"] == 0.0
 
 
+def test_a_target_straight_ahead_has_no_circle():
+    told = run("turn", ROBOT, "--target", "0 deg, 1 m", "--strategy", "leg-yaw", "--duration", "1 s")[1]
+    assert "the circle to the target is a straight line" in told
+    assert "inf" not in told
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -37,6 +37,14 @@ def test_exercises_wait_for_their_answers(lesson, capsys, monkeypatch):
     assert 4 <= answered <= 6
 
 
+@pytest.mark.parametrize("wrong", [lambda e: max(5.0 * e, 0.0), lambda e: 0.2 if e > 0.0 else 0.0])
+def test_a_branch_is_checked_at_two_places(wrong, capsys):
+    cells = nbformat.read(LESSONS[1], as_version=4).cells
+    (source,) = (cell.source for cell in cells if "def settled(epsilon):\n    return ..." in cell.source)
+    exec(source.replace("def settled(epsilon):\n    return ...", ""), {"settled": wrong, "check": check})
+    assert capsys.readouterr().out == "Not yet. It is not zero for every epsilon; try 0.01.\n"
+
+
 def test_an_answer_is_checked(capsys):
     conditions = {"It is negative.": lambda x: x > 0, "It is no square.": lambda x: (x**0.5).is_integer()}
     for answer in (..., -1.0, 2.0, "4", 4.0):

@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import binomtest, levene, ttest_ind, ttest_rel
 
 from chilopod.analysis import square_root_fit
+from chilopod.errors import ParameterError
 from chilopod.statistics import (
     Comparison,
     Estimate,
@@ -105,6 +106,18 @@ def test_the_tests_are_scipy_s():
         assert (ours.interval.low, ours.interval.high) == pytest.approx(theirs.confidence_interval())
         assert (ours.above().p, ours.freedom) == pytest.approx((theirs.pvalue, theirs.df))
     assert spread_difference([*one, np.nan], other).above().p == pytest.approx(levene(one, other).pvalue)
+
+
+@pytest.mark.parametrize("others", [[1.0], [1.0, 2.0], 1.0])
+def test_paired_trials_are_as_many(others):
+    with pytest.raises(ParameterError, match=r"other = .*: must be as many; allowed: \(3,\)"):
+        difference([1.0, 2.0, 3.0], others, paired=True)
+
+
+@pytest.mark.parametrize("gap", [np.nan, np.inf])
+def test_only_finite_numbers_count(gap):
+    assert mean([gap, 1.0, 2.0, 6.0]) == mean([1.0, 2.0, 6.0])
+    assert grouped_mean([[1.0, gap], [3.0, 5.0]]).value == 3.0
 
 
 @pytest.mark.parametrize(("successes", "count"), [(0, 10), (5, 10), (10, 10), (994, 1000)])

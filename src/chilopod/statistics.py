@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri, stdtr, stdtrit
 
+from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 
 LEVEL = 0.95  # of all intervals; equal things are told apart in a share 1 - LEVEL of cases at most
@@ -115,7 +116,7 @@ class Estimate:
 
 
 def mean(values: ArrayLike, size: float = 0.0) -> Estimate:
-    """Mean of the numbers that are not NaN; its error is unknown for fewer than three different values.
+    """Mean of the finite numbers; its error is unknown for fewer than three different values.
 
     Values are alike if they differ by the rounding of the largest of them, or of numbers of some size."""
     finite = np.asarray(values, dtype=np.float64)
@@ -146,10 +147,11 @@ def ratio(of: ArrayLike, to: ArrayLike) -> Estimate:
 
 
 def grouped_mean(values: ArrayLike) -> Estimate:
-    """Mean of the numbers that are not NaN in independent groups, shape (groups, members), such as courses of targets:
-    members of a group may depend on each other."""
+    """Mean of the finite numbers in independent groups, shape (groups, members), such as courses of targets: members of
+    a group may depend on each other."""
     table = np.asarray(values, dtype=np.float64)
-    return ratio(np.nansum(table, axis=1), np.isfinite(table).sum(axis=1))
+    known = np.isfinite(table)
+    return ratio(np.where(known, table, 0.0).sum(axis=1), known.sum(axis=1))
 
 
 def share(reached: ArrayLike) -> Interval:
@@ -173,11 +175,14 @@ def share(reached: ArrayLike) -> Interval:
 
 
 def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Estimate:
-    """Mean of some trials minus that of others, shapes (n,) and (m,), by Welch's test; NaN is left out.
+    """Mean of some trials minus that of others, shapes (n,) and (m,), by Welch's test; only finite numbers count.
 
-    Paired trials have equal indices, as those of one seed, and the error is that of their differences.
+    Paired trials have equal indices, as those of one seed, and the error is that of their differences. ParameterError
+    if their numbers differ.
     """
     if paired:
+        if np.shape(one) != np.shape(other):
+            raise ParameterError("must be as many", field="other", value=np.shape(other), allowed=str(np.shape(one)))
         return mean(np.asarray(one) - np.asarray(other), size=float(np.nanmax(np.abs(one), initial=0.0)))
     first, second = mean(one), mean(other)
     error, freedom = _together([first.error**2, second.error**2], [first.freedom, second.freedom])

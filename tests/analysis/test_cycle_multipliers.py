@@ -9,7 +9,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.analysis import cycle_multipliers, walk_multipliers
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
-from chilopod.analysis.cycle_multipliers import AMPLITUDE
+from chilopod.analysis.cycle_multipliers import AMPLITUDE, spectral_moves
 from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, start, walk_cycle
@@ -342,6 +342,38 @@ def test_a_weak_slack_spring_is_part_of_the_error():
         step = np.array([[1.0 - 4e-6 * stiffness / 1.001, 0.002 / 1.001], [-0.002 * stiffness / 1.001, 1.0 / 1.001]])
         pair = np.linalg.eigvals(step)[0] ** 250
         assert abs(found.exact[0].multiplier - complex(pair.real, abs(pair.imag))) < found.exact[0].error < 2e-4
+
+
+HOPPER = """<mujoco><option timestep="0.001" cone="elliptic"/><worldbody>
+  <geom type="plane" size="1 1 1" solref="0.03 0.8"/><body pos="0 0 0.5"><joint name="z" type="slide" axis="0 0 1"/>
+  <geom type="sphere" size="0.1" mass="1" contype="0" conaffinity="0"/><body pos="0 0 -0.4">
+  <joint name="l" type="slide" axis="0 0 1" damping="2" stiffness="300"/>
+  <geom type="sphere" size="0.05" mass="0.1"/></body></body></worldbody>
+  <actuator><position joint="l" kp="100" kv="1"/></actuator></mujoco>"""
+
+
+def test_errors_contain_what_rounding_does_to_two_multipliers_near_zero():
+    push = 0.03 * np.sin(2.0 * np.pi * np.arange(400) / 400)[:, None]
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(HOPPER), push)
+    hop, small = cycle_multipliers("hopper", cycle, np.zeros(4), ["z", "l"]).exact
+    assert abs(hop.multiplier - (-0.01698459 + 0.53109875j)) < hop.error < 1e-6
+    # By the Jacobians of all 400 steps, multiplied in 40 digits.
+    assert abs(small.multiplier - (3.90e-8 + 1.65e-8j)) < small.error < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("matrix", "moved"),
+    [
+        (np.eye(3), 1e-9),
+        (np.diag([0.5, 0.2, -0.1]), 1e-9),
+        (np.diag([1.0, 0.0], 1), 1e-9**0.5),  # d^2 = error
+        (np.diag([1.0, 1.0], 1) + np.diag([0.0, 1e-8, -1e-8]), 1e-9 ** (1 / 3)),
+    ],
+)
+def test_an_error_of_a_matrix_moves_single_and_defective_eigenvalues(matrix, moved):
+    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+    found = spectral_moves(turn @ matrix @ turn.T, np.linalg.eigvals(matrix).tolist(), 1e-9)
+    assert moved <= max(found) < 4.0 * moved
 
 
 def grown(cycle, bend, cycles):

@@ -136,6 +136,11 @@ def test_a_robot_may_arrive_at_the_last_moment(ready):
     assert walked.goal_nearest.item() == pytest.approx(0.149, abs=1e-6)
 
 
+def test_the_nearest_place_may_be_that_where_the_target_is_put_up(ready):
+    behind = course_named("170 deg, 0.4 m", 4.0)
+    assert drive(replace(ready, controller=None), behind).records[0].goal_nearest.item() == pytest.approx(0.4)
+
+
 def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
     monkeypatch.setattr("chilopod.tasks.course.radius_law", lambda *asked: ready.law)
     named = ["springs.adjustable[0]=true", "springs.softest=9 N*mm/deg"]

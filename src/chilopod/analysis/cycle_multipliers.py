@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +52,7 @@ _FORGOTTEN, _BLOCK, _MOST_CYCLES = 2, 4, 10_000  # cycles
 _LARGER = 4.0  # times the first bends, beyond which they begin anew
 _NOT_BENT = 1e-3  # part of a mode, above its rounding: a smaller one would bend by 1° at 1000° per second
 _HEADING = "the heading"  # see CycleMap.depends_on_place
+_RIM = 12  # points of a circle
 _MOST = 8  # multipliers between the ends of an interval that has an onset
 _DRIFT, _EVEN = 0.2, 2.0  # m, rad, per second, in all cycles that are followed; largest change over the least
 
@@ -119,7 +121,7 @@ def cycle_multipliers(
         beside = np.concatenate([ahead, _switched(cycle, x, basis, step)])
         if not len(beside):
             break
-    exact = _exact(cycle, x, basis, dual, at, step) if closes and not len(beside) else ()
+    exact = _exact(cycle, x, derivative, basis, dual, at, step) if closes and not len(beside) else ()
     try:
         finite, seen = _finite(cycle, x, basis, dual, at, amplitude, cycles)
     except AnalysisError:  # so large bends fall
@@ -253,13 +255,32 @@ def _followed(cycle: CycleMap, x: Array, bends: Array, dual: Array, cycles: int)
     return np.array(matrices), np.array(seen), np.array(sides)
 
 
-def _exact(cycle: CycleMap, x: Array, basis: Array, dual: Array, at: _Indices, step: float) -> _Modes:
-    """Modes of the derivative, by bends of two tiny sizes; slopes to both sides that differ are part of the error."""
+def _exact(
+    cycle: CycleMap, x: Array, derivative: Array, basis: Array, dual: Array, at: _Indices, step: float
+) -> _Modes:
+    """Modes of the derivative, by bends of two tiny sizes; slopes to both sides that differ are part of the error, and
+    so is what rounding of the derivative moves, also through modes that are left out."""
     tiny = [_followed(cycle, x, size * basis, dual / size, 1) for size in (step, _SHORTER * step)]
-    rounding = _ROUNDING * (1.0 + np.abs(x).max() / (_SHORTER * step))
+    of_images = _ROUNDING * np.abs(x).max() / (_SHORTER * step)
     far, near = (np.diff(each[2], axis=1)[0] for each in tiny)
     kink = (near - _SHORTER * far) / (1.0 - _SHORTER)  # without what falls with the size
-    return _modes(np.concatenate([each[0] for each in tiny]), basis[at], 1, rounding, kink)
+    modes = _modes(np.concatenate([each[0] for each in tiny]), basis[at], 1, _ROUNDING + of_images, kink)
+    error = float(_ROUNDING * np.linalg.norm(derivative, 2) + of_images)
+    moves = spectral_moves(derivative, [mode.multiplier for mode in modes], error)
+    return tuple(replace(mode, error=max(mode.error, move)) for mode, move in zip(modes, moves, strict=True))
+
+
+def spectral_moves(matrix: Array, near: Sequence[complex], error: float) -> list[float]:
+    """Distances within which an error of a matrix (n, n), in the 2-norm, keeps its eigenvalues nearest to some numbers:
+    radii of the first circles round them that no eigenvalue of matrices with that error meets. They grow by factors of
+    2; those of eigenvalues that meet the others are found too, be they defective or not."""
+    values, rim, found = np.linalg.eigvals(matrix), np.exp(2j * np.pi * np.arange(_RIM) / _RIM), []
+    for number in near:
+        middle, radius = values[np.abs(values - number).argmin()], error
+        while np.linalg.svdvals((middle + radius * rim)[:, None, None] * np.eye(len(matrix)) - matrix).min() < error:
+            radius *= 2.0
+        found.append(radius)
+    return found
 
 
 def _finite(

@@ -76,6 +76,7 @@ def course(
     described = options.described
     chosen = strategy_named(strategy, ON_COURSES)
     spring = None if k1 is None else options.spring(chosen.springs, k1)
+    chosen.check(spring)
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
     goals = course_named(targets, 1.0 if seconds is None else seconds)  # the engine's own patience takes long to load
@@ -109,8 +110,8 @@ def turn(
             "--k1",
             metavar="auto|law|VALUE",
             help="Stiffness of the springs that the strategy softens. auto: nearest to the target in undisturbed "
-            "trials; law: the settled walk is the circle to the target (the paper's k1-hat); or a value such as "
-            '"10 N*mm/deg".',
+            "trials; law: the settled walk is the circle to the target (the paper's k1-hat), as is auto for open-loop; "
+            'or a value such as "10 N*mm/deg".',
         ),
     ] = "auto",
     strategy: Annotated[

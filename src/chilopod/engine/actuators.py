@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine.arguments import as_array, as_number
+from chilopod.engine.arguments import as_array, as_number, beyond
 from chilopod.engine.contract import Command
 from chilopod.engine.ramps import Ramps
 from chilopod.engine.saved import part
@@ -222,7 +222,7 @@ class Actuators:
         rows[:] = array
         if not ((np.abs(rows) <= LARGEST) | ~walking[:, None]).all():
             allowed = f"numbers up to {LARGEST:g} for every robot that still walks"
-            raise ParameterError("must be finite", field=f"command.{name}", allowed=allowed)
+            raise ParameterError(beyond(rows[walking]), field=f"command.{name}", allowed=allowed)
         return rows
 
     def _check(self, stiffness: Array, walking: NDArray[np.bool_]) -> None:

@@ -19,6 +19,11 @@ BEGINNING = 1e-9
 period."""
 
 
+def beyond(array: Array) -> str:
+    """Complaint about numbers of which some are too large, infinite or NaN."""
+    return "is too large" if np.isfinite(array).all() else "must be finite"
+
+
 def as_array(name: str, value: object) -> Array:
     """An array of plain numbers, not necessarily a copy."""
     try:
@@ -100,7 +105,7 @@ def standing(
                 f"has the wrong shape {array.shape}", field=name, allowed=f"{allowed}, or one for each walk"
             )
         if not (np.abs(array) <= LARGEST).all():
-            raise ParameterError("must be finite", field=name, allowed=f"numbers up to {LARGEST:g}")
+            raise ParameterError(beyond(array), field=name, allowed=f"numbers up to {LARGEST:g}")
     angles = np.broadcast_to(np.atleast_2d(angles), (len(np.atleast_2d(angles)), joints))
     headings, places = np.atleast_1d(headings), np.atleast_2d(places)
     try:
@@ -148,7 +153,7 @@ def rows_of(
             np.finfo(float).max if name == "initial" else LARGEST
         )  # the state of a walk that diverges may be larger
         if not (np.abs(array) <= largest).all():
-            raise ParameterError("must be finite", field=name, allowed=f"numbers up to {largest:g}")
+            raise ParameterError(beyond(array), field=name, allowed=f"numbers up to {largest:g}")
         if name == "friction" and not (array > 0.0).all():
             raise ParameterError("must be positive", field=name)
         arrays[name] = array if array.ndim > len(shape) else array[None]

@@ -39,7 +39,7 @@ def add_measures(data: xr.Dataset, period: float) -> None:
     ``goal_spring_work``
         Positive work of actuators on springs, 1/2 theta^2 dk, J; they recover no energy.
     ``goal_drive_work``
-        Work of joint torques, joint by joint and command by command, where it is positive, J.
+        Net work of joint torques from one command to the next, joint by joint, where it is positive, J.
     """
     place, yaw, angles = (data[name].values for name in ("position", "leg_yaw", "joint_angle"))
     torques, seen, commands = angles[:0], angles[:0], np.zeros(1)

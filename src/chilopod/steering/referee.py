@@ -226,7 +226,7 @@ class CourseReferee:
                 self._seen_from[robot, number] = away * np.cos(bearing), away * np.sin(bearing)
                 self._number[robot], self._places[robot, number], self._begin[robot, number] = number, place, now
                 if away - ARRIVAL_RADIUS <= most:
-                    self._aims[robot], self._since[robot] = place, now
+                    self._aims[robot], self._since[robot], self._least[robot] = place, now, away
                     break
                 self._end[robot, number], self._verdicts[robot, number] = now, Verdict.TOO_FAR.label
             else:

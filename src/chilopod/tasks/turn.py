@@ -90,10 +90,12 @@ class Turn(Pathed):
         return f"{self.who}: turn to {self.target} by {self.strategy.name}"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
-        found = self.criteria
+        found, radius = self.criteria, self.target.radius
         above = [
             f"{self.strategy.name}: {self.strategy.sentence}",
-            f"the circle to the target has a radius of {self.target.radius:.3f} m",
+            f"the circle to the target has a radius of {radius:.3f} m"
+            if np.isfinite(radius)
+            else "the circle to the target is a straight line",
         ]
         springs = {"by the settled radius (the paper's k1-hat)": self.by_law, "walked with": self.stiffness}
         for name, spring in springs.items():

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from chilopod.errors import ParameterError
 from chilopod.paper import statements
 from chilopod.paper.section import Context, Size
 from chilopod.paper.table import OfPlanar, Row, Verdict
+from chilopod.paper.turning.figures import criteria
 from chilopod.paper.turning.sections import rows
 from chilopod.paper.turning.study import all_lower, minima, turning
 from chilopod.paper.turning.trials import CRITERIA, springs_by_outcome, turning_task
@@ -239,3 +241,11 @@ def test_findings_of_another_robot(found):
     assert springs_by_outcome(stiff.criteria)[Outcome.ARRIVED] == []
     table = rows(replace(found, tasks={"A": stiff, "B": found.tasks["B"]}))
     assert next(row.result.words for row in table if getattr(row, "statement", None) == statements.TASKS["A"].outcomes)
+
+
+@pytest.mark.parametrize(("k_hat", "below"), [(30.0, True), (10.0, False)])
+def test_only_minima_below_the_law_s_spring_have_a_reason(k_hat, below):
+    springs = (15.0, 17.0, 21.0, 28.0, 41.0)
+    task = made_up_robot.task(springs, 21.0, {}, dict.fromkeys(springs, Outcome.ARRIVED.label))
+    found = SimpleNamespace(tasks={"A": task}, laws=SimpleNamespace(k_hat=lambda radius: (k_hat,)))
+    assert ("grows fast enough" in " ".join(criteria(found, "A").text)) is below

@@ -180,7 +180,8 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
             at, (factor, unit) = low.sel(criterion=name), SCALES[name]
             words = (
                 f"{factor * float(at['mean']):.3g} ± {factor * float(at['error']):.2g} {unit} at k1 = "
-                f"{float(at['at']):.3g} (no worse: {float(at.softest):g} to {float(at.stiffest):g})"
+                f"{float(at['at']):.3g} (of the springs that walked {float(at.softest):g} to "
+                f"{float(at.stiffest):g} are no worse)"
             )
             result = Result(words, float(at["at"]), unit=PAPER_UNIT)
             rows.append(OfTwin(statement, result, within(around(at, statement.said))))

@@ -43,6 +43,7 @@ _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 _CURVES = tuple(zip(style.CURVES, _DASHES, strict=False))
 _AXES = {"distance": ("target distance", "m"), "angle": ("target angle", "deg"), "effort": ("leg yaw", "rad²·s")}
 _STRATEGIES = ((style.BLUE, "o"), (style.ORANGE, "s"))
+_SLOW = "Below it a bend that starts from straight grows fast enough for the task; next to the pitchfork it does not."
 _TOP, _TOP_HOPF = (41, 15, 10, 7, 5), (41, 10, 5, 3, 2)  # N*mm/deg, on the upper axis
 
 
@@ -242,8 +243,9 @@ def _said(found: Turning, letter: str) -> str:
         f"{outcome_words(task.criteria, span)}. The minima (parabola through the lowest mean and its neighbours): "
         f"{places(task)}\u00a0{SPRING_UNIT}. The dashed line is the spring of the radius law, {spring(k_hat)}; "
         f"for the robot the paper's is {printed.TASKS[letter].k_hat.value:g}, with all three minima around it. In the "
-        f"model they lie at {listing(number(part, 2) for part in parts)} of the law's spring: next to the pitchfork a "
-        "bend that starts from straight grows too slowly for the task. The axis of ε3 does not start at zero."
+        f"model they lie at {listing(number(part, 2) for part in parts)} of the law's spring."
+        + (f" {_SLOW}" if min(parts) < 1.0 else "")
+        + " The axis of ε3 does not start at zero."
     )
 
 

@@ -36,7 +36,7 @@ def panels(found: RobotWalks) -> Iterator[Panel]:
     yield joints(found)
     if found.uniform is not None:
         yield different(found, found.uniform)
-    yield durations(found.durations)
+    yield durations(found)
 
 
 def walks(found: RobotWalks) -> Panel:
@@ -57,8 +57,8 @@ def walks(found: RobotWalks) -> Panel:
             f"The paper's base series with its own springs: {base.sizes['repeat']} walks of the twin from straight on "
             f"at each of {base.sizes['spring']} values of {k(1)}, 90\u00a0s each, angles averaged over the last "
             f"5\u00a0s as in the paper. {int(here.sum())} of {here.size} end in a curve, {lefts} to the left and "
-            f"{rights} to the right. The square-root fit puts the onset at {said} {SPRING_UNIT}; the paper's "
-            f"estimate for its robot is {printed.ONSET.value:g}.",
+            f"{rights} to the right. The square-root fit to those that have settled puts the onset at {said} "
+            f"{SPRING_UNIT}; the paper's estimate for its robot is {printed.ONSET.value:g}.",
             "These are the data that the twin's unknown constants were fitted to (the printed onset, the two printed "
             "radii, which springs walk straight and which do not; and the walking speed), so agreement here is no "
             "surprise. What follows was not fitted."
@@ -140,8 +140,9 @@ def _all(found: RobotWalks) -> dict[str, xr.Dataset]:
     return {"as built": found.base, **{title: data for title, (_, data) in _variants(found).items()}}
 
 
-def durations(data: xr.Dataset) -> Panel:
+def durations(found: RobotWalks) -> Panel:
     """Onset, radii and shares of curved walks over the duration of the walks."""
+    data, settled = found.durations, number(onset_point(found.base).value, 3)
     times = listing(f"{each:g}" for each in data.duration.values)
     said = "; ".join(f"{row.statement.quantity.partition(',')[0]} {row.result.words}" for row in duration_rows(data))
     return Panel(
@@ -152,8 +153,9 @@ def durations(data: xr.Dataset) -> Panel:
         "share of walks that curve at some springs.",
         text=(
             "The paper does not say how long its robot walked before the angles were averaged. These are the walks of "
-            f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s and judged as before; "
-            f"a bend takes its time, the longer the closer {k(1)} is to the onset.",
+            f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s. A bend takes its "
+            f"time, the longer the closer {k(1)} is to the onset. So all curved walks count here, also those that have "
+            f"not settled, and the last onset may differ from that of settled walks alone, {settled} {SPRING_UNIT}.",
             f"What the table asks, and whether it is met: {typeset(said)}.",
         ),
         data=data,
