@@ -110,7 +110,7 @@ def test_the_tests_are_scipy_s():
 
 @pytest.mark.parametrize("others", [[1.0], [1.0, 2.0], 1.0])
 def test_paired_trials_are_as_many(others):
-    with pytest.raises(ParameterError, match=r"other = .*: must be as many; allowed: \(3,\)"):
+    with pytest.raises(ParameterError, match=r"other: has the wrong shape .*; allowed: \(3,\)"):
         difference([1.0, 2.0, 3.0], others, paired=True)
 
 

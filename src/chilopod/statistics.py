@@ -182,7 +182,7 @@ def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Est
     """
     if paired:
         if np.shape(one) != np.shape(other):
-            raise ParameterError("must be as many", field="other", value=np.shape(other), allowed=str(np.shape(one)))
+            raise ParameterError(f"has the wrong shape {np.shape(other)}", field="other", allowed=str(np.shape(one)))
         return mean(np.asarray(one) - np.asarray(other), size=float(np.nanmax(np.abs(one), initial=0.0)))
     first, second = mean(one), mean(other)
     error, freedom = _together([first.error**2, second.error**2], [first.freedom, second.freedom])
