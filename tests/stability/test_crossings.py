@@ -268,6 +268,13 @@ def test_signs_of_subnormal_numbers():
     np.testing.assert_allclose(logs, [np.log(0.5) + 2 * np.log(1e-310), np.log(1e-310) + np.log(1e300)], rtol=1e-13)
 
 
+@pytest.mark.parametrize("left_out", [0, 1, 2])
+def test_the_function_of_a_missing_matrix_is_not_known(left_out):
+    terms = np.array([[np.nan + 0j] * 3, [1.0, 2.0, 3.0]])
+    signs, logs = symmetric(terms, left_out)
+    np.testing.assert_array_equal(np.isnan([signs, logs]), [[True, False]] * 2)
+
+
 @pytest.mark.parametrize(("low", "width"), [(0.0, 1e-300), (-1e300, 2e300), (1e6, 1e-3), (-1e-310, 3e-310)])
 def test_parameters_of_any_scale(low, width):
     middle = low + 0.37 * width

@@ -1,11 +1,15 @@
 """Orbits of systems that conserve an energy: they come in families, with a multiplier 1 besides that of the motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from chilopod.stability import begin, exponents, follow, from_rhs, locate, multipliers
+from chilopod.errors import AnalysisError
+from chilopod.stability import begin, exponents, follow, from_rhs, locate, multipliers, switch
+from chilopod.stability.branches.branch import Ending
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
 
@@ -101,3 +105,32 @@ def test_searches_end():
     assert found.status is SearchStatus.CONSERVATIVE
     assert len(found) == 0
     assert any("+1 throughout" in remark for remark in found.remarks)
+
+
+def by_energy(value):
+    """Hénon & Heiles (1964), with the gradient of their energy times a parameter."""
+
+    def rhs(t, s):
+        gx, gy = s[0] + 2.0 * s[0] * s[1], s[1] + s[0] ** 2 - s[1] ** 2
+        return [s[2] + value * gx, s[3] + value * gy, value * s[2] - gx, value * s[3] - gy]
+
+    return from_rhs(rhs, 4, None, guess_period=8.0)
+
+
+def test_branches_leave_collisions_of_a_family_by_energy():
+    """The orbit along an axis: across it states are rounding, and orbits of the family with other periods are near."""
+    branch = follow(by_energy, begin(by_energy, 0.0, [0.0, -0.478, 0.0, 0.0], rising=False), (-0.1, 0.1), points=10)
+    doubled, equal = branch.special_points[:2]
+    for point, times in ((doubled, 2), (equal, 1)):
+        for start in switch(by_energy, point):
+            left = follow(by_energy, start, (-0.1, 0.1), points=1, closely=False)
+            assert left.ending is Ending.ENOUGH_POINTS
+            assert left.periods == times
+            assert left.points[-1].period == pytest.approx(times * point.period, rel=1e-3)
+            assert np.abs(left.points[-1].orbit[[0, 2]]).max() > 1e-6  # across the axis
+            for each in left.points:
+                rhs = lambda t, s: by_energy(0.0).velocity(s)  # noqa: E731
+                end = solve_ivp(rhs, (0.0, each.period), each.orbit, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+                np.testing.assert_allclose(end, each.orbit, atol=1e-9)
+    with pytest.raises(AnalysisError, match=r"does not close"):
+        follow(by_energy, replace(start, orbit=equal.orbit + 0.01 * np.eye(4)[0]), (-0.1, 0.1), points=1)

@@ -27,7 +27,7 @@ from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.inspection import Inspected, inspect
+from chilopod.stability.branches.inspection import Inspected, by_energy, inspect
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, outward, trace
 from chilopod.stability.interface import Family, SystemLike, returns_per_period, with_shared_symmetries
@@ -54,7 +54,6 @@ _MEETING = 1e-6  # distance of a multiplier from +1 at a special point where bra
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
 _IN_FOLD = "the branch starts in a fold"
-_STEADY = 1e-6  # largest value of the parameter, relative to its scale, along a family by energy
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
 
 Progress = Callable[[int, BranchPoint], None]
@@ -122,7 +121,7 @@ class Branch(Result):
             for each in self.points
             if each.special is not None
         ]
-        if _by_energy(values, self.scale):
+        if by_energy(values, self.scale):
             special = [(each.special.label, f"{each.period:.9g}", "") for each in self.special_points if each.special]
             values = [float(point.period or 0.0) for point in self.points]
             head = (
@@ -157,7 +156,7 @@ class Branch(Result):
         if not (isinstance(state, Real) and state in range(orbits.shape[1])):
             raise ParameterError("must be a state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
         axes, color, state, across = axes_for(axes), None, int(state), "parameter"
-        if _by_energy(values.tolist(), self.scale):
+        if by_energy(values.tolist(), self.scale):
             values, across = np.array([point.period for point in self.points]), "period"
         for verdict, first, last in self._stretches():
             part = slice(first, last + 1)
@@ -322,15 +321,10 @@ def followed(
             moved = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
         if moved is not None:
             remarks.append(MOVED.format(found[-1].value))
-    if _by_energy([point.value for point in found], curve.scale):
+    if by_energy([point.value for point in found], curve.scale):
         remarks = [remark for remark in remarks if remark != _IN_FOLD]
     said = tuple(dict.fromkeys([*remarks, *_unpaired_folds(found)]))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
-
-
-def _by_energy(values: list[float], scale: float) -> bool:
-    """True for a family of conservative orbits, along which the parameter is zero but for rounding."""
-    return len(values) > 1 and max(map(abs, values)) <= _STEADY * scale
 
 
 def _unpaired_folds(points: list[BranchPoint]) -> list[str]:

@@ -34,12 +34,14 @@ from chilopod.stability.interface import (
 )
 from chilopod.stability.orbits.orbit import Orbit, known_state, past_event, searched_orbit, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import Section, carried, returned_states, section_at, whole_period
+from chilopod.stability.returns import Section, carried, return_duration, returned_states, whole_period
 
 IN_FOLD = 1e-6
 """Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
 
 _CLOSES = 1e-6  # distance, relative to the sizes, at which an orbit closes
+_CLOSING = "a point of a branch, or a system with its `spatial_symmetry`"
+_ROUNDING = 1e-9  # size of a state, relative to that along the old branch, that is rounding
 _RESTS = 0.01  # distance, relative to each state, within which a failed guess counts as an equilibrium
 _BESIDE = 1e-3  # step of second differences, in units
 _SINGULAR = 1e-9  # singular value, relative to the largest, below which another curve crosses
@@ -78,6 +80,8 @@ class Start(ReadOnlyArrays):
         Bifurcation point of the start, if any.
     outward
         Direction of the state, shape (n,), from the bifurcation point to a start beside it. May be None.
+    sizes
+        Sizes of the states along the old branch, shape (n,), if known.
     """
 
     value: float
@@ -90,6 +94,7 @@ class Start(ReadOnlyArrays):
     period: float | None = None
     bifurcation: BifurcationPoint | None = None
     outward: Array | None = None
+    sizes: Array | None = None
 
 
 def begin(
@@ -183,13 +188,14 @@ def switch(
     one at +1 a branch point.
     """
     check_arguments(family=family, periods=1 if periods is None else periods)
-    old, known = None, None
+    old, known, along = None, None, None
     if isinstance(point, BranchPoint):
         if point.bifurcation is None:
             raise ParameterError("must be a special point", field="point", value=point.value)
         # At the start of a branch of doubled period the point belongs to the orbits that it leaves.
         halved = point.period is not None and point.bifurcation.period < 0.75 * point.period
         old, known = point.tangent * point.units, point.periods // (2 if halved else 1)
+        along = point.units[:-1]
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
@@ -206,11 +212,9 @@ def switch(
         known = known or (max(1, round(own)) if np.isfinite(own) else 1)
         periods = known if periods is None else int(periods)
         if is_autonomous(system):
-            whole = whole_period(system, periods)
-            # The point knows its period better than the family's guess.
-            section = section_at(whole, point.orbit, duration=point.period * periods / known)
-            period = searched_orbit(whole, point.orbit, with_error=False, section=section).period
-    at = Start(point.value, point.orbit, old=old, periods=periods, period=period, bifurcation=point)
+            # The point knows its period; a search may find another orbit of a family by energy.
+            period = point.period * periods / known
+    at = Start(point.value, point.orbit, old=old, periods=periods, period=period, bifurcation=point, sizes=along)
     return _along_modes(at, point, returns_per_period(system))
 
 
@@ -235,11 +239,15 @@ def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
     """Sizes of the states along a branch, shape (n,): the system's own, or the distance from the orbit at which its
     return map becomes nonlinear, or the orbit's change over the interval, with ratios from the orbit."""
     x, value = start.orbit, start.value
-    system, section = curve.system(value), curve.section_at(x, value, start.period)
+    system = curve.system(value)
     given = getattr(system, "scale", None)
     if given is not None:
         return given
-    found = _linear_within(curve, x, value, section)
+    period, old = start.period, start.sizes if isinstance(start, Start) else start.units[:-1]
+    base = sizes(system, x, return_duration(system) if period is None else period / returns_per_period(system))
+    if old is not None and (base < _ROUNDING * old).any():  # a state that rests at zero is rounding there
+        base = old
+    found = _linear_within(curve, x, value, base, period)
     if not isinstance(start, Start) or start.outward is None:
         return found
     # A small cycle does not determine the sizes of later ones, which grow as the root of the parameter.
@@ -247,11 +255,11 @@ def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
     return found * max(1.0, float((grown / found).max()))
 
 
-def _linear_within(curve: Curve, x: Array, value: float, section: Section | None) -> Array:
-    """Sizes of the states, shape (n,), up to which returns near an orbit are linear."""
-    system = curve.system(value)
+def _linear_within(curve: Curve, x: Array, value: float, base: Array, period: float | None) -> Array:
+    """Sizes of the states, with the ratios of ``base``, shape (n,), up to which returns near an orbit are linear."""
+    system, curve.sizes = curve.system(value), base
+    section = curve.section_at(x, value, period)
     image = curve.image(x, value, section)
-    base = sizes(system, x, image.duration)
     direction = np.cos(1.0 + 3.0 * np.arange(x.size))
     direction = image.across @ (base * direction / np.abs(direction).max())
     returned = image.state, image.jacobian @ direction
@@ -309,6 +317,9 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     if not np.isfinite(matrix).all():
         said = "the flow is not finite at neighbouring values of the parameter"
         raise AnalysisError(said, field="start", allowed="another value")
+    reach = np.maximum(units[:-1], np.abs(start.orbit))
+    if not (np.abs(image.state - start.orbit) <= _CLOSES * (reach + np.abs(image.jacobian) @ reach)).all():
+        raise AnalysisError("the orbit does not close here", field="start", allowed=_CLOSING)
     if start.mode is None:
         tangent = _along(matrix, start.rising)
         if start.outward is not None and float(tangent[:-1] @ (start.outward / units[:-1])) < 0.0:

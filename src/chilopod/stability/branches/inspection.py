@@ -42,6 +42,7 @@ _ERROR = 1e-10  # relative error of the return map's derivative at a corrected o
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, at a branch point
 _DIP = 0.3  # the same, relative to the larger one at the ends of the step
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # distances from a place at which its sides are compared, relative to the step
+_STEADY = 1e-6  # largest value of the parameter, relative to its scale, along a family by energy
 _SURE = 3.0  # factor on the error of a multiplier for a certain side of the circle
 _FORESEEN = 5e-3  # error of the predicted period, relative to it, that needs no other orbits within the step
 _ROUGH = 0.03  # error of a polynomial through the period, relative to its change, that shows a jump
@@ -79,25 +80,25 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
     sure = offers(curve.system(step.found.value), "flow_with_error")
     found: list[tuple[float, BranchPoint]] = []
     for place in places:
-        near, event = within.at(place.crossing.value).found.value, place.crossing.event
+        near, event = _near(within, place.crossing.value), place.crossing.event
         breaking = place.block is not None and not place.block.trivial
         lone = event is CircleEvent.PLUS and not (place.crossing.collision or place.branching or place.fold or breaking)
         if lone:
             if place.crossing.change == 0:
-                remarks += (f"near {near:.9g}: a multiplier comes to +1 and goes back, and no other orbit is near",)
+                remarks += (f"{near}: a multiplier comes to +1 and goes back, and no other orbit is near",)
             elif not any(each.fold for each in places):  # else it is that of the fold, uncertain because it is flat
-                remarks += (f"near {near:.9g}: a multiplier passes +1, but no fold and no other orbit is near",)
+                remarks += (f"{near}: a multiplier passes +1, but no fold and no other orbit is near",)
             continue
         if (sure or (leaving and event is CircleEvent.PLUS)) and not _confirmed(within, place):
-            remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which does not count",)
+            remarks += (f"{near}: {event.sentence} by no more than its error, which does not count",)
             continue
         try:
             point = special_point(within, place)
         except ContinuumError as error:
-            remarks += (f"near {near:.9g}: {error.problem}, so it is no bifurcation point",)
+            remarks += (f"{near}: {error.problem}, so it is no bifurcation point",)
             continue
         if point is None:
-            remarks += (f"near {near:.9g}: {event.sentence}, which the orbit that is found there does not confirm",)
+            remarks += (f"{near}: {event.sentence}, which the orbit that is found there does not confirm",)
         else:
             found.append((place.crossing.value, point))
     points: list[BranchPoint] = []
@@ -108,6 +109,19 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
         points.append(special)
         last = at
     return Inspected(tuple(points), remarks)
+
+
+def _near(within: Within, at: float) -> str:
+    """Words for a place within a step: the parameter, or the period along a family by energy."""
+    start, found = within.step.start, within.at(at).found
+    if start.section is not None and by_energy([start.last.value, found.value], within.curve.scale):
+        return f"near the period {found.image.period:.9g}"
+    return f"near {found.value:.9g}"
+
+
+def by_energy(values: list[float], scale: float) -> bool:
+    """True for a family of conservative orbits, along which the parameter is zero but for rounding."""
+    return len(values) > 1 and max(map(abs, values)) <= _STEADY * scale
 
 
 def _confirmed(within: Within, place: EventPlace) -> bool:
@@ -169,7 +183,7 @@ def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[EventPlac
     places = []
     for block, found in _searched(within) if crossed else ():
         if found.status in (SearchStatus.BUDGET, SearchStatus.INCOMPLETE):
-            remarks += tuple(f"near {step.found.value:.6g}: {remark}" for remark in found.remarks)
+            remarks += tuple(f"{_near(within, step.size)}: {remark}" for remark in found.remarks)
         places += [_placed(within, each, block) for each in found.crossings if each.value > CLOSE * step.size]
     if turned and not any(place.fold or place.branching for place in places):
         fold = fold_within(within, 0.0, step.size)

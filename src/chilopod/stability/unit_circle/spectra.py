@@ -342,9 +342,11 @@ def factors(nu: ComplexArray, event: CircleEvent) -> ComplexArray:
     return np.asarray(nu[..., first] * nu[..., second] - 1.0)
 
 
+@np.errstate(divide="ignore", invalid="ignore")
 def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
     """Elementary symmetric polynomials of the rows of ``terms``, all but ``left_out`` of them at a time, as signs and
-    logarithms, shapes (k,). The rows are closed under conjugation."""
+    logarithms, shapes (k,). The rows are closed under conjugation; those of a missing matrix are NaN, as the results.
+    """
     small = np.zeros((terms.shape[0], left_out + 1), dtype=np.complex128)
     small[:, 0] = 1.0
     logs = np.zeros(terms.shape[0])
@@ -359,8 +361,7 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
             small = small * (term / scale)[:, None] + shifted / scale[:, None]
         terms = terms[:, few:]
     sizes, last = np.abs(terms), small[:, left_out]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real))
+    logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real))
     # Real and imaginary part separately: the quotient of a complex subnormal and its size would overflow.
     divisors = np.where(sizes == 0.0, 1.0, sizes)
     directions = terms.real / divisors + 1j * (terms.imag / divisors)
