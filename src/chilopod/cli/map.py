@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, RobotOptions, deliver, free, with_options
+from chilopod.cli.options import OutOption, RobotOptions, deliver, free, note_si, with_options
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import known_names
 
@@ -54,6 +54,8 @@ def stability_map(
     "0 mm" "60 mm" --out atlas
     """
     robot = options.described
+    for name, (path, *ends) in (("x", x), ("y", y)):
+        note_si(robot, path, f"--{name} {path}", ends)
     from chilopod.analysis.map import map as mapped
     from chilopod.analysis.map_picture import SHOWN
 
