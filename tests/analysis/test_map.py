@@ -150,14 +150,14 @@ def test_radii_are_those_of_branches():
     [
         (("ground.friction", 200.0, 300.0), (K1, "7 N*mm/deg", "15 N*mm/deg")),
         (("legs.half_width", "60 mm", "90 mm"), ("legs.forward_offset", "40 mm", "60 mm")),  # no onset is on this map
-        (("modules", 6, 7), ("speed", "0.08 m/s", "0.1 m/s")),
+        (("modules", 5, 6), ("speed", "0.08 m/s", "0.1 m/s")),
     ],
 )
 def test_radii_do_not_depend_on_a_spring_on_the_horizontal_axis(x, y):
     robot = ROBOT.with_value(K1, stiffness(9.0))
-    found = mapped(robot, x, y, points=3, also=["radius"])
+    found = mapped(robot, x, y, points=2, also=["radius"])
     bends = found.fate == FATES.index(Fate.BENDS)
-    assert bends.sum() > 3
+    assert bends[0, -1]
     np.testing.assert_array_equal(np.isfinite(found.radius), bends)
     assert found.remarks == ()
     there = Plane.over(robot, x, y).at(float(found.x_values[-1]), float(found.y_values[0]))

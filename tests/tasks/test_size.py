@@ -104,7 +104,8 @@ def test_limits_and_budgets():
     gentle = size(ROBOT, {"margin": ">50%", "settling": "<6 s"}, [SPRING])
     assert gentle.outcome is Outcome.MET
     (about,) = gentle.reasons
-    assert about == "the onset of springs.stiffness[0] is 11.9906 N*mm/deg (bends)"
+    assert about.startswith("the onset of springs.stiffness[0] is 11.99")
+    assert about.endswith(" N*mm/deg (bends)")
     assert gentle.wishes[0] == Wish("margin", 0.5, 1)
     assert gentle.values[0] >= 0.5
     assert gentle.values[1] <= 6.0

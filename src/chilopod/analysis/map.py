@@ -186,7 +186,8 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
     nodes = np.column_stack([rows[places[:, 0]], columns[places[:, 1]]])
     # From the onset on, each walk is corrected from the nearest known one; of other numbers of modules none is near.
     places *= np.where([grid.plane.y.whole, grid.plane.x.whole], 100, 1)
-    apart, seeds, near = 1e6 + grid.values[GROWTH, *nodes.T], [None] * len(nodes), np.zeros(len(nodes), dtype=int)
+    apart, near = 1e6 + grid.values[GROWTH, *nodes.T], np.zeros(len(nodes), dtype=int)
+    seeds: list[tuple[Array, Array] | None] = [None] * len(nodes)
     for done in range(len(nodes)):
         progress(done / len(nodes), f"{done} radii")
         at = int(apart.argmin())

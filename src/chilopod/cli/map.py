@@ -54,8 +54,6 @@ def stability_map(
     "0 mm" "60 mm" --out atlas
     """
     robot = options.described
-    for name, (path, *ends) in (("x", x), ("y", y)):
-        note_si(robot, path, f"--{name} {path}", ends)
     from chilopod.analysis.map import map as mapped
     from chilopod.analysis.map_picture import SHOWN
 
@@ -72,6 +70,8 @@ def stability_map(
             robot, x, y, points=points, also=also, kept=out and out / "map-rates.nc", replace=options.force,
             remark=lambda sentence: typer.echo(f"note: {sentence}", err=True), progress=partial(tell, "map"),
         )  # fmt: skip
+    for name, (path, *ends) in (("x", x), ("y", y)):
+        note_si(robot, path, f"--{name} {path}", ends)
 
     def write() -> list[Path]:
         return write_map(found, shown, out, replace=options.force) if out else []
