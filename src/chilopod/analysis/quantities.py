@@ -71,7 +71,7 @@ class Mode(NamedTuple):
 
     @property
     def fate(self) -> Fate:
-        """What becomes of the disturbance where it grows."""
+        """Fate of the disturbance where it grows."""
         if self.multiplier.imag != 0.0:
             return Fate.UNDULATES
         # A bend to one side is mirrored by the return of half a period.
@@ -151,7 +151,7 @@ class Onset:
         return self.first(robot).point.value
 
     def fate(self, robot: Robot, value: float) -> Fate:
-        """What becomes of a disturbance beyond a critical value: the straight walk bends or undulates."""
+        """Fate of a disturbance beyond a critical value: the straight walk bends or undulates."""
         return leading_mode(robot.with_value(self.parameter, value)).fate
 
     def in_words(self, robot: Robot, quantity: str, value: float, digits: int) -> str:
