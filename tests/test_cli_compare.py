@@ -8,7 +8,7 @@ from helpers.command_line import remarks, run
 def test_a_table_and_files(tmp_path):
     code, out, err = run("compare", "aoi2022-planar", "aoi2022", "--show", "onset")
     assert (code, remarks(err)) == (0, [])
-    assert out.splitlines()[0] == "aoi2022-planar and aoi2022: onset 11.99 N*mm/deg and 11.58 N*mm/deg"
+    assert out.splitlines()[0] == "aoi2022-planar and aoi2022: onset 11.99 N*mm/deg (bends) and 11.58 N*mm/deg (bends)"
     assert out.splitlines()[2].split()[0] == "legs.forward_offset"
     code, out, _ = run(
         "compare", "aoi2022-planar", "aoi2022", "--show", "speed", "--json", "--out", str(tmp_path / "c")

@@ -35,7 +35,10 @@ def test_files_and_text_say_the_same(tmp_path):
 
 
 def test_a_map_without_curves_is_written_too(tmp_path):
-    assert run("map", "aoi2022-planar", "--x", MAP[3], "2", "2.5", *MAP[6:], "--points", "3", "--out", tmp_path)[0] == 0
+    code, _, err = run("map", "aoi2022-planar", "--x", MAP[3], "2", "2.5", *MAP[6:], "--points", "3", "--out", tmp_path)
+    assert code == 0
+    said = f"note: a number without a unit is SI: --x {MAP[3]} is 2 N*m/rad to 2.5 N*m/rad, that is 34.91 N*mm/deg to"
+    assert said in err
     assert (tmp_path / "map-curves.csv").read_text().splitlines()[-1].startswith("point,curve_x")
 
 

@@ -13,7 +13,7 @@ PRESET = "aoi2022-planar"
 def test_a_table_and_the_same_as_json(tmp_path):
     code, out, err = run("sensitivity", PRESET, "--show", "onset")
     assert (code, remarks(err)) == (0, [])
-    assert out.splitlines()[0] == "aoi2022-planar: onset 11.991 N*mm/deg"
+    assert out.splitlines()[0] == "aoi2022-planar: onset 11.991 N*mm/deg (bends)"
     assert out.splitlines()[2].split()[:3] == ["gait.module_phase", "120", "deg"]
     code, out, err = run("sensitivity", PRESET, "--show", "onset", "--json", "--out", str(tmp_path / "new"))
     assert code == 0

@@ -44,6 +44,12 @@ def test_mistakes_are_named_in_one_line(arguments, said):
     assert len([line for line in remarks(err) if line.startswith("error:")]) == 1
 
 
+def test_a_range_without_a_unit_is_said():
+    code, _, err = run("size", "aoi2022-planar", "--margin", "1 m", "--free", "springs.stiffness[0]=1..2")
+    assert code == 2
+    assert "a number without a unit is SI: --free springs.stiffness[0] is 1 N*m/rad to 2 N*m/rad, that is 17.45" in err
+
+
 def test_an_option_that_is_given_twice_is_refused():
     code, out, err = run(
         "size", "aoi2022-planar", "--speed", "<0.1 m/s", "--speed=>0.2 m/s", "--free", "speed=0.05..0.3 m/s"

@@ -48,13 +48,12 @@ def test_curves_are_where_lines_across_them_change(found):
             paths, value = (K1, OTHERS), curve.values[index]
             beside = value[p] * np.array([1.0 - 1e-3, 1.0 + 1e-3])
             line = ROBOT.with_value(paths[q], value[q])
-            nearest = min(
-                bifurcations(line, paths[p], tuple(beside), normal_form=False),
-                key=lambda at: abs(at.point.value - value[p]),
-            )
+            points = bifurcations(line, paths[p], tuple(beside), normal_form=False)
+            # Where two curves meet, both kinds are there.
+            own = [at for at in points if at.point.kind is curve.kind]
+            nearest = min(own, key=lambda at: abs(at.point.value - value[p]))
             bound = curve.error_bound[index]
             allowed = bound[p] + bound[q] * along[p] / along[q] + nearest.point.error_bound
-            assert nearest.point.kind is curve.kind
             assert abs(nearest.point.value - value[p]) <= allowed
 
 
@@ -142,10 +141,54 @@ def test_radii_are_those_of_branches():
         assert found.radius[j, 0] == pytest.approx(float(walks.axis_radius[-1]), rel=1e-6)
     assert found.plot(Figure().add_subplot(), "radius").get_title() == "Radius of the curved walk (m)"
     assert found.to_dataset().radius.attrs["units"] == "m"
-    with pytest.raises(ParameterError, match=r"^radius: must be left out"):
-        mapped(ROBOT, ("modules", 4, 6), ("speed", 0.05, 0.1), points=5, also=["radius"])
     with pytest.raises(ParameterError, match=r"^also = 'radii': must be a part of maps; did you mean 'radius'\?"):
         mapped(ROBOT, X, Y, also=["radii"])
+
+
+@pytest.mark.parametrize(
+    ("x", "y"),
+    [
+        (("ground.friction", 200.0, 300.0), (K1, "7 N*mm/deg", "15 N*mm/deg")),
+        (("legs.half_width", "60 mm", "90 mm"), ("legs.forward_offset", "40 mm", "60 mm")),  # no onset is on this map
+        (("modules", 5, 6), ("speed", "0.08 m/s", "0.1 m/s")),
+    ],
+)
+def test_radii_do_not_depend_on_a_spring_on_the_horizontal_axis(x, y):
+    robot = ROBOT.with_value(K1, stiffness(9.0))
+    found = mapped(robot, x, y, points=2, also=["radius"])
+    bends = found.fate == FATES.index(Fate.BENDS)
+    assert bends[0, -1]
+    np.testing.assert_array_equal(np.isfinite(found.radius), bends)
+    assert found.remarks == ()
+    there = Plane.over(robot, x, y).at(float(found.x_values[-1]), float(found.y_values[0]))
+    walks = curved_walks(there, K1, (there.get(K1), stiffness(20.0)))
+    assert found.radius[0, -1] == pytest.approx(float(walks.axis_radius[-1]), rel=1e-6)
+
+
+def test_a_curve_beside_another_that_does_not_explain_its_edges_is_followed():
+    """Neimark-Sacker points beside a pitchfork, in a corner: two multipliers are unstable, 0 to the right, 1 above."""
+    numbers = {"body.modules": 3, "body.mass": 0.01, "body.length": 0.09, "legs.forward_offset": 0.006}
+    numbers |= {"legs.half_width": 0.01, "gait.stride": 0.004, "ground.friction": 2.0}
+    robot = ROBOT
+    for path, value in numbers.items():
+        robot = robot.with_value(path, value)
+    ends = stiffness(0.0005), stiffness(0.001421875)
+    found = mapped(robot, (K1, *ends), ("springs.stiffness[1]", *ends), points=3)
+    assert found.unstable[:2, :2].tolist() == [[2, 0], [1, 0]]
+    assert sorted(curve.kind.label for curve in found.curves) == ["Neimark-Sacker", "pitchfork"]
+    curve = found.curves[[each.kind for each in found.curves].index(Kind.NEIMARK_SACKER)]
+    for (a, b), error in zip(curve.values, curve.error_bound, strict=True):
+        line = robot.with_value("springs.stiffness[1]", b)
+        points = bifurcations(line, K1, (0.98 * a, 1.02 * a), normal_form=False)
+        near = [each.point for each in points if each.point.kind is Kind.NEIMARK_SACKER]
+        assert min(abs(each.value - a) for each in near) <= 1e-6 * a + 10.0 * error.max()
+
+
+def test_why_a_computation_failed_is_said():
+    found = mapped(ROBOT, ("gait.stance", "1 h", "2 h"), ("body.mass", 8.0, 9.0), points=2)
+    assert {FATES[index] for index in found.fate.ravel()} == {Fate.FAILED}
+    (remark,) = found.remarks
+    assert remark.startswith("at 4 of the values the computation failed: the motion is too fast to follow")
 
 
 def test_folds_begin_where_the_pitchfork_turns(monkeypatch):

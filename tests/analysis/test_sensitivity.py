@@ -8,13 +8,14 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.stats.qmc import Sobol
 
-from chilopod.analysis import Onset, bifurcations, curved_walks, sensitivity, uncertainty
+from chilopod.analysis import Onset, bifurcations, compare, curved_walks, sensitivity, uncertainty
 from chilopod.analysis.derivatives import derivative
 from chilopod.analysis.parameters import ALL, K1, numbers_read, stiffness
 from chilopod.analysis.quantities import leading_mode
 from chilopod.analysis.uncertainty import sobol_shares
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.robot import load_robot
+from chilopod.stability import Kind
 
 ROBOT = load_robot("aoi2022-planar")
 ROBOT_ONSET = Onset().first(ROBOT).point.value
@@ -128,13 +129,27 @@ def test_an_onset_of_springs_alike_does_not_depend_on_each():
 def test_its_summary_and_its_json_say_the_same():
     found = sensitivity(ROBOT, quantities=("onset", "frequency"), paths=["body.mass", "springs.damping[0]"])
     lines, plain = found.lines(), found.as_json()
-    assert "onset 11.991 N*mm/deg" in lines[0]
+    assert "onset 11.991 N*mm/deg (bends)" in lines[0]
     assert any(line.split()[:2] == ["body.mass", "8.5"] for line in lines)
     assert any("springs.damping[0] is 0: onset changes by" in line for line in lines)
     assert plain["onset"]["percent_per_percent"]["body.mass"] == found.percent("onset")["body.mass"]
     axes = found.plot(Figure().add_subplot())
     assert len(axes.patches) == 1
     assert axes.get_xlabel() == "change of the onset by 1 % of a number (%)"
+
+
+def test_an_onset_says_what_the_straight_walk_does_beyond_it():
+    others = "springs.stiffness[1:]"
+    found = sensitivity(ROBOT, Onset(others), ("onset",), ["body.mass"])
+    (there,) = bifurcations(ROBOT, others, (0.99 * found.values[0], 1.01 * found.values[0]), normal_form=False)
+    assert there.point.kind is Kind.NEIMARK_SACKER
+    assert found.title.endswith(" N*mm/deg (undulates)")
+    assert found.as_json()["onset"]["fate"] == "undulates"
+    first = sensitivity(ROBOT, quantities=("onset",), paths=["body.mass"])
+    assert (first.title.split()[-1], first.as_json()["onset"]["fate"]) == ("(bends)", "bends")
+    both = compare(ROBOT, ROBOT.with_value("body.mass", 9.0), Onset(others), ("onset",))
+    assert both.title.count("(undulates)") == 2
+    assert both.as_json()["quantities"]["onset"]["fates"] == ["undulates"] * 2
 
 
 def test_what_is_not_known_is_refused():
@@ -202,6 +217,19 @@ class TestUncertainty:
         assert found.interval[0] < found.value < found.interval[1]
         changes = np.array([sensitivity(ROBOT, paths=paths).percent("onset")[path] for path in paths])
         assert found.shares.total == pytest.approx(changes**2 / (changes**2).sum(), abs=0.1)
+
+    def test_onsets_of_two_kinds_are_counted(self):
+        robot, second = ROBOT.with_value("body.modules", 5), "springs.stiffness[1]"
+        numbers = {"body.length": 4.0, "body.mass": 100.0, "ground.friction": 900.0, "legs.forward_offset": 0.2}
+        numbers |= {"gait.stride": 0.12, ALL: stiffness(900.0), second: stiffness(630.0)}
+        for path, value in numbers.items():
+            robot = robot.with_value(path, value)
+        found = uncertainty(robot, {second: stiffness(190.0)}, samples=16)
+        counts = {fate.label: count for fate, count in found.fates.items()}
+        assert {*counts} == {"bends", "undulates"}
+        assert sum(counts.values()) + found.failed == found.evaluations
+        assert found.as_json()["fates"] == counts
+        assert any(f"undulates in {counts['undulates']}" in line and "mix" in line for line in found.lines())
 
     def test_robots_without_an_onset_are_counted_and_do_not_count(self):
         onset = Onset(between=(stiffness(11.9), stiffness(75.0)))

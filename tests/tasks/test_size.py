@@ -14,7 +14,7 @@ from chilopod.errors import ChilopodError
 from chilopod.progress import silent
 from chilopod.robot import Robot, load_robot
 from chilopod.tasks import size
-from chilopod.tasks.sizing.search import FAILED, Outcome, Search, Wish
+from chilopod.tasks.sizing.search import FAILED, Outcome, Search, Wish, parsed_wish
 from chilopod.trials import NONE, Trial, run, summaries
 
 ROBOT = load_robot("aoi2022-planar")
@@ -101,8 +101,12 @@ def test_a_walk_that_settles_for_hours_is_said_to_be_settling():
 
 
 def test_limits_and_budgets():
-    gentle = size(ROBOT, {"margin": ">0.5", "settling": "<6 s"}, [SPRING])
+    gentle = size(ROBOT, {"margin": ">50%", "settling": "<6 s"}, [SPRING])
     assert gentle.outcome is Outcome.MET
+    (about,) = gentle.reasons
+    assert about.startswith("the onset of springs.stiffness[0] is 11.99")
+    assert about.endswith(" N*mm/deg (bends)")
+    assert gentle.wishes[0] == Wish("margin", 0.5, 1)
     assert gentle.values[0] >= 0.5
     assert gentle.values[1] <= 6.0
     spent = size(ROBOT, {"growth": -0.1, "onset": stiffness(30.0)}, [SPRING], budget=3)
@@ -128,6 +132,12 @@ def test_quantities_agree_with_other_computations():
     assert measured.work(robot) == pytest.approx(0.5 * angle**2 * (onset - spring), rel=1e-6)
     # The derivative of the onset by the friction, 0.1815 % per %, is that of `sensitivity`.
     assert measured.friction(robot) == pytest.approx(0.1815, rel=1e-3)
+
+
+def test_shares_are_wishes_without_a_unit():
+    assert parsed_wish(ROBOT, Onset(), "margin", "-30%") == Wish("margin", pytest.approx(-0.3))
+    with pytest.raises(ChilopodError, match=r"^growth = '30%'"):
+        parsed_wish(ROBOT, Onset(), "growth", "30%")
 
 
 def test_what_is_no_wish_or_no_range_is_refused():

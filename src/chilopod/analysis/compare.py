@@ -74,10 +74,6 @@ class RobotComparison(Summary):
     others: tuple[str, ...]
     effects: dict[str, Effects]
 
-    def _shown(self, name: str, value: float) -> str:
-        unit = unit_of(name, self.first, self.onset)
-        return f"{units.from_si(value, unit):.4g} {unit}".rstrip() if math.isfinite(value) else "none"
-
     def as_json(self) -> dict[str, Any]:
         """Differences and effects as plain numbers, SI; null where a robot has no such quantity."""
         robots, quantities = (self.first, self.second), {}
@@ -86,6 +82,9 @@ class RobotComparison(Summary):
             values = [finite(found.first), finite(found.second)]
             effects = {path: {key: finite(x[at]) for key, x in parts.items()} for at, path in enumerate(self.paths)}
             quantities[name] = {"values_si": values, "effects_si": effects}
+            if name == "onset":
+                known = zip(robots, values, strict=True)
+                quantities[name]["fates"] = [x and self.onset.fate(robot, x).label for robot, x in known]
         return {
             "robots": [robot.name for robot in robots],
             "parameter": self.onset.parameter,
@@ -99,7 +98,8 @@ class RobotComparison(Summary):
         """Both robots with their quantities."""
         said = []
         for name, found in self.effects.items():
-            said.append(f"{name} {self._shown(name, found.first)} and {self._shown(name, found.second)}")
+            pairs = (self.first, found.first), (self.second, found.second)
+            said.append(f"{name} {' and '.join(self.onset.in_words(robot, name, x, 4) for robot, x in pairs)}")
         return f"{self.first.name} and {self.second.name}: {', '.join(said)}"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:

@@ -21,9 +21,9 @@ import xarray as xr
 from chilopod.analysis.growth import FATES, Fate, growth_rates
 from chilopod.analysis.map_axes import DERIVED, Given, Plane
 from chilopod.analysis.map_curves import Search
-from chilopod.analysis.map_grid import FATE, Grid
+from chilopod.analysis.map_grid import FATE, GROWTH, Grid
 from chilopod.analysis.map_result import StabilityMap
-from chilopod.analysis.parameters import ALL
+from chilopod.analysis.parameters import ALL, K1
 from chilopod.analysis.quantities import Measured, Onset
 from chilopod.errors import ChilopodError, OutputError, ParameterError, known_names
 from chilopod.frozen import Array
@@ -87,15 +87,14 @@ def map(
     Raises
     ------
     ParameterError
-        If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if
-        radii are wanted and neither axis is a number of the robot; if the map would take too long.
+        If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if the
+        map would take too long.
     """
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:
         raise ParameterError("must be a number of values", field="points", value=points, allowed=f"2 to {_MOST_POINTS}")
     if also:
         known_names(also, _ALSO, "also", "must be a part of maps")
-    bending = _bending(plane) if "radius" in also else None
     file = None if kept is None else Path(kept)
     grid = Grid(plane, points, keep=lambda grid: _keep(grid, file) if file else None)
     if file:
@@ -110,7 +109,7 @@ def map(
         wanted |= search.cells()
         grid.refine(wanted, rest)
         search.run()
-    radius, lost = _radii(grid, bending, rest)
+    radius, lost = _radii(grid, "radius" in also, rest)
     if search.lost:
         lost.append(f"the pitchfork is subcritical at {sum(search.lost)} points, but its folds were not found")
     if search.with_folds and any(curve.kind is Kind.TRANSCRITICAL for curve in search.curves):
@@ -119,7 +118,7 @@ def map(
     return StabilityMap(
         robot, plane.x, plane.y, grid.x, grid.y, growth, frequency, error, unstable.astype(np.int16),
         fate.astype(np.int8), grid.computed, radius, curves=tuple(search.curves),
-        remarks=(*dict.fromkeys(search.remarks), *_invalid(grid), *lost),
+        remarks=(*dict.fromkeys(search.remarks), *_invalid(grid), *_failed(grid), *lost),
         folds_known=search.with_folds and not (search.lost or search.remarks),
     )  # fmt: skip
 
@@ -131,6 +130,13 @@ def _invalid(grid: Grid) -> list[str]:
     found = grid.robots(grid.x[columns[first]].tolist(), grid.y[rows[first]].tolist())
     reasons = {(why.field, why.problem): str(why) for why in found if isinstance(why, ChilopodError)}
     return [f"at {rows.size} of the values there is no robot: {'; or '.join(reasons.values())}"] if reasons else []
+
+
+def _failed(grid: Grid) -> list[str]:
+    """A sentence about the values whose computation failed."""
+    count = int((grid.values[FATE] == FATES.index(Fate.FAILED)).sum())
+    why = "the motion is too fast to follow, or a multiplier near the unit circle has no error bound"
+    return [f"at {count} of the values the computation failed: {why}"] * bool(count)
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
@@ -158,34 +164,46 @@ def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool
         remark(f"the map takes about {said}: {each:.2g} s a growth rate; fewer points or modules take less")
 
 
-def _bending(plane: Plane) -> Onset:
-    """Number of an axis along which a robot bends; ParameterError if there is none."""
-    for axis in (plane.x, plane.y):
-        if axis.path not in DERIVED and not axis.whole:
-            return Onset(axis.path, None if axis.path.startswith(ALL) else (axis.low, axis.high))
-    allowed = "maps with a number of the robot on an axis"
-    raise ParameterError("must be left out of this map", field="radius", allowed=allowed)
+def _bending(plane: Plane) -> list[Onset]:
+    """Numbers by which a curved walk may be reached from the onset, the likeliest first: springs of the axes, the first
+    spring, which may leave the map, and other numbers of the axes."""
+    axes = {each.path: (each.low, each.high) for each in (plane.x, plane.y) if each.path not in DERIVED}
+    springs = dict.fromkeys([*(path for path in axes if path.startswith(ALL)), K1])
+    others = (Onset(*each) for each in axes.items() if each[0] not in {*springs, "body.modules"})
+    return [*(Onset(path) for path in springs), *others]
 
 
-def _radii(grid: Grid, bending: Onset | None, progress: Progress) -> tuple[Array, list[str]]:
+def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[str]]:
     """Radius of the curved walk that leaves the straight one, m, shape (rows, columns), with a sentence on how many are
     not found. NaN for these, off a coarse lattice, where the robot does not bend, and everywhere if none is wanted."""
     bends = grid.values[FATE] == FATES.index(Fate.BENDS)
     found = np.full(bends.shape, np.nan)
-    if bending is None:
+    if not wanted:
         return found, []
-    measured = Measured(bending)
+    tried = [Measured(number) for number in _bending(grid.plane)]
     rows, columns = (np.unique(np.linspace(0, size - 1, min(size, _LATTICE)).astype(int)) for size in bends.shape)
-    nodes = []
-    for j in rows.tolist():
-        own = columns[bends[j, columns]].tolist()
-        # From the onset on, so that each walk is near the last.
-        nodes += [(j, i) for i in (own if bends[j, -1] else own[::-1])]
-    for done, (j, i) in enumerate(nodes):
+    places = np.argwhere(bends[np.ix_(rows, columns)])
+    nodes = np.column_stack([rows[places[:, 0]], columns[places[:, 1]]])
+    # From the onset on, each walk is corrected from the nearest known one; of other numbers of modules none is near.
+    places *= np.where([grid.plane.y.whole, grid.plane.x.whole], 100, 1)
+    apart, near = 1e6 + grid.values[GROWTH, *nodes.T], np.zeros(len(nodes), dtype=int)
+    seeds: list[tuple[Array, Array] | None] = [None] * len(nodes)
+    for done in range(len(nodes)):
         progress(done / len(nodes), f"{done} radii")
-        with suppress(ChilopodError):
-            if measured.branches < _BRANCHES:
-                found[j, i] = measured.walked("radius", grid.plane.at(float(grid.x[i]), float(grid.y[j])))
+        at = int(apart.argmin())
+        j, i = nodes[at].tolist()
+        for measured in tuple(tried):
+            measured.near = seeds[near[at]]
+            with suppress(ChilopodError):
+                if sum(each.branches for each in tried) < _BRANCHES:
+                    found[j, i] = measured.walked("radius", grid.plane.at(float(grid.x[i]), float(grid.y[j])))
+            if measured.near is not seeds[near[at]]:
+                tried.sort(key=lambda each: each is not measured)
+                seeds[at] = measured.near
+                away = np.abs(places - places[at]).sum(axis=1)
+                near[away < apart], apart = at, np.where(apart < np.inf, np.minimum(apart, away), np.inf)
+                break
+        apart[at] = np.inf
     lost = len(nodes) - int(np.isfinite(found).sum())
     said = f"{lost} of {len(nodes)} radii are not found, or of walks that bend a joint by more than a right angle"
     return found, [said] if lost else []

@@ -32,6 +32,7 @@ from chilopod.stability.points import WITHOUT_CRITICALITY
 _LONGEST = 0.04  # step along a curve, in units of the box
 _MOST = 12  # curves
 _COVERED = 1.5  # cells between an edge of the grid and the curve that crosses it
+_ON = 0.1  # cells between a curve and a point on it
 _FOLD_TOLERANCE = 1e-12  # of the flow; a fold is known to about its square root
 _FOLD_POINTS = 100
 _PIECES, _PIECE = 12, 5  # parts in which a branch is followed to its fold, and points of each
@@ -76,11 +77,13 @@ class MapCurve(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Edge:
-    """Two computed neighbours on the finest grid, at row j and column i and the next column (across) or row."""
+    """Two computed neighbours on the finest grid, at row j and column i and the next column (across) or row, and the
+    difference of their numbers of unstable multipliers."""
 
     j: int
     i: int
     across: bool
+    jump: int
 
     def ordered(self, along: Any, other: Any) -> tuple[Any, Any]:
         """Parts of the number that changes along it, and of the other number, in the order of the map's axes."""
@@ -115,8 +118,11 @@ class Search:
         while left and len(self.curves) < _MOST:
             edge = left[len(left) // 2]
             self._tried.add(edge)
+            known = [*self.curves]
             for point in self._located(edge):
-                self._follow(point, edge)
+                place = self._indices(np.array(edge.ordered(point.value, self._beside(edge))))
+                if not any(c.kind is point.kind and _distance(self._indices(c.values), place) < _ON for c in known):
+                    self._follow(point, edge)
             left = self._uncovered(left)
         if left:
             self.remarks.append(f"{_MOST} curves are followed; {len(left)} more places where a mode turns are left")
@@ -158,20 +164,23 @@ class Search:
         for across in (True, False):
             one, other = (count[:, :-1], count[:, 1:]) if across else (count[:-1], count[1:])
             places = np.argwhere((one >= 0) & (other >= 0) & (one != other))
-            found += [Edge(int(j), int(i), across) for j, i in places]
+            found += [Edge(int(j), int(i), across, int(abs(one[j, i] - other[j, i]))) for j, i in places]
         return found
 
     def _uncovered(self, edges: list[Edge]) -> list[Edge]:
-        """Edges that no curve crosses, and that are not beside one that was tried in vain."""
-        lines = [self._indices(curve.values) for curve in self.curves if curve.kind is not Kind.FOLD]
-        tried = np.array([(edge.i, edge.j) for edge in self._tried]).reshape(-1, 2)
+        """Edges whose difference no curves beside them explain, and that are not beside a like one that was tried."""
+        lines = [(each.kind, self._indices(each.values)) for each in self.curves if each.kind is not Kind.FOLD]
 
-        def nearest(edge: Edge) -> float:
+        def covered(edge: Edge) -> bool:
             middle = np.array([edge.i + 0.5 * edge.across, edge.j + 0.5 * (not edge.across)])
-            apart = [_distance(line, middle) for line in lines] + np.abs(tried - middle).max(axis=1).tolist()
-            return min(apart, default=np.inf)
+            if any(np.abs(middle - (e.i, e.j)).max() <= _COVERED for e in self._tried if e.jump == edge.jump):
+                return True
+            near = [kind for kind, line in lines if _distance(line, middle) <= _COVERED]
+            # One multiplier passes the unit circle on a curve, or a pair.
+            single = len(near) - (pairs := near.count(Kind.NEIMARK_SACKER))
+            return edge.jump % 2 <= single and edge.jump <= single + 2 * pairs
 
-        return [edge for edge in edges if nearest(edge) > _COVERED]
+        return [edge for edge in edges if not covered(edge)]
 
     def _indices(self, values: Array) -> Array:
         """Columns and rows, in fractions, of SI values of both numbers."""

@@ -17,6 +17,7 @@ from scipy.linalg import eig
 
 from chilopod import units
 from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.growth import Fate
 from chilopod.analysis.parameters import ALL, K1, searched_springs
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, first_loss, interval_text
 from chilopod.errors import AnalysisError, ParameterError
@@ -68,6 +69,14 @@ class Mode(NamedTuple):
         turns = abs(np.angle(self.multiplier**self.returns))
         return float(turns) / (self.returns * self.duration)
 
+    @property
+    def fate(self) -> Fate:
+        """Fate of the disturbance where it grows."""
+        if self.multiplier.imag != 0.0:
+            return Fate.UNDULATES
+        # A bend to one side is mirrored by the return of half a period.
+        return Fate.BENDS if (self.multiplier.real < 0.0) is (self.returns == 2) else Fate.ALTERNATES
+
 
 def straight_return(robot: Robot, symmetric: bool = True) -> ReturnMap:
     """Return map of the straight walk, over half a period where the gait has that symmetry."""
@@ -87,9 +96,9 @@ def leading_mode(robot: Robot, symmetric: bool = True) -> Mode:
 
 @dataclass(frozen=True)
 class Onset:
-    """The number whose change bends the robot, the interval in which its critical value is searched, of springs by
-    default that of :func:`chilopod.analysis.parameters.searched_springs`, and the value at which straight and curved
-    walks are studied, by default that of each robot; SI.
+    """The number at whose critical value the straight walk loses stability, to a bend or an undulation, the interval in
+    which that is searched, of springs by default that of :func:`chilopod.analysis.parameters.searched_springs`, and the
+    value at which straight and curved walks are studied, by default that of each robot; SI.
 
     Most robots bend as a spring falls. Where the straight walk is unstable at the upper end of the interval and stable
     at the lower one, the robot bends as the number rises.
@@ -141,6 +150,17 @@ class Onset:
             growth = leading_mode(robot.with_value(self.parameter, k)).growth
         return self.first(robot).point.value
 
+    def fate(self, robot: Robot, value: float) -> Fate:
+        """Fate of a disturbance beyond a critical value: the straight walk bends or undulates."""
+        return leading_mode(robot.with_value(self.parameter, value)).fate
+
+    def in_words(self, robot: Robot, quantity: str, value: float, digits: int) -> str:
+        """A quantity with its unit; for an onset, what the straight walk does beyond it."""
+        if not np.isfinite(value):
+            return "none"
+        shown = units.format(value, unit_of(quantity, robot, self), digits=digits)
+        return f"{shown} ({self.fate(robot, value).label})" if quantity == "onset" else shown
+
     def rises(self, robot: Robot) -> bool:
         """True if the straight walk is unstable at the upper end of the interval."""
         return leading_mode(robot.with_value(self.parameter, self.interval(robot)[1])).growth > 0.0
@@ -158,12 +178,14 @@ class Measured:
         Number that bends the robots.
     branches
         Number of branches of curved walks that were followed so far, which take a second or more each.
+    near
+        State of the curved walk from which the next is corrected, and inverse of the slope of what it lacks.
     """
 
     def __init__(self, number: Onset, similar: bool = True) -> None:
         self.number, self.branches, self._similar = number, 0, similar
         self._critical: float | None = None
-        self._near: tuple[Array, Array] | None = None  # state of a curved walk, inverse of the slope of what it lacks
+        self.near: tuple[Array, Array] | None = None
         self._last: tuple[Robot, WalkMeans] | None = None
 
     def function(self, name: str) -> Callable[[Robot], float]:
@@ -222,7 +244,7 @@ class Measured:
         return -1.0 / growth
 
     def margin(self, robot: Robot) -> float:
-        """Relative distance of the robot's number from the onset, negative if the robot bends."""
+        """Relative distance of the robot's number from the onset, negative if the straight walk is unstable."""
         apart = robot.get(self.number.parameter) / self.onset(robot) - 1.0
         return -apart if self.number.rises(robot) else apart
 
@@ -251,12 +273,12 @@ class Measured:
             value = units.format(robot.get(path), robot.unit_of(path), digits=4)
             raise AnalysisError("the straight walk is stable there: nothing curves", field=path, value=value)
         model = PlanarModel(robot, use_symmetry=False)
-        found = None if self._near is None else _corrected(model, *self._near)
+        found = None if self.near is None else _corrected(model, *self.near)
         if found is None:
             state = self._followed(robot, model)
             slope = model.flow(state, 0.0, model.period)[1] - np.eye(state.size)
             found = state, np.asarray(np.linalg.inv(slope), dtype=np.float64)
-        self._near = found
+        self.near = found
         return found[0]
 
     def _means(self, robot: Robot) -> WalkMeans:

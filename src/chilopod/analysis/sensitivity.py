@@ -1,4 +1,4 @@
-"""Derivatives of a robot's onset of bending, growth, radius and coefficient with respect to every number of its file.
+"""Derivatives of a robot's onset, growth, radius and coefficient with respect to every number of its file.
 
 The return map H of the straight walk is computed exactly for any robot. With the left and right eigenvectors l, r of a
 multiplier nu, l r = 1, its derivative by a number p is nu' = l H' r (first-order perturbation; Kato, *Perturbation
@@ -89,10 +89,12 @@ class Sensitivity(Summary, ReadOnlyArrays):
         found: dict[str, Any] = {"robot": self.robot.name, "parameter": self.onset.parameter, "at_si": at}
         found["numbers_si"] = numbers
         for row, name in enumerate(self.quantities):
-            found[name] = {"value_si": float(self.values[row])}
+            found[name] = {"value_si": (value := float(self.values[row]))}
             changes = "percent_per_percent" if name in _RELATIVE else "change_per_percent"
             errors = dict(zip(self.paths, self.errors[row].tolist(), strict=True))
             tables = {"derivatives_si": self.of(name), "errors_si": errors, changes: self.percent(name)}
+            if name == "onset":
+                found[name]["fate"] = self.onset.fate(self.robot, value).label
             found[name] |= {key: {path: finite(x) for path, x in table.items()} for key, table in tables.items()}
         return found
 
@@ -100,7 +102,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
     def title(self) -> str:
         """Robot, and the values of the quantities."""
         shown = zip(self.quantities, self.values.tolist(), strict=True)
-        said = (f"{name} {units.format(value, self._unit(name), digits=5)}" for name, value in shown)
+        said = (f"{name} {self.onset.in_words(self.robot, name, value, 5)}" for name, value in shown)
         return f"{self.robot.name}: {', '.join(said)}"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
@@ -157,7 +159,7 @@ def sensitivity(
     Parameters
     ----------
     robot, onset
-        Robot, and the number whose fall bends it, with the value at which growth, frequency and radius are taken.
+        Robot, and the number whose change bends it, with the value at which growth, frequency and radius are taken.
     quantities
         Some of :data:`chilopod.analysis.quantities.QUANTITIES`. The coefficient takes a hundred normal forms, the
         radius a branch of curved walks.

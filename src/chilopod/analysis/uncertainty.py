@@ -1,4 +1,4 @@
-"""Spread of the onset of bending where the numbers of a robot are uncertain, and the share of each number in it.
+"""Spread of the onset of instability where the numbers of a robot are uncertain, and the share of each number in it.
 
 Every uncertain number is uniform within its tolerance, independent of the others. The spread is propagated to first
 order, with the derivatives of :func:`chilopod.analysis.sensitivity`, and sampled (scipy's scrambled Sobol points). The
@@ -11,6 +11,7 @@ have the quantity.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ import numpy as np
 from scipy.stats.qmc import Sobol
 
 from chilopod import units
+from chilopod.analysis.growth import Fate
 from chilopod.analysis.quantities import Onset
 from chilopod.analysis.sensitivity import sensitivity
 from chilopod.errors import ChilopodError, ParameterError
@@ -72,7 +74,7 @@ def sobol_shares(f_a: Array, f_b: Array, f_ab: Array, rng: np.random.Generator) 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty(Summary, ReadOnlyArrays):
-    """Spread of the onset of bending.
+    """Spread of the onset, where the straight walk loses stability.
 
     Attributes
     ----------
@@ -86,6 +88,8 @@ class Uncertainty(Summary, ReadOnlyArrays):
         Onset in every sample, SI, shape (samples,), NaN where there is none; half are from each set of samples.
     shares, failed, evaluations
         Shares of the numbers in the variance, number of evaluations without an onset, and of all.
+    fates
+        Number of evaluations by what the straight walk does beyond the onset.
     """
 
     robot: Robot
@@ -98,6 +102,7 @@ class Uncertainty(Summary, ReadOnlyArrays):
     shares: Shares
     failed: int
     evaluations: int
+    fates: Counter[Fate]
 
     @property
     def deviation(self) -> float:
@@ -128,6 +133,8 @@ class Uncertainty(Summary, ReadOnlyArrays):
             "interval_si": [*map(finite, self.interval)],
             "evaluations": self.evaluations,
             "failed": self.failed,
+            "fate": self.onset.fate(self.robot, self.value).label,
+            "fates": {fate.label: count for fate, count in self.fates.items()},
             "numbers": {
                 path: {
                     "tolerance_si": float(self.tolerances[i]),
@@ -147,7 +154,8 @@ class Uncertainty(Summary, ReadOnlyArrays):
         numbers = self.value, self.deviation, self.propagated, *self.interval
         value, deviation, propagated, low, high = (f"{units.from_si(each, unit):.4g}" for each in numbers)
         spread = f"standard deviation {deviation} (to first order {propagated}), 90 % between {low} and {high}"
-        return f"{self.robot.name}: onset {value} {unit}, {spread if self._known.size else 'no sample has one'}"
+        value = f"{value} {unit} ({self.onset.fate(self.robot, self.value).label})"
+        return f"{self.robot.name}: onset {value}, {spread if self._known.size else 'no sample has one'}"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         cells: list[Sequence[str]] = [("number", "within ±", "share alone", "with others")]
@@ -160,6 +168,9 @@ class Uncertainty(Summary, ReadOnlyArrays):
             cells.append((path, within, alone, jointly))
         said = f"{self.failed} of {self.evaluations} robots are not possible or have no onset, and do not count"
         below = [said] * bool(self.failed)
+        if len(self.fates) > 1:
+            counts = ", ".join(f"{fate.label} in {count}" for fate, count in self.fates.most_common())
+            below.append(f"beyond the onset the straight walk {counts} robots: spread and shares mix these")
         if self.deviation == 0.0:
             below.append("none of these numbers changes the onset")
         if np.ptp(shares.total_ends, axis=1).max(initial=0.0) > _WIDE:
@@ -184,12 +195,12 @@ def uncertainty(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Uncertainty:
-    """Spread of the onset of bending for numbers within tolerances.
+    """Spread of the onset for numbers within tolerances.
 
     Parameters
     ----------
     robot, onset
-        Robot, and the number whose fall bends it.
+        Robot, and the number whose change bends it.
     tolerances
         Largest deviation of each uncertain number, SI, by its path.
     samples, seed
@@ -216,7 +227,7 @@ def uncertainty(
     centre = np.array([robot.get(path) for path in paths])
     first, second = (centre + deviations[:, half] for half in range(2))
     blocks = [first, second, *(np.where(np.arange(widths.size) == i, second, first) for i in range(widths.size))]
-    found = np.full((len(blocks), samples), np.nan)
+    found, fates = np.full((len(blocks), samples), np.nan), Counter[Fate]()
     for at, numbers in enumerate(np.concatenate(blocks).tolist()):
         if at % samples % _SHOWN == 0:
             progress(0.1 + 0.9 * at / found.size, f"{at} of {found.size} robots")
@@ -225,8 +236,10 @@ def uncertainty(
             for path, number in zip(paths, numbers, strict=True):
                 sample = sample.with_value(path, number)
             found.flat[at] = onset.beside(sample, value)
+            fates[onset.fate(sample, float(found.flat[at]))] += 1
     shares, failed = sobol_shares(found[0], found[1], found[2:], rng), int(np.isnan(found).sum())
-    return Uncertainty(robot, onset, value, paths, widths, propagated, found[:2].ravel(), shares, failed, found.size)
+    sampled = found[:2].ravel()
+    return Uncertainty(robot, onset, value, paths, widths, propagated, sampled, shares, failed, found.size, fates)
 
 
 def _check(robot: Robot, tolerances: Mapping[str, float], onset: Onset, samples: int) -> None:

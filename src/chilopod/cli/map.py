@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, RobotOptions, deliver, free, with_options
+from chilopod.cli.options import OutOption, RobotOptions, deliver, free, note_si, with_options
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import known_names
 
@@ -70,6 +70,8 @@ def stability_map(
             robot, x, y, points=points, also=also, kept=out and out / "map-rates.nc", replace=options.force,
             remark=lambda sentence: typer.echo(f"note: {sentence}", err=True), progress=partial(tell, "map"),
         )  # fmt: skip
+    for name, (path, *ends) in (("x", x), ("y", y)):
+        note_si(robot, path, f"--{name} {path}", ends)
 
     def write() -> list[Path]:
         return write_map(found, shown, out, replace=options.force) if out else []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property, partial
 from inspect import Parameter, Signature, signature
@@ -253,12 +253,22 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
             robot.override(parameter, text)
     if not low < high:
         raise ParameterError("must rise from a lower to a higher value", field="between", value=" ".join(between))
-    shown = robot.unit_of(parameter)
-    if shown != unit and any(map(_bare, between)):
-        taken = f"{units.format(low, unit, digits=4)} to {units.format(high, unit, digits=4)}"
-        own = f"{units.format(low, shown, digits=4)} to {units.format(high, shown, digits=4)}"
-        typer.echo(f"note: a number without a unit is SI: --between is {taken}, that is {own}", err=True)
+    note_si(robot, parameter, "--between", between)
     return low, high
+
+
+def note_si(robot: Robot, path: str, option: str, ends: Sequence[str]) -> None:
+    """Say what a range is taken for if it has no unit; a range that is none is refused where it is read."""
+    from chilopod import units
+
+    with suppress(ChilopodError):
+        unit, shown = robot.si_unit_of(path), robot.unit_of(path)
+        if shown != unit and any(map(_bare, ends)):
+            low, high = (units.parse(end, unit) for end in ends)
+            taken, own = (
+                f"{units.format(low, u, digits=4)} to {units.format(high, u, digits=4)}" for u in (unit, shown)
+            )
+            typer.echo(f"note: a number without a unit is SI: {option} is {taken}, that is {own}", err=True)
 
 
 def onset_of(robot: Robot, parameter: str, between: tuple[str, str] | None, at: str | None = None) -> Onset:

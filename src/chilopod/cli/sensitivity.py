@@ -47,9 +47,9 @@ def sensitivity(
 ) -> None:
     """Effect of each number of a robot on where it bends: derivatives with respect to every number of its file.
 
-    The onset is the value of the number at which the straight walk begins to bend, as it falls or as it rises. Growth
-    and frequency are those of the leading mode of the straight walk. With --uncertain it prints the spread of the onset
-    where numbers are uniform within tolerances, and the share of each number in it.
+    The onset is the value of the number at which the straight walk loses stability (bends or undulates), as it falls or
+    as it rises. Growth and frequency are those of the leading mode of the straight walk. With --uncertain it prints the
+    spread of the onset where numbers are uniform within tolerances, and the share of each number in it.
 
     Example: chilopod sensitivity aoi2022-planar --uncertain 10%
     """
@@ -88,10 +88,10 @@ def compare(
 ) -> None:
     """Differing numbers of two robots, and the part of each in the difference of where they bend.
 
-    The onset is the value of the number at which the straight walk begins to bend. A part is the mean over all orders
-    in which the numbers of the first robot can be changed to those of the second (Shapley value), so parts add up.
-    Robots that differ in ten numbers or more take minutes, and a note says how many; a part is unknown where a robot in
-    between has no such quantity, or moves far faster than both.
+    The onset is the value of the number at which the straight walk loses stability (bends or undulates). A part is the
+    mean over all orders in which the numbers of the first robot can be changed to those of the second (Shapley value),
+    so parts add up. Robots that differ in ten numbers or more take minutes, and a note says how many; a part is unknown
+    where a robot in between has no such quantity, or moves far faster than both.
 
     Example: chilopod compare aoi2022-planar aoi2022
     """

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from chilopod.cli.options import OnsetOptions, with_options
+from chilopod.cli.options import OnsetOptions, note_si, with_options
 from chilopod.errors import ParameterError
 
 
@@ -23,7 +23,7 @@ class _SizeOptions(OnsetOptions):
     speed: _wish("speed along the curved walk, or along the straight one if that is stable") = None  # type: ignore[valid-type]
     onset: _wish("critical value of --parameter") = None  # type: ignore[valid-type]
     growth: _wish("growth rate of the leading mode of the straight walk") = None  # type: ignore[valid-type]
-    margin: _wish("relative distance of --parameter from its onset, negative if the robot bends") = None  # type: ignore[valid-type]
+    margin: _wish("relative distance of --parameter from its onset, negative if the straight walk is unstable") = None  # type: ignore[valid-type]
     settling: _wish("time in which a disturbance of the walk falls to 1/e") = None  # type: ignore[valid-type]
     friction: _wish("relative change of the onset by a relative change of the floor's friction") = None  # type: ignore[valid-type]
     work: _wish("work of an actuator that stiffens the spring of the curved walk to its onset") = None  # type: ignore[valid-type]
@@ -63,6 +63,8 @@ def size(
     if not wishes:
         raise ParameterError("must be given", field=" or ".join(f"--{name}" for name in _WISHES))
     ranges = [_range(text) for text in free]
+    for path, *ends in ranges:
+        note_si(robot, path, f"--free {path}", ends)
     file = options.free_in(options.out, "sized.toml")
     from chilopod import tasks
     from chilopod.output import write_atomic

@@ -8,6 +8,7 @@ computed changes the outcome. The result is a :class:`chilopod.tasks.sizing.resu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 import xarray as xr
@@ -26,6 +27,7 @@ from chilopod.trials import run
 _AS_COMPUTED = 0.02  # largest relative deviation of radius and speed of a planar walk from those computed
 _SETTLED = 15.0  # settling times of a walk
 _LONGEST = 900.0  # s, of a walk
+_OF_ONSET = {"onset", "margin", "friction", "work", "coefficient"}
 
 
 def size(
@@ -74,6 +76,10 @@ def size(
     outcome = search.run()
     reasons, front = search.reasons(outcome)
     found, again = search.at(search.best), search.again
+    if _OF_ONSET & {*names}:
+        with suppress(ChilopodError):
+            value = onset.in_words(found, "onset", again.onset(found), 6)
+            reasons = [*reasons, f"the onset of {onset.parameter} is {value}"]
     values = np.array([wish.of(again, found) for wish in given])
     bound = search.bound() if outcome is Outcome.MET and search.is_root else np.nan
     progress(1.0, "walks")

@@ -36,7 +36,7 @@ class Sizing(Summary, ReadOnlyArrays):
     free, numbers, bound
         Ranges of the free numbers, their values, SI, shape (numbers,), and the bound on the error of a root, or NaN.
     outcome, reasons
-        Outcome, and sentences about what stands in the way.
+        Outcome; sentences about what stands in the way, and about the onset if a wish depends on it.
     front
         Pareto front of two conflicting wishes: free numbers, then quantities, SI, shape (points, numbers + wishes).
     walks
