@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Sized
 from dataclasses import fields, is_dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,12 @@ _MOST_SHOWN, _WIDEST, _FEW = 12, 88, 6  # fields; characters of one; numbers of 
 
 
 class Short:
-    """Base of dataclasses that print as a few lines; large parts are shown by type and size."""
+    """Base of dataclasses that print as a few lines; large parts are shown by type and size.
+
+    ``_verdicts`` names properties that are printed too.
+    """
+
+    _verdicts: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
@@ -48,7 +53,7 @@ class Short:
 
 def _short(result: Any) -> str:
     shown = [each.name for each in fields(result) if each.repr]
-    lines = [f"    {name}={in_one_line(getattr(result, name))}" for name in shown[:_MOST_SHOWN]]
+    lines = [f"    {name}={in_one_line(getattr(result, name))}" for name in (*shown[:_MOST_SHOWN], *result._verdicts)]
     if len(shown) > _MOST_SHOWN:
         lines.append(f"    and {', '.join(shown[_MOST_SHOWN:])}"[: _WIDEST + 20])
     return "\n".join([f"{type(result).__name__}(", *lines, ")"])

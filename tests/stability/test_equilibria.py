@@ -136,6 +136,9 @@ class TestEquilibrium:
         assert (found.state == 0.0).all()
         assert found.stable
 
+    def test_its_stability_is_printed(self):
+        assert "    stable=True\n)" in str(find_equilibrium(oscillator(-0.3), [0.3, -0.2]))
+
     def test_on_the_axis_nothing_is_claimed(self):
         assert find_equilibrium(oscillator(0.0), [0.1, 0.0]).stable is None
         assert find_equilibrium(lorenz(LORENZ_HOPF), lorenz_state(24.7)).stable is None

@@ -307,7 +307,7 @@ def test_a_slow_family_is_not_called_once_the_time_is_over():
     found = locate(family, (0.3, 3.0), orbit=[0.0], seconds=0.5)
     assert found.status is SearchStatus.BUDGET
     assert len(calls) < 15
-    assert f"{found.searched[0]:.9g} to {found.searched[1]:.9g}, {found.evaluations} orbits" in str(found)
+    assert f"{found.searched[0]:.9g} to {found.searched[1]:.9g}, at {found.evaluations} values" in str(found)
 
 
 @pytest.mark.parametrize("low", [-1.0, 0.0, 0.1])

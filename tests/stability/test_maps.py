@@ -128,7 +128,7 @@ def test_a_multiplier_that_only_touches_the_circle_is_a_remark(family):
     assert len(found) == 0
     assert found.complete
     (remark,) = found.remarks
-    assert "only touches the unit circle" in remark
+    assert "only touches the unit circle, within its error" in remark  # two crossings may hide there
     assert float(remark.split()[1]) == pytest.approx(0.5, abs=1e-5)
 
 
@@ -197,6 +197,35 @@ def test_a_wrong_derivative_is_refused_whatever_came_before():
 )
 def test_a_right_derivative_passes_the_check(image):
     from_map(image, 1).flow(np.array([0.5]), 0.0, 1.0)
+
+
+@pytest.mark.parametrize("power", [2, 3, 5])
+def test_curvature_contradicts_no_derivative_that_is_zero(power):
+    """A difference of the odd powers is the step's."""
+
+    def family(p, wrong=0.0):
+        return from_map(lambda x: ([-p * x[0] - x[0] ** power], [[wrong - p - power * x[0] ** (power - 1)]]), 1)
+
+    (point,) = locate(family, (0.0, 1.5), orbit=[0.0])
+    assert point.kind is Kind.PERIOD_DOUBLING
+    assert abs(point.value - 1.0) <= point.error_bound
+    with pytest.raises(ParameterError, match=r"entry \(0, 0\) is 0.001, but .*; allowed: d state"):
+        multipliers(family(0.0, 1e-3), [0.0])
+
+
+def test_states_too_small_for_a_difference_need_their_scale():
+    def family(p, scale=None, wrong=0.0):
+        return from_map(
+            lambda x: ([-p * x[0] + 1e24 * x[0] ** 3], [[wrong - p + 3e24 * x[0] ** 2]]), 1, orbit=[0.0], scale=scale
+        )
+
+    with pytest.raises(
+        ParameterError, match=r"entry \(0, 0\) is -0.5, but .*; allowed: a smaller `scale` of the states"
+    ):
+        multipliers(family(0.5))
+    assert multipliers(family(0.5, [1e-12])).values.tolist() == [-0.5]
+    with pytest.raises(ParameterError, match=r"entry \(0, 0\) is -0.4, but a difference gives -0.5"):
+        multipliers(family(0.5, [1e-12], 0.1))
 
 
 @pytest.mark.parametrize(("quadratic", "kind"), [(0.0, Kind.PITCHFORK), (1e-8, Kind.TRANSCRITICAL)])

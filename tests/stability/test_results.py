@@ -120,7 +120,7 @@ def test_a_branch_of_one_point_prints():
 
 def test_located_points_print():
     assert [line.split("  ") for line in str(located()).splitlines()[1:]] == [
-        [f"searched: -1.5 to 3.6, {located().evaluations} orbits, at most {located().spacing:.2g} apart"],
+        [f"searched: -1.5 to 3.6, at {located().evaluations} values, at most {located().spacing:.2g} apart"],
         ["", "period doubling", f"-1 ± {located()[0].error_bound:.1e}", "supercritical"],
         ["", "transcritical", "", f"1 ± {located()[1].error_bound:.1e}"],
     ]

@@ -47,7 +47,7 @@ def test_a_small_orbit_is_that_of_the_linear_motion():
 
 
 @pytest.mark.parametrize("symmetry", [None, -np.eye(2)])
-@pytest.mark.parametrize("form", ["rows", "times", "record"])
+@pytest.mark.parametrize("form", ["rows", "times", "record", "record across"])
 def test_guesses_that_are_orbits(form, symmetry):
     system = duffing(symmetry=symmetry)
     known = find_orbit(system, [1.88, 0.64])
@@ -61,11 +61,23 @@ def test_guesses_that_are_orbits(form, symmetry):
         "rows": states[:-1],
         "times": (times + 3.0, along(times + 3.0)),
         "record": xr.DataArray(states, {"time": times}, ("time", "state")),
+        "record across": xr.DataArray(states.T, {"time": times}, ("state", "time")),
     }[form]
     found = find_orbit(system, guess)
     assert np.abs(found.state - known.state).max() <= (found.error + known.error).max() + 1e-14
     (point,) = locate(lambda force: duffing(force, -np.eye(2)), (2.2, 2.6), orbit=guess)
     assert point.value == pytest.approx(2.403377116057, abs=1e-11)
+
+
+def test_a_record_must_tell_its_times():
+    for record in (
+        xr.DataArray(np.ones((9, 2)), dims=("time", "state")),
+        xr.DataArray(np.ones((9, 2)), dims=("t", "i")),
+    ):
+        with pytest.raises(ParameterError, match=r"^orbit = .*: must tell its times; allowed: a dimension `time`"):
+            find_orbit(duffing(), record)
+    state = find_orbit(duffing(), xr.DataArray([1.88, 0.64], dims="state")).state
+    assert state == pytest.approx(find_orbit(duffing(), [1.88, 0.64]).state, abs=1e-14)
 
 
 def test_a_cycle_is_followed_to_where_it_becomes_homoclinic():

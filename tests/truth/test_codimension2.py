@@ -102,6 +102,44 @@ def test_cusp(unit):
     assert curve.values[0][0] == pytest.approx(-curve.values[-1][0], rel=1e-12)
 
 
+def test_the_tip_of_an_arnold_tongue_is_no_cusp():
+    """x -> x + q + p sin x has folds at q = p and q = -p, which are straight; at p = q = 0 it is the identity."""
+
+    def family2(q, p):
+        return mapped(lambda x: (x + q + p * np.sin(x), np.array([[1.0 + p * np.cos(x[0])]])))
+
+    start = BifurcationPoint(Kind.FOLD, 0.5, 0.0, np.array([1.5 * np.pi]), np.ones(1, complex), 1.0 + 0j, 0.0)
+    curve = follow2(family2, start, ((-1.0, 1.0), (-0.2, 0.8)), second=0.5)
+    check_special(curve, (CodimensionTwo.DEGENERATE_FOLD, [0.0, 0.0]))
+    assert curve.special[0].next_coefficient_error < 1e-9
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+
+
+def test_a_curve_that_is_lost_at_the_tip_of_an_arnold_tongue_says_so():
+    """A circle map with a decay towards the circle: at p = q = 0 every angle is a fixed point."""
+
+    def family2(q, p):
+        def image(x):
+            r, a = np.hypot(*x), np.arctan2(x[1], x[0])
+            radius = 1.0 + 0.3 * (r - 1.0) + p * np.cos(a)
+            angle = a + q + p * np.sin(a) + 0.2 * (r - 1.0) + 0.3 * p * np.cos(2.0 * a)
+            c, s = np.cos([a, angle]), np.sin([a, angle])
+            polar = np.array([[0.3, -p * s[0]], [0.2, 1.0 + p * c[0] - 0.6 * p * np.sin(2.0 * a)]])
+            out, back = (
+                np.array([[c[1], -radius * s[1]], [s[1], radius * c[1]]]),
+                np.array([[c[0], s[0]], [-s[0] / r, c[0] / r]]),
+            )
+            return radius * np.array([c[1], s[1]]), out @ polar @ back
+
+        return from_map(image, 2)
+
+    (fold,) = locate(lambda q: family2(q, 0.1), (0.0, 0.5), orbit=[1.0, 0.0])
+    curve = follow2(family2, fold, ((-0.5, 0.5), (-0.2, 0.4)), second=0.1, rising=False)
+    assert curve.endings[1] is Ending.LOST
+    assert np.abs(curve.values[-1]).max() < 1e-4
+    assert "tip of an Arnold tongue" in curve.reasons[1]
+
+
 def area_changing(a, b, c=0.2):
     """(x, y) -> (y, a - b x - y^2 + c x y): at its fixed point the determinant is b - c x, the trace (c - 2) x."""
     return mapped(

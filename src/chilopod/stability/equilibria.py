@@ -65,6 +65,7 @@ class Equilibrium(ReadOnlyArrays):
     jacobian: Array
     eigenvalues: ComplexArray
     error_bounds: Array
+    _verdicts = ("stable",)
 
     @property
     def stable(self) -> bool | None:

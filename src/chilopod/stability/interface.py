@@ -12,12 +12,13 @@ from __future__ import annotations
 import contextlib
 import functools
 import inspect
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any, Protocol, TypeGuard, TypeVar, cast, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words
 from chilopod.flows import deadline
@@ -150,7 +151,8 @@ def checked_flow(
     else:  # the function may return the same arrays at every call
         state, derivative = state.copy(), derivative.copy()
     if compared is not False and _is_long(system, t1 - t0) and is_due(function, with_error or compared is True):
-        compare(lambda x: checked_flow(system, x, t0, t1, with_error, False)[0], x, state, derivative, name)
+        scale = getattr(system, "scale", None)
+        compare(lambda x: checked_flow(system, x, t0, t1, with_error, False)[0], x, state, derivative, name, scale)
     if not with_error:
         return state, derivative
     error = numbers(found[2], (n, n) if shape_of(found[2]) else (), name)
@@ -247,6 +249,7 @@ _ROUNDING = 8.0 * float(np.finfo(float).eps)
 _STEPS = 1e-5, 1e-7, 1e-9  # steps of differences, relative to each state
 _FARTHER = 10.0 ** np.arange(-3.0, 8.0, 2.0)  # those at which a state near zero is not lost in the rounding of terms
 _CONTRADICTS = 1e-3  # least relative error of a derivative that is refused
+_CURVED = 2.0  # largest error of a difference, relative to its change at a shorter step, that may be curvature
 _ROUNDED = 1e-12  # error of an entry, relative to the largest, each in units of the states, that may be rounding
 _OWN = __name__.partition(".")[0]
 
@@ -264,14 +267,17 @@ def is_due(function: Any, always: bool = False) -> bool:
     return not own and (deadline.is_first(_code(function)) or always)
 
 
-def compare(mapped: Callable[[Array], Array], x: Array, state: Array, derivative: Array, field: str) -> None:
+def compare(
+    mapped: Callable[[Array], Array], x: Array, state: Array, derivative: Array, field: str, scale: ArrayLike | None
+) -> None:
     """Compare a derivative with differences: along one direction and, if these contradict it, entry by entry.
 
     Those to both sides differ by curvature, noise or a kink: a smaller error is not refused. Nor is one that vanishes
-    at longer steps: near zero the terms of a function may be far larger than the state, and round accordingly.
+    at longer steps: near zero the terms of a function may be far larger than the state, and round accordingly; nor one
+    that vanishes with the step, as the cube of a state does.
     """
     largest = float(np.abs(x).max()) or 1.0
-    steps, one = np.where(x != 0.0, np.abs(x), largest), np.eye(x.size)
+    steps, one = np.where(x != 0.0, np.abs(x), largest if scale is None else scale), np.eye(x.size)
 
     def compared(shift: Array) -> tuple[NDArray[np.bool_], Array]:
         with np.errstate(all="ignore"):
@@ -299,9 +305,15 @@ def compare(mapped: Callable[[Array], Array], x: Array, state: Array, derivative
         for i in np.flatnonzero(wrong).tolist():
             if any(agrees(i, step * one[j]) for step in (*_FARTHER * steps[j], *np.array(_STEPS) * largest)):
                 continue
-            given, other = derivative[i, j], column[0][1][i] / (_STEPS[0] * steps[j])
-            said = f"derivative entry ({i}, {j}) is {given:g}, but a difference gives {other:g}"
-            raise ParameterError(said, field=field, value=x.tolist(), allowed="d state[i] / d x[j]")
+            given = derivative[i, j]
+            slopes = [change[i] / (step * steps[j]) for (_, change), step in zip(column, _STEPS, strict=True)]
+            curved = all(abs(a - given) <= _CURVED * abs(a - b) for a, b in itertools.pairwise(slopes))
+            if curved and (x[j] != 0.0 or abs(slopes[0]) * steps[j] <= steps[i]):
+                continue
+            said = f"derivative entry ({i}, {j}) is {given:g}, but a difference gives {slopes[0]:g}"
+            smaller = f"a smaller `scale` of the states, as a state of 0 is disturbed by {_STEPS[0] * steps[j]:g}"
+            allowed = smaller if curved else "d state[i] / d x[j]"
+            raise ParameterError(said, field=field, value=x.tolist(), allowed=allowed)
 
 
 _KEPT = 64  # cached systems: those around a point are used repeatedly

@@ -55,7 +55,8 @@ class PeriodicSystem(ReadOnlyArrays):
     velocity
         Function ``velocity(x)`` -> dx/dt, shape (n,), for a system that does not depend on time.
     guess_period
-        Approximate period of such a system's orbits, or a multiple of it below 100; an orbit gets its shortest period.
+        Approximate period of such a system's orbits, or a multiple of it below 100; one from a state gets its
+        shortest period, one from a whole orbit that of the guess.
     flow_with_error, flow_states, flow_tangents, flow_volume, is_stiff, velocity_series
         See :mod:`chilopod.stability.interface`.
     concurrent
@@ -323,7 +324,7 @@ def from_map(
         for _ in range(math.ceil(t1) - math.ceil(t0)):
             start, (x, factor) = x, applied(x)
             if is_due(image, compared):
-                compare(lambda x: applied(x)[0], start, x, factor, "image")
+                compare(lambda x: applied(x)[0], start, x, factor, "image", scale)
             with np.errstate(all="ignore"):  # derivatives that are not finite are refused later
                 derivative, reach = factor @ derivative, np.abs(factor) @ reach
         return x, derivative, reach

@@ -23,6 +23,10 @@ class CodimensionTwo(Labelled):
     """Kind of a point of codimension two; each member's ``sentence`` describes it in words."""
 
     CUSP = "cusp", "two curves of folds meet and vanish: beyond it one orbit is left of three"
+    DEGENERATE_FOLD = (
+        "degenerate fold",
+        "the cubic term vanishes as well, unlike at a cusp: so at an Arnold tongue's tip",
+    )
     DEGENERATE_PITCHFORK = "degenerate pitchfork", "it turns from super- to subcritical: folds of new orbits end here"
     DEGENERATE_TRANSCRITICAL = "degenerate transcritical", "the quadratic term vanishes, as in a pitchfork"
     GENERALISED_PERIOD_DOUBLING = "generalised period doubling", "it turns subcritical: folds of new orbits end here"
@@ -80,9 +84,10 @@ class SpecialPoint2(Point2):
         Kind of the point.
     next_coefficient, next_coefficient_error
         Next coefficient where that of the curve's normal form vanishes, for the same map and amplitude, and a bound on
-        its error: c of a -> a + c a^3 at a cusp and a degenerate transcritical point; e of a -> a + e a^5 at a
+        its error: c of a -> a + c a^3 on folds and transcritical points; e of a -> a + e a^5 at a
         degenerate pitchfork and a generalised period doubling, and of |a| -> |a| + e |a|^5, the second Lyapunov
-        coefficient, at a Chenciner point. None elsewhere.
+        coefficient, at a Chenciner point. None elsewhere. Where it is zero within its error, a fold is degenerate and
+        no cusp, and the folds that the other kinds name need not exist.
     """
 
     kind: CodimensionTwo

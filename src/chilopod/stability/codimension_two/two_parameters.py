@@ -23,7 +23,7 @@ from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
-from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
+from chilopod.stability.codimension_two.detection import MEETING, Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.equilibria import SHRINKS
@@ -200,10 +200,13 @@ def _followed(
             return curve.evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
 
         about = curve.system(end.values), end.place.state, end.image.duration
+        if reason.startswith("step:") and np.linalg.svd(end.matrix[:-1], compute_uv=False)[-1] <= MEETING:
+            reason = _TIP
         reason = event_beside(*about, derivative) or reason
     return _Half(kept, ending, reason)
 
 
+_TIP = "the equations are singular here, as at the tip of an Arnold tongue, where periodic orbits form a continuum"
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
 _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
 _HALVINGS = 12  # halvings of the amplitude

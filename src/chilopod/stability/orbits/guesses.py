@@ -35,8 +35,11 @@ _STILL = 1e-3  # motion of a state, relative to the others, that counts as rest
 
 def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     """Nodes of a guess that is a whole orbit, as :func:`~chilopod.stability.find_orbit` takes it, or None."""
-    if hasattr(guess, "coords") and "time" in guess.coords:
-        guess = guess.coords["time"].values, guess.values
+    if hasattr(guess, "dims") and len(guess.dims) == 2:
+        if "time" not in guess.indexes:
+            allowed = "a dimension `time` with its values"
+            raise ParameterError("must tell its times", field="orbit", value=guess.dims, allowed=allowed)
+        guess = guess.indexes["time"], guess.transpose("time", ...).values
     n, whole = system.dimension, return_duration(system) * returns_per_period(system)
     timed = isinstance(guess, tuple) and len(guess) == 2 and hasattr(guess[1], "__len__")
     times, states = guess if timed else (None, guess)

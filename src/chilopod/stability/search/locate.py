@@ -103,10 +103,10 @@ class Located(Result, Sequence[BifurcationPoint]):
         many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"
         first = f"Located: {many}, {self.status.label}: {self.status.sentence}"
         low, high = self.searched
-        orbits = f"{self.evaluations} orbits, at most {self.spacing:.2g} apart"
+        at = f"at {self.evaluations} values, at most {self.spacing:.2g} apart"
         return [
             first,
-            f"searched: {low:.9g} to {high:.9g}, {orbits}",
+            f"searched: {low:.9g} to {high:.9g}, {at}",
             *rows(point.row for point in self.points),
             *said(self.remarks),
         ]
@@ -355,5 +355,6 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
     if touch:
         value_text = bounded(point.value, point.error_bound)
-        return f"at {value_text} a multiplier only touches the unit circle and goes back: nothing changes"
+        said = "only touches the unit circle, within its error, and goes back: nothing changes beside it"
+        return f"at {value_text} a multiplier {said}"
     return point
