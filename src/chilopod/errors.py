@@ -44,8 +44,7 @@ class ChilopodError(Exception):
         subject = None if self.field is None else _cut(self.field, _LONGEST_NAME) or "''"
         if self.value is not None:
             subject = f"{subject} = {_brief(self.value)}" if subject else _brief(self.value)
-        named = self.source is None or self.source == self.value
-        source = None if named else _cut(str(self.source), _LONGEST_NAME)
+        source = None if self.source is None else _cut(self.source, _LONGEST_NAME)
         text = ": ".join(part for part in (source, subject, self.problem) if part)
         if self.nearest:
             text = f"{text}; did you mean {self.nearest!r}?"

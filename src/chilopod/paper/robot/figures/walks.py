@@ -142,7 +142,8 @@ def _all(found: RobotWalks) -> dict[str, xr.Dataset]:
 
 def durations(found: RobotWalks) -> Panel:
     """Onset, radii and shares of curved walks over the duration of the walks."""
-    data, settled = found.durations, number(onset_point(found.base).value, 3)
+    data, settled = found.durations, onset_point(found.base).value
+    alone = f", {number(settled, 3)} {SPRING_UNIT}" if np.isfinite(settled) else ""
     times = listing(f"{each:g}" for each in data.duration.values)
     said = "; ".join(f"{row.statement.quantity.partition(',')[0]} {row.result.words}" for row in duration_rows(data))
     return Panel(
@@ -155,7 +156,7 @@ def durations(found: RobotWalks) -> Panel:
             "The paper does not say how long its robot walked before the angles were averaged. These are the walks of "
             f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s. A bend takes its "
             f"time, the longer the closer {k(1)} is to the onset. So all curved walks count here, also those that have "
-            f"not settled, and the last onset may differ from that of settled walks alone, {settled} {SPRING_UNIT}.",
+            f"not settled, and the last onset may differ from that of settled walks alone{alone}.",
             f"What the table asks, and whether it is met: {typeset(said)}.",
         ),
         data=data,
