@@ -96,8 +96,7 @@ def draw_fork(
         along = np.linspace(1.0 / fit.critical, inverse.max(), 200)
         for sign, name in ((1.0, law[1]), (-1.0, None)):
             axes.plot(along, sign * np.rad2deg(fit.angle(along)), color=law[0], linestyle=DASHED, lw=1.3, label=name)
-    finish(axes, ylabel="mean angle of joint 1 (deg)", title="C  Joint 1")
-    axes.legend(loc="upper left", frameon=True, framealpha=1.0, edgecolor="none")  # lines over the full height pass it
+    finish(axes, legend="upper left", ylabel="mean angle of joint 1 (deg)", title="C  Joint 1")
 
 
 def draw_robot_radii(axes: Axes, places: Sequence[float]) -> None:

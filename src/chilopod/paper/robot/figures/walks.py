@@ -168,7 +168,8 @@ def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
     shapes.draw_examples(axes, found.examples, narrow)
     base, fit, paper = found.base, found.fit, printed.ONSET.value
     inverse = 1.0 / base.spring.values
-    axes["C"].axvline(1.0 / paper, color=style.ORANGE, lw=1.4, label=f"robot's onset, {paper:g}")
+    # The legend stands above the line.
+    axes["C"].axvline(1.0 / paper, ymax=0.58, color=style.ORANGE, lw=1.4, label=f"robot's onset, {paper:g}")
     law = (style.VERMILLION, f"square root from {number(fit.critical, 3)}" if fit else "")
     shapes.draw_fork(axes["C"], base, _SIDES, fit, law)
     axes["C"].set_xlim(0.0, 1.06 * inverse.max())
