@@ -119,9 +119,8 @@ def by_energy(value):
 
 def test_branches_leave_collisions_of_a_family_by_energy():
     """The orbit along an axis: across it states are rounding, and orbits of the family with other periods are near."""
-    branch = follow(by_energy, begin(by_energy, 0.0, [0.0, -0.478, 0.0, 0.0], rising=False), (-0.1, 0.1), points=10)
-    doubled, equal = branch.special_points[:2]
-    for point, times in ((doubled, 2), (equal, 1)):
+    branch = follow(by_energy, begin(by_energy, 0.0, [0.0, -0.42, 0.0, 0.0], rising=False), (-0.1, 0.1), points=15)
+    for point, times in zip(branch.special_points[:3], (2, 2, 1), strict=True):
         for start in switch(by_energy, point):
             left = follow(by_energy, start, (-0.1, 0.1), points=1, closely=False)
             assert left.ending is Ending.ENOUGH_POINTS
@@ -133,4 +132,4 @@ def test_branches_leave_collisions_of_a_family_by_energy():
                 end = solve_ivp(rhs, (0.0, each.period), each.orbit, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
                 np.testing.assert_allclose(end, each.orbit, atol=1e-9)
     with pytest.raises(AnalysisError, match=r"does not close"):
-        follow(by_energy, replace(start, orbit=equal.orbit + 0.01 * np.eye(4)[0]), (-0.1, 0.1), points=1)
+        follow(by_energy, replace(start, orbit=point.orbit + 0.01 * np.eye(4)[0]), (-0.1, 0.1), points=1)
