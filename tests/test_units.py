@@ -23,6 +23,7 @@ STIFFNESS = "N*m/rad"
         ("2 N*m*s/rad", "N*m*s/rad", 2.0), ("2 N*m/(rad/s)", "N*m*s/rad", 2.0), ("3 kg*cm^2", "kg*m^2", 3e-4),
         ("3 kg*cm²", "kg*m^2", 3e-4), ("256.5 N*s/m", "N*s/m", 256.5), ("1 kgf", "N", 9.80665), ("2 Hz", "1/s", 2.0),
         ("-1.5e-3", "m", -1.5e-3), ("120", STIFFNESS, 120.0), (120, STIFFNESS, 120.0), (Fraction(1, 4), "m", 0.25),
+        ("30%", "", 0.3), ("-2.5 %", "", -0.025), ("10 %/s", "1/s", 0.1),
     ],
 )  # fmt: skip
 def test_reads(text, si_unit, value):

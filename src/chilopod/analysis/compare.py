@@ -84,7 +84,8 @@ class RobotComparison(Summary):
             quantities[name] = {"values_si": values, "effects_si": effects}
             if name == "onset":
                 known = zip(robots, values, strict=True)
-                quantities[name]["fates"] = [x and self.onset.fate(robot, x).label for robot, x in known]
+                fates = [None if x is None else self.onset.fate(robot, x).label for robot, x in known]
+                quantities[name]["fates"] = fates
         return {
             "robots": [robot.name for robot in robots],
             "parameter": self.onset.parameter,

@@ -122,6 +122,14 @@ def _leading(robots: list[Robot], half: bool) -> Array:
     return rows
 
 
+def growing(nu: ComplexArray, half: bool) -> NDArray[np.intp]:
+    """Indices of the fates of modes that grow, by their multipliers of a return, which takes a period or half of it."""
+    # A bend to one side is mirrored by the return of half a period.
+    bends = nu.real < 0.0 if half else nu.real > 0.0
+    real = np.where(bends, FATES.index(Fate.BENDS), FATES.index(Fate.ALTERNATES))
+    return np.where(nu.imag != 0.0, FATES.index(Fate.UNDULATES), real)
+
+
 def _rows(values: ComplexArray, period: Array, half: bool) -> Array:
     """Rows of :func:`_batch` of multipliers of a return, shape (robots, 2N+1)."""
     moduli = np.abs(values)
@@ -129,10 +137,7 @@ def _rows(values: ComplexArray, period: Array, half: bool) -> Array:
     returns = 2 if half else 1
     with np.errstate(divide="ignore"):
         growth = returns * np.log(np.abs(nu)) / period
-    # A bend to one side is mirrored by the return of half a period.
-    bends = nu.real < 0.0 if half else nu.real > 0.0
-    real = np.where(bends, FATES.index(Fate.BENDS), FATES.index(Fate.ALTERNATES))
-    fate = np.where(nu.imag != 0.0, FATES.index(Fate.UNDULATES), real)
+    fate = growing(nu, half)
     fate[growth < 0.0] = FATES.index(Fate.STRAIGHT)
     frequency = np.abs(np.angle(nu**returns)) / period
     return np.stack([growth, frequency, np.full(period.size, np.nan), (moduli > 1.0).sum(1), fate])

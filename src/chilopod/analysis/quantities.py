@@ -17,7 +17,7 @@ from scipy.linalg import eig
 
 from chilopod import units
 from chilopod.analysis.branch import curved_walks
-from chilopod.analysis.growth import Fate
+from chilopod.analysis.growth import FATES, Fate, growing
 from chilopod.analysis.parameters import ALL, K1, searched_springs
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, first_loss, interval_text
 from chilopod.errors import AnalysisError, ParameterError
@@ -72,10 +72,7 @@ class Mode(NamedTuple):
     @property
     def fate(self) -> Fate:
         """Fate of the disturbance where it grows."""
-        if self.multiplier.imag != 0.0:
-            return Fate.UNDULATES
-        # A bend to one side is mirrored by the return of half a period.
-        return Fate.BENDS if (self.multiplier.real < 0.0) is (self.returns == 2) else Fate.ALTERNATES
+        return FATES[int(growing(np.array(self.multiplier), self.returns == 2))]
 
 
 def straight_return(robot: Robot, symmetric: bool = True) -> ReturnMap:

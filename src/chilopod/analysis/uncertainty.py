@@ -89,7 +89,7 @@ class Uncertainty(Summary, ReadOnlyArrays):
     shares, failed, evaluations
         Shares of the numbers in the variance, number of evaluations without an onset, and of all.
     fates
-        Number of evaluations by what the straight walk does beyond the onset.
+        Number of samples by what the straight walk does beyond the onset.
     """
 
     robot: Robot
@@ -236,7 +236,8 @@ def uncertainty(
             for path, number in zip(paths, numbers, strict=True):
                 sample = sample.with_value(path, number)
             found.flat[at] = onset.beside(sample, value)
-            fates[onset.fate(sample, float(found.flat[at]))] += 1
+            if at < 2 * samples:  # independent ones
+                fates[onset.fate(sample, float(found.flat[at]))] += 1
     shares, failed = sobol_shares(found[0], found[1], found[2:], rng), int(np.isnan(found).sum())
     sampled = found[:2].ravel()
     return Uncertainty(robot, onset, value, paths, widths, propagated, sampled, shares, failed, found.size, fates)

@@ -28,7 +28,7 @@ _PI: Final = Fraction(31415926535897932384626433832795028841971693993751, 10**49
 _NUMBER: Final = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE]([+-]?[0-9]+))?)(?![0-9.])\s*(.*)", re.DOTALL)
 # An operator or bracket, or a name with its power. Powers have one digit and belong to names, never to brackets, so no
 # text can make a number too big to compute with.
-_TOKEN: Final = re.compile(r"\s*(?:([*/()])|([A-Za-z]+|1)(?:\s*(?:\^|\*\*)\s*([+-]?[0-9]))?(?![0-9]))\s*")
+_TOKEN: Final = re.compile(r"\s*(?:([*/()])|([A-Za-z]+|1|%)(?:\s*(?:\^|\*\*)\s*([+-]?[0-9]))?(?![0-9]))\s*")
 # Typographic forms that are common in papers.
 _PLAIN: Final = str.maketrans({"·": "*", "⋅": "*", "×": "*", "µ": "u", "μ": "u", "°": "deg", "²": "^2", "³": "^3"})
 
@@ -66,6 +66,7 @@ class Unit:
 
 _ONE: Final = Unit(Fraction(1), 0, (0, 0, 0, 0))
 _UNITS: Final = {
+    "%": Unit(Fraction(1, 100), 0, (0, 0, 0, 0)),
     "m": Unit(Fraction(1), 0, (1, 0, 0, 0)),
     "g": Unit(Fraction(1, 1000), 0, (0, 1, 0, 0)),
     "s": Unit(Fraction(1), 0, (0, 0, 1, 0)),

@@ -110,9 +110,7 @@ def parsed_wish(robot: Robot, onset: Onset, name: str, given: float | str) -> Wi
     try:
         sense = {"<": -1, ">": 1}.get(given[:1], 0) if isinstance(given, str) else 0
         unit = robot.si_unit_of(onset.parameter) if name == "onset" else QUANTITIES[name]
-        text, percent = str(given)[abs(sense) :].removeprefix("="), "%" * (not unit)
-        value = units.parse(text.removesuffix(percent), unit) if isinstance(given, str) else float(given)
-        value *= 0.01 if percent and text.endswith(percent) else 1.0
+        value = units.parse(given[abs(sense) :].removeprefix("="), unit) if isinstance(given, str) else float(given)
         if not np.isfinite(value) or (name in ("radius", "speed", "settling") and value <= 0.0):
             raise ParameterError("must be finite, and positive for a radius, a speed or a time", value=given)
     except ChilopodError as error:
