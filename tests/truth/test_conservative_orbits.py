@@ -133,3 +133,27 @@ def test_branches_leave_collisions_of_a_family_by_energy():
                 np.testing.assert_allclose(end, each.orbit, atol=1e-9)
     with pytest.raises(AnalysisError, match=r"does not close"):
         follow(by_energy, replace(start, orbit=point.orbit + 0.01 * np.eye(4)[0]), (-0.1, 0.1), points=1)
+
+
+def test_units_of_a_family_that_begins_at_a_tiny_orbit_are_renewed():
+    """Two states of the second normal mode are quadratic in its amplitude, so fixed units suit tiny orbits only."""
+
+    def gradient(x, y):
+        return x + 1.4 * x * y + 0.25 * y * y + 1.2 * x**3, 1.8 * y + 0.7 * x * x + 0.5 * x * y + y**3
+
+    def family(value):
+        def rhs(t, s):
+            gx, gy = gradient(s[0], s[1])
+            return [s[2] + value * gx, s[3] + value * gy, value * s[2] - gx, value * s[3] - gy]
+
+        return from_rhs(rhs, 4, None, guess_period=5.0)
+
+    start = begin(family, 0.0, [0.3, 0.0, 0.0, 0.0], rising=False)
+    assert np.abs(start.orbit).max() < 1e-4
+    branch = follow(family, start, (-0.1, 0.1), points=105, closely=False)
+    x, y, vx, vy = branch.points[-1].orbit
+    potential = 0.5 * x * x + 0.9 * y * y + 0.7 * x * x * y + 0.25 * x * y * y + 0.3 * x**4 + 0.25 * y**4
+    assert 0.5 * (vx * vx + vy * vy) + potential > 0.005  # fixed units end at 0.0032281
+    assert (np.abs(branch.points[-1].orbit) < 1e3 * branch.units[:-1]).all()
+    continued = follow(family, branch, (-0.1, 0.1), points=1, closely=False)
+    np.testing.assert_array_equal(continued.units, branch.units)

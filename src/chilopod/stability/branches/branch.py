@@ -30,7 +30,7 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, by_energy, inspect
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, outward, trace
-from chilopod.stability.interface import Family, SystemLike, returns_per_period, with_shared_symmetries
+from chilopod.stability.interface import Family, SystemLike, offers, returns_per_period, sizes, with_shared_symmetries
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import EVENT_AT_ZERO, MOVED, event_beside, return_duration, starts
@@ -55,6 +55,7 @@ _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _FIRST, _FOLD_STEPS = 0.01, 40  # first step round a fold, in the same units, and number of steps
 _IN_FOLD = "the branch starts in a fold"
 _NARROWEST = 1e-9  # least width of an interval, relative to its values
+_OUTGROWN = 1e3  # change of an orbit, in units, after which these are determined anew: they no longer suit all states
 
 Progress = Callable[[int, BranchPoint], None]
 
@@ -87,8 +88,8 @@ class Branch(Result):
 
     @property
     def units(self) -> Array:
-        """Sizes of the states and scale of the parameter along the curve, shape (n+1,)."""
-        return self.points[0].units
+        """Sizes of the states and scale of the parameter at the end of the curve, shape (n+1,)."""
+        return self.points[-1].units
 
     @property
     def scale(self) -> float:
@@ -254,15 +255,18 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
         inward = dict(zip(curve.between, (True, False), strict=True))
         anchor = anchored(curve, replace(start, rising=inward.get(start.value, start.rising)), step)
     else:
-        units = curve.units
-        tangent = start.tangent * start.units / units
         meeting = start.special not in (None, Kind.FOLD) and float(np.abs(start.multipliers - 1.0).min()) <= _MEETING
-        special = start.special if meeting else None
-        first = replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=special)
+        first = replace(_in_units(start, curve.units), special=start.special if meeting else None)
         anchor = curve.anchor(first, ahead=step if meeting else 0.0)
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = (_IN_FOLD,) if in_fold else ()
     return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor
+
+
+def _in_units(point: BranchPoint, units: Array) -> BranchPoint:
+    """A point with its tangent in other units."""
+    tangent = point.tangent * point.units / units
+    return replace(point, tangent=tangent / np.linalg.norm(tangent), units=units)
 
 
 def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anchor]:
@@ -276,7 +280,8 @@ def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anc
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = 0.0 if last.special is None else branch.step
-    anchor = curve.anchor(last, earlier[0] if earlier else None, ahead)
+    before = next((point for point in earlier[:1] if np.array_equal(point.units, last.units)), None)
+    anchor = curve.anchor(last, before, ahead)
     # Steps along straight parts are longer than the longest.
     return (replace(branch, step=min(branch.step, longest)) if longest < LONGEST else branch), anchor
 
@@ -292,13 +297,14 @@ def followed(
     until: Kind | None = None,
 ) -> Branch:
     """A branch with the points that follow an anchor; it also ends past a special point of the kind ``until``."""
-    curve.first, curve.long_steps = branch.points[0], longest >= LONGEST
-    found, remarks, done = list(branch.points), list(branch.remarks), 0
+    curve.first, curve.long_steps = _in_units(branch.points[0], curve.units), longest >= LONGEST
+    found, remarks, done, reached = list(branch.points), list(branch.remarks), 0, False
 
     def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Inspected, BranchPoint], Ending | None]:
-        within = inspect(curve, step, closely)
+        nonlocal reached
+        within, end = inspect(curve, step, closely), step.end.last
         reached = until is not None and any(point.special is until for point in within.points)
-        return (within, step.end.last), Ending.ENOUGH_POINTS if reached else ending
+        return (within, end), Ending.ENOUGH_POINTS if reached or _outgrown(curve, [*found, end]) else ending
 
     def keep(looked: tuple[Inspected, BranchPoint], _: int) -> None:
         nonlocal done
@@ -309,22 +315,47 @@ def followed(
         with UserCode("progress"):
             progress(done, end)
 
-    moved: Anchor | None = anchor
-    while moved is not None:
+    moved, size = anchor, branch.step
+    while True:
         before, left = done, points and points - done
-        ending, reason, size = trace(curve, moved, (branch.step, longest), left, look, keep)
-        moved = None
+        ending, reason, size = trace(curve, moved, (size, longest), left, look, keep)
+        last = found[-1]
+        if ending is Ending.ENOUGH_POINTS and done > before and not reached and _outgrown(curve, found):
+            moved = _renewed(curve, last)
+            found[-1] = moved.last
+            size = min(longest, size * float(np.linalg.norm(last.tangent * last.units / curve.units)))
+            continue
+        beside = None
         if ending is Ending.LOST:
-            last = found[-1]
             system, derivative = curve.system(last.value), partial(_derivative, curve, last)
             reason = event_beside(system, last.orbit, _duration(system, last), derivative) or reason
-            moved = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
-        if moved is not None:
-            remarks.append(MOVED.format(found[-1].value))
+            beside = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
+        if beside is None:
+            break
+        moved, size = beside, branch.step
+        remarks.append(MOVED.format(last.value))
     if by_energy([point.value for point in found], curve.scale):
         remarks = [remark for remark in remarks if remark != _IN_FOLD]
     said = tuple(dict.fromkeys([*remarks, *_unpaired_folds(found)]))
     return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
+
+
+def _outgrown(curve: Curve, points: list[BranchPoint]) -> bool:
+    """True if the orbit has changed by many of its units since these were determined, unless the system gives them."""
+    end = points[-1]
+    first = next(point for point in points if np.array_equal(point.units, end.units))
+    if offers(curve.system(end.value), "scale"):
+        return False
+    return bool((np.abs(end.orbit - first.orbit) > _OUTGROWN * end.units[:-1]).any())
+
+
+def _renewed(curve: Curve, last: BranchPoint) -> Anchor:
+    """The anchor at a point, in units determined there; no state's unit exceeds its motion."""
+    system = curve.system(last.value)
+    motion = sizes(system, last.orbit, _duration(system, last))
+    curve.sizes = np.minimum(branch_sizes(curve, last), np.maximum(motion, last.units[:-1]))
+    curve.first = _in_units(curve.first, curve.units)
+    return curve.anchor(_in_units(last, curve.units))
 
 
 def _unpaired_folds(points: list[BranchPoint]) -> list[str]:
