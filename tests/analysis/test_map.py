@@ -165,6 +165,12 @@ def test_radii_do_not_depend_on_a_spring_on_the_horizontal_axis(x, y):
     assert found.radius[0, -1] == pytest.approx(float(walks.axis_radius[-1]), rel=1e-6)
 
 
+def test_walks_that_bend_too_far_are_told_from_radii_that_are_not_found():
+    found = mapped(ROBOT, (K1, "1 N*mm/deg", "9 N*mm/deg"), ("body.mass", "8.1 kg", "8.2 kg"), points=2, also=["radius"])
+    assert np.isfinite(found.radius).tolist() == [[False, True], [False, True]]
+    assert found.remarks == ("at 2 of 4 values the curved walk bends a joint by more than a right angle: no radius",)
+
+
 def test_a_curve_beside_another_that_does_not_explain_its_edges_is_followed():
     """Neimark-Sacker points beside a pitchfork, in a corner: two multipliers are unstable, 0 to the right, 1 above."""
     numbers = {"body.modules": 3, "body.mass": 0.01, "body.length": 0.09, "legs.forward_offset": 0.006}

@@ -12,7 +12,6 @@ import hashlib
 import io
 import time
 from collections.abc import Callable, Collection
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from chilopod.analysis.map_curves import Search
 from chilopod.analysis.map_grid import FATE, GROWTH, Grid
 from chilopod.analysis.map_result import StabilityMap
 from chilopod.analysis.parameters import ALL, K1
-from chilopod.analysis.quantities import Measured, Onset
+from chilopod.analysis.quantities import TOO_BENT, Measured, Onset
 from chilopod.errors import ChilopodError, OutputError, ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
@@ -174,8 +173,8 @@ def _bending(plane: Plane) -> list[Onset]:
 
 
 def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[str]]:
-    """Radius of the curved walk that leaves the straight one, m, shape (rows, columns), with a sentence on how many are
-    not found. NaN for these, off a coarse lattice, where the robot does not bend, and everywhere if none is wanted."""
+    """Radius of the curved walk that leaves the straight one, m, shape (rows, columns), with sentences on how many are
+    missing. NaN for these, off a coarse lattice, where the robot does not bend, and everywhere if none is wanted."""
     bends = grid.values[FATE] == FATES.index(Fate.BENDS)
     found = np.full(bends.shape, np.nan)
     if not wanted:
@@ -188,15 +187,18 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
     places *= np.where([grid.plane.y.whole, grid.plane.x.whole], 100, 1)
     apart, near = 1e6 + grid.values[GROWTH, *nodes.T], np.zeros(len(nodes), dtype=int)
     seeds: list[tuple[Array, Array] | None] = [None] * len(nodes)
+    bent = np.zeros(len(nodes), dtype=bool)
     for done in range(len(nodes)):
         progress(done / len(nodes), f"{done} radii")
         at = int(apart.argmin())
         j, i = nodes[at].tolist()
         for measured in tuple(tried):
             measured.near = seeds[near[at]]
-            with suppress(ChilopodError):
+            try:
                 if sum(each.branches for each in tried) < _BRANCHES:
                     found[j, i] = measured.walked("radius", grid.plane.at(float(grid.x[i]), float(grid.y[j])))
+            except ChilopodError as error:
+                bent[at] |= error.problem == TOO_BENT
             if measured.near is not seeds[near[at]]:
                 tried.sort(key=lambda each: each is not measured)
                 seeds[at] = measured.near
@@ -204,9 +206,11 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
                 near[away < apart], apart = at, np.where(apart < np.inf, np.minimum(apart, away), np.inf)
                 break
         apart[at] = np.inf
-    lost = len(nodes) - int(np.isfinite(found).sum())
-    said = f"{lost} of {len(nodes)} radii are not found, or of walks that bend a joint by more than a right angle"
-    return found, [said] if lost else []
+    missing = np.isnan(found[*nodes.T])
+    folded, lost = int((missing & bent).sum()), int((missing & ~bent).sum())
+    said = {f"at {folded} of {len(nodes)} values {TOO_BENT}: no radius": folded}
+    said |= {f"{lost} of {len(nodes)} radii are not found": lost}
+    return found, [each for each, count in said.items() if count]
 
 
 def _key(plane: Plane) -> str:

@@ -45,6 +45,8 @@ QUANTITIES = {
 }  # fmt: skip
 """Units by the name of the quantity, a method of :class:`Measured`; that of the onset is that of its number."""
 
+TOO_BENT = "the curved walk bends a joint by more than a right angle"
+
 _OF_WALKS = {"radius", "speed", "settling", "work"}  # curved ones
 
 
@@ -193,7 +195,7 @@ class Measured:
         """A quantity of a robot; AnalysisError also where it is one of a curved walk at which engines end."""
         value = float(getattr(self, name)(robot))
         if name in _OF_WALKS and self.growth(robot) > 0.0 and self.most_bent(robot) > MOST_BENT:
-            raise AnalysisError("the curved walk bends a joint by more than a right angle", field=name)
+            raise AnalysisError(TOO_BENT, field=name)
         return value
 
     def onset(self, robot: Robot) -> float:
