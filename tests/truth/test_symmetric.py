@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from chilopod.stability import Criticality, Kind, PeriodicSystem, from_rhs, locate, multipliers
+from chilopod.stability import Criticality, Kind, PeriodicSystem, begin, follow, from_rhs, locate, multipliers
 from helpers.systems import linear
 
 FORCE, RATE = 0.4, 1.3
@@ -125,3 +125,27 @@ def test_strong_resonances_have_no_verdict(order):
     assert point.criticality is Criticality.NOT_COMPUTED
     assert point.normal_form is not None
     assert "resonance" in point.normal_form.status.name.lower()
+
+
+def test_a_symmetry_does_not_hinder_an_orbit_whose_returns_magnify():
+    """Two equal FitzHugh-Nagumo cells, time reversed: in step their returns magnify by up to three millions. Rounding is
+    not symmetric, so what it leaves of asymmetry grows from node to node. Without the symmetry: the same values."""
+    swap = np.kron(np.eye(2)[::-1], np.eye(2))
+
+    def cell(u, v, other, forcing):
+        return [v + u**3 / 3.0 - u - forcing - 0.1 * (other - u), -0.2 * (u + 0.3 - 0.8 * v)]
+
+    def rhs(t, x, a):
+        forcing = a * np.cos(0.9 * t)
+        return cell(x[0], x[1], x[2], forcing) + cell(x[2], x[3], x[0], forcing)
+
+    def family(a):
+        return from_rhs(rhs, 4, 2.0 * np.pi / 0.9, args=(a,), spatial_symmetry=swap)
+
+    orbit = [-0.87671416, -0.64733018] * 2
+    found = locate(family, (0.2, 2.5), orbit=orbit, normal_form=False)
+    assert found.complete
+    np.testing.assert_allclose([point.value for point in found], [0.243981296, 1.185042918, 1.261124839], rtol=1e-8)
+    start = begin(family, found[-1].value, found[-1].orbit)
+    branch = follow(family, start, (start.value, 2.5), closely=False)
+    assert branch.points[-1].value == 2.5

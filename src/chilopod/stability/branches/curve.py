@@ -193,7 +193,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         timed = anchor if anchor.section is None else replace(anchor, section=replace(anchor.section, duration=time))
         last, n, space = anchor.last, anchor.last.orbit.size, anchor.space
         self.steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
-        count = node_count(guess.matrix[:n, :n] + np.eye(n), np.ones(n)) if space is None else 0
+        count = node_count(within_space(space, guess.matrix)[:n, :n] + np.eye(n), np.ones(n))
         off, weakest, corrections = np.full(2, self.precision), np.zeros(2), 0
         if count >= _MANY_NODES:
             moved, x, value, image, matrix = self._shot(anchor, plane, count)
@@ -235,14 +235,18 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     def _shot(self, anchor: Anchor, plane: Plane, count: int) -> tuple[Array, Array, float, ReturnMap, Array]:
         """Displacement in units, state, parameter, return map and :meth:`matrix`, by multiple shooting."""
-        last, section = anchor.last, anchor.section
-        system, units = self.system(last.value), self.units
+        last, section, space = anchor.last, anchor.section, anchor.space
+        system, units, shared = self.system(last.value), self.units, None
+        if space is not None:
+            shared = units[:-1, None] * np.linalg.eigh(space)[1][:, -round(float(np.trace(space))) :]
         duration = return_duration(system) if section is None else section.duration
         start = np.append(last.orbit, last.value)
         self.budget.take(2 * FEW_ROUNDS)  # each in parts
         nodes = nodes_along(system, last.orbit, duration, count, last.value)
+        if space is not None:  # no correction would remove what is left of asymmetry
+            nodes = nodes._replace(states=nodes.states / units[:-1] @ space * units[:-1])
         free = Free(plane.row, plane.target, start, self.scale)
-        problem = Problem(lambda value: self.system(self._inside(value)), free)
+        problem = Problem(lambda value: self.system(self._inside(value)), free, shared)
         found = shot(problem, nodes, units[:-1], section)
         x, value = found.nodes.states[0], self._inside(found.nodes.value) if plane.edge is None else plane.edge[1]
         system = self.system(value)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.linalg.lapack import dgesv
 
 from chilopod.errors import AnalysisError
@@ -94,7 +95,7 @@ def nodes_along(system: SystemLike, x: Array, duration: float, count: int, value
 class Problem:
     """Problem of :func:`shot`: the systems by the parameter, with its equation ``free``, None for a given one.
 
-    ``shared`` is a basis of the space of the first state's corrections, shape (n, k). Every evaluation takes a return
+    ``shared`` is a basis of the space of the states, if their symmetries leave one, shape (n, k). Every evaluation takes a return
     of the budget. With ``careful`` steps are short, the return time is free and the section not needed until it nearly
     closes.
     """
@@ -199,8 +200,9 @@ class _Equations:
             self._linear[:, :, n] /= m
         if system.symmetry is not None:
             self._ends[-1], self._linear[-1] = system.symmetry @ self._ends[-1], system.symmetry @ self._linear[-1]
-        self._off = self._ends - np.concatenate([nodes.states[1:], nodes.states[:1]])
         sizes, x = frame.sizes, nodes.states[0]
+        self._ends = self._shared(self._ends, sizes)
+        self._off = self._ends - np.concatenate([nodes.states[1:], nodes.states[:1]])
         if free is None and x.any():
             sizes = np.maximum(sizes, np.maximum(np.abs(nodes.states), np.abs(self._ends)).max(axis=0))
         self._across = 0.0 if frame.section is None else float(frame.section.normal @ (x - frame.section.point))
@@ -215,6 +217,14 @@ class _Equations:
             lost = np.flatnonzero(~np.isfinite(self._ends).all(axis=1))
             where = f"node {lost[0]} of {m}: " if lost.size else ""
             raise AnalysisError(f"{where}the motion is not finite between two nodes", field="orbit")
+
+    def _shared(self, states: Array, sizes: Array) -> Array:
+        """States without the asymmetry that rounding leaves, which grows from one node to the next."""
+        if self._problem.shared is None:
+            return states
+        basis = np.linalg.qr(self._problem.shared / sizes[:, None])[0]
+        with np.errstate(all="ignore"):  # values that are not finite are refused later
+            return np.asarray(states / sizes @ basis @ basis.T * sizes)
 
     def _to_nodes(self, system: SystemLike) -> None:
         """Carry every node to the next one."""
@@ -304,7 +314,7 @@ class _Equations:
         if time is not None and not self._returned:  # else the next node determines it
             every[n] = time @ every
         states = np.array([every[:n], *(total @ every for total in totals[:-1])])
-        return Nodes(states, float(every[n]), float(every[n + 1]))
+        return Nodes(self._shared(states, sizes), float(every[n]), float(every[n + 1]))
 
     def after(self, correction: Nodes, part: float) -> _Equations:
         """The equations after part of a correction, or less."""
@@ -351,6 +361,8 @@ def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, 
     """Solution of linear equations in units, within ``shared`` states if given; the shortest for families."""
     if shared is not None:
         basis = np.linalg.qr(shared / sizes[:, None])[0]
+        if len(matrix) > len(basis):
+            basis = block_diag(basis, 1.0)  # the parameter
         return np.asarray(basis @ _solution(basis.T @ matrix @ basis, basis.T @ right, cutoff, None, sizes))
     try:
         if cutoff == _SINGULAR:
