@@ -128,8 +128,8 @@ def test_strong_resonances_have_no_verdict(order):
 
 
 def test_a_symmetry_does_not_hinder_an_orbit_whose_returns_magnify():
-    """Two equal FitzHugh-Nagumo cells, time reversed: in step their returns magnify by up to three millions. Rounding is
-    not symmetric, so what it leaves of asymmetry grows from node to node. Without the symmetry: the same values."""
+    """Two equal FitzHugh-Nagumo cells, time reversed: in step their returns magnify by up to three millions. Rounding
+    is not symmetric, so what it leaves of asymmetry grows from node to node. Without the symmetry: the same values."""
     swap = np.kron(np.eye(2)[::-1], np.eye(2))
 
     def cell(u, v, other, forcing):
