@@ -313,7 +313,7 @@ def test_a_slow_family_is_not_called_once_the_time_is_over():
 @pytest.mark.parametrize("low", [-1.0, 0.0, 0.1])
 @pytest.mark.parametrize("cells", [2, 3, 4, 5])
 def test_a_point_among_the_symmetric_orbits_of_a_ring(cells, low):
-    """The cells move alike there, so the point is that of one cell: its equations at 98 instants of odd orbits, as one system."""
+    """The cells move alike there, so the point is that of one cell, by collocation of odd orbits at 98 instants."""
     turn = np.roll(np.eye(cells), 1, 0)
 
     def rhs(t, x, p):

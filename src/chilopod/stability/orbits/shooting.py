@@ -95,9 +95,9 @@ def nodes_along(system: SystemLike, x: Array, duration: float, count: int, value
 class Problem:
     """Problem of :func:`shot`: the systems by the parameter, with its equation ``free``, None for a given one.
 
-    ``shared`` is a basis of the space of the states, if their symmetries leave one, shape (n, k). Every evaluation takes
-    a return of the budget. With ``careful`` steps are short, the return time is free and the section not needed until
-    it nearly closes.
+    ``shared`` is a basis of the space of symmetric states, shape (n, k), None for all. Every evaluation takes a return
+    of the budget. With ``careful`` steps are short, the return time is free and the section not needed until it nearly
+    closes.
     """
 
     system_at: Callable[[float], SystemLike]
