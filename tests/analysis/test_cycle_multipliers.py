@@ -108,17 +108,23 @@ def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
     per_unit = STIFF.get(K1) / 75.0
 
     def measured(robot, **given):
-        value = np.exp(0.01 * (30.0 - robot.get(K1) / per_unit))
-        return SimpleNamespace(finite=(CycleMode(complex(value), 0.001, np.ones(5)),))
+        spring = robot.get(K1) / per_unit
+        bent = ("yaw1", 0.3) if spring < 25.0 else None
+        return SimpleNamespace(
+            finite=(CycleMode(complex(np.exp(0.01 * (30.0 - spring))), 0.001, np.ones(5)),), given_way=bent
+        )
 
     monkeypatch.setattr("chilopod.analysis.walk_multipliers", measured)
     arguments = ["stability", "aoi2022", "--engine", "twin", "--json", "--onset", K1]
-    found = printed(*arguments, "20 N*mm/deg", "50 N*mm/deg")
-    # Its error over the slope.
-    np.testing.assert_allclose(
-        np.array([found["onset_si"], *found["interval_si"]]) / per_unit, [30.0, 29.9, 30.1], atol=0.03
-    )
+    for low in ("26 N*mm/deg", "5 N*mm/deg"):
+        found = printed(*arguments, low, "50 N*mm/deg")
+        # Its error over the slope.
+        np.testing.assert_allclose(
+            np.array([found["onset_si"], *found["interval_si"]]) / per_unit, [30.0, 29.9, 30.1], atol=0.03
+        )
     assert "must hold an onset" in run(*arguments, "40 N*mm/deg", "50 N*mm/deg")[2]
+    said = run(*arguments, "10 N*mm/deg", "27 N*mm/deg")[2]
+    assert "must hold an onset; its ends have a walk that has given way and the multiplier 1.0305" in said
 
 
 def test_the_command_line_prints_them(straight, monkeypatch):
@@ -150,15 +156,42 @@ FALL = """<mujoco><option timestep="0.01"/><worldbody>
 @pytest.mark.parametrize(
     ("push", "travel", "complaint"),
     [
-        (0.0, (), "motion: must repeat: z changes by -[0-9.]+ in each cycle"),
-        (1.0, ("z",), "motion: must repeat: x changes by [0-9.]+ in each cycle"),
-        (1.0, ("x", "z"), "motion: must repeat: rate of x changes by 0.5 in each cycle"),
+        (0.0, (), "motion: must repeat: z changes by -[0-9.]+ m in each cycle"),
+        (1.0, ("z",), "motion: must repeat: x changes by [0-9.]+ m in each cycle"),
+        (1.0, ("x", "z"), "motion: must repeat: rate of x changes by 0.5 m/s in each cycle"),
     ],
 )
 def test_a_motion_that_moves_on_is_refused(push, travel, complaint):
     cycle = CycleMap(mujoco.MjModel.from_xml_string(FALL), np.full((50, 1), push), travel)
     with pytest.raises(AnalysisError, match=complaint):
         cycle_multipliers("fall", cycle, np.zeros(len(cycle.names)), ["rate of x"])
+
+
+JOINT = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
+  <joint name="yaw1" axis="0 0 1" stiffness="{}" damping="0.05"/>
+  <geom size="0.1" pos="0.5 0 0" mass="1" contype="0" conaffinity="0"/></body></worldbody>
+  <actuator><motor joint="yaw1"/></actuator></mujoco>"""
+
+
+# The joint without a spring turns at 0.4 rad/s for 30.9 s, less 5.08 s in which it begins, and by 0.19 rad by its swing.
+@pytest.mark.parametrize(
+    ("stiffness", "push", "mean"),
+    [(2.0, 0.0, None), (2.0, 0.2, 0.1), (2.0, -0.2, -0.1), (2.0, 0.02, None), (0.0, 0.02, 0.4 * 25.82 + 0.19)],
+)
+def test_a_walk_that_bends_by_more_than_it_swings_has_given_way(stiffness, push, mean):
+    control = push + 0.1 * np.sin(2.0 * np.pi * np.arange(300) / 300)[:, None]
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(JOINT.format(stiffness)), control)
+    walker = SimpleNamespace(walk_cycle=lambda robot: (cycle, np.zeros(2)))
+    found = walk_multipliers(SimpleNamespace(name="one", body=SimpleNamespace(modules=2)), walker)
+    if mean is None:
+        assert found.given_way is None
+        assert found.stable is True
+        return
+    assert found.given_way == ("yaw1", pytest.approx(mean, rel=0.03))
+    assert found.stable is False
+    assert found.as_json()["given_way"]["mean_rad"] == found.given_way[1]
+    assert found.title.startswith("one: the straight walk has given way: it bends (yaw1 = ")
+    assert "The multipliers are those of the bent walk." in found.lines()[-1]
 
 
 @pytest.mark.parametrize(
