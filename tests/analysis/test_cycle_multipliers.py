@@ -173,7 +173,7 @@ JOINT = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
   <actuator><motor joint="yaw1"/></actuator></mujoco>"""
 
 
-# The joint without a spring turns at 0.4 rad/s for 30.9 s, less 5.08 s in which it begins, and by 0.19 rad by its swing.
+# The joint without a spring turns at 0.4 rad/s for 30.9 s, less 5.08 s in which it begins, and 0.19 rad by its swing.
 @pytest.mark.parametrize(
     ("stiffness", "push", "mean"),
     [(2.0, 0.0, None), (2.0, 0.2, 0.1), (2.0, -0.2, -0.1), (2.0, 0.02, None), (0.0, 0.02, 0.4 * 25.82 + 0.19)],

@@ -283,14 +283,14 @@ def test_another_preset_is_another_robot(page):
 
 
 def test_an_address_sets_the_whole_walk(page):
-    """Sliders that it leaves out go back to the file."""
-    page.errand(partial(page._open_address, True), "friction=0.5&k3=8&seed=1")
-    page.errand(partial(page._open_address, True), "k1=8&seed=2")
-    end = time.monotonic() + 10.0
-    while page._query() != "k1=8&seed=2":
-        assert time.monotonic() < end, page._query()
-        assert page.failure is None
-        time.sleep(0.02)
+    """Sliders and the strategy that it leaves out are as at the start."""
+    for asked in ("k3=8&friction=0.5&seed=1&strategy=leg-yaw", "k1=8&seed=2"):
+        page.errand(partial(page._open_address, True), asked)
+        end = time.monotonic() + 10.0
+        while page._query() != asked or page._controls._strategy.value != page.session.settings.strategy:
+            assert time.monotonic() < end, page._query()
+            assert page.failure is None
+            time.sleep(0.02)
     page.errand(partial(page._open_address, True), "seed=1")
 
 
