@@ -257,7 +257,7 @@ def test_bends_that_decay_are_no_stable_motion():
     found = cycle_multipliers("lim", CycleMap(mujoco.MjModel.from_xml_string(LIMITED), push), np.zeros(2), ["h"])
     assert not found.exact
     assert found.stable is None
-    assert found.title == "lim: bends of 1° decay; no periodic motion was found"
+    assert found.title == "lim: bends of 1° decay; no periodic motion was found from this start"
     assert any(words.startswith("limit of h at 0.9") for words in found.contacts)
 
 
@@ -438,7 +438,7 @@ def test_bends_that_meet_a_stop_to_one_side_do_not_grow():
 def test_modes_decay_each_within_its_own_error():
     modes = tuple(CycleMode(complex(value), error, np.ones(2)) for value, error in ((0.986, 2e-4), (0.258, 0.064)))
     found = CycleMultipliers("three", 0.6, np.zeros(2), 1e-3, (), None, 0.02, modes, np.zeros(2), ())
-    assert found.title == "three: bends of 1.15° decay; no periodic motion was found"
+    assert found.title == "three: bends of 1.15° decay; no periodic motion was found from this start"
 
 
 @pytest.mark.parametrize(

@@ -214,6 +214,7 @@ def test_what_is_used_of_viser_is_still_there(page):
         assert msgspec.convert(good, gate._KINDS[good["type"]])
     assert gate._scripts().count("'sha256-") == 3  # not 'unsafe-inline'
     assert b"<title>chilopod live</title>" in gate._page()
+    assert b"Viser client" not in gate._page()
 
 
 def test_a_viser_that_listens_in_another_way_is_not_used(monkeypatch):

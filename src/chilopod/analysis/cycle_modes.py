@@ -110,7 +110,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         if self.exact:
             return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
         size = self._shown(self.amplitude, 3)
-        why = "the periodic motion has no derivative" if self.switch else "no periodic motion was found"
+        why = "the periodic motion has no derivative" if self.switch else "no periodic motion was found from this start"
         return f"{self.name}: bends of {size} {_GROWTH[_verdict(self.finite)]}; {why}"
 
     def as_json(self) -> dict[str, Any]:

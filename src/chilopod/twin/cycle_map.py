@@ -113,7 +113,7 @@ class CycleMap:
 
     def path(self, x: Array) -> Array:
         """States after every step of a cycle, (steps, n), from the state before it, (n,)."""
-        seen = self._rolled(*map(np.atleast_2d, self.full(x)), ["qpos", "qvel"])[1]
+        seen = self._rolled(*self.full(x[None]), ["qpos", "qvel"])[1]
         return self.reduced(seen["qpos"][0], seen["qvel"][0])
 
     def _rolled(self, positions: Array, rates: Array, record: list[str]) -> tuple[Batch, dict[Any, NDArray[Any]]]:
