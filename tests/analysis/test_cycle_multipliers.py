@@ -210,6 +210,13 @@ def test_a_start_and_bends_that_are_none_are_refused(start, bends, complaint):
         cycle_multipliers("cart", cycle, start, bends)
 
 
+@pytest.mark.parametrize(("cycles", "said"), [(5, "must be more"), (20.5, "must be a whole number"), (10**5, "is too")])
+def test_cycles_must_be_enough(cycles, said):
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), np.zeros((5, 2)), travel=("x",))
+    with pytest.raises(ParameterError, match=rf"cycles = {cycles}: {said}.*; allowed: 12 to 10000"):
+        cycle_multipliers("cart", cycle, np.zeros(3), ["y"], cycles=cycles)
+
+
 def test_controls_must_be_finite():
     with pytest.raises(ParameterError, match="control = nan: must be finite"):
         CycleMap(mujoco.MjModel.from_xml_string(CART), [[0.0, np.nan]])

@@ -112,8 +112,7 @@ def _found(
     if not (isinstance(amplitude, Real) and 0.0 < amplitude < 1.0):
         allowed = "above 0, below 1, in the unit of the bends (rad)"
         raise ParameterError("must be a small number", field="amplitude", value=amplitude, allowed=allowed)
-    if checked_count("cycles", cycles, _MOST_CYCLES) < 3 * _BLOCK:
-        raise ParameterError("must be more", field="cycles", value=cycles, allowed=f"{3 * _BLOCK} to {_MOST_CYCLES}")
+    checked_count("cycles", cycles, _MOST_CYCLES, 3 * _BLOCK)
     at = _indices(cycle, bends)
     x = as_array("start", start)
     if x.shape != (len(cycle.names),) or not np.isfinite(x).all():
