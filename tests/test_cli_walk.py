@@ -71,7 +71,7 @@ def test_walk_prints_a_line_a_walk(capsys):
 
 def test_the_end_that_is_printed_is_the_end_at_any_rate(capsys):
     arguments = ["walk", ROBOT, *SOFT, "--seed", "1", "--duration", "1.9 s"]
-    (fine,), (coarse,) = (printed(*arguments, "--rate", rate, "--json")["walks"] for rate in ("100", "0.1"))
+    (fine,), (coarse,) = (printed(*arguments, "--rate", rate, "--json")["walks"] for rate in ("100", "0.1 Hz"))
     np.testing.assert_allclose([coarse["x_m"], coarse["y_m"]], [fine["x_m"], fine["y_m"]], atol=1e-4)
     assert coarse["mean_joint_angles_rad"] == [None] * 5
     assert coarse["axis_radius_m"] is None
@@ -163,6 +163,7 @@ def test_a_target_straight_ahead_has_no_circle():
         (["walk", ROBOT, "--duration", "0 s"], ["duration", "more than 0"]),
         (["walk", ROBOT, "--duration", "3 kg"], ["kg"]),
         (["walk", ROBOT, "--rate", "0"], ["rate"]),
+        (["walk", ROBOT, "--rate", "7 s"], ["--rate = '7 s'", "Hz"]),
         (["walk", ROBOT, "--repeats", "0"], ["--repeats"]),
         (["walk", ROBOT, "--repeats", "3"], ["repeats", "seed"]),
         (["walk", ROBOT, "--trials", "/dev/null/trials"], ["/dev/null/trials", "cannot be written"]),
@@ -193,7 +194,7 @@ def test_what_cannot_be_walked_is_refused(arguments, words):
 def test_the_rate_that_the_help_names_is_that_of_records(capsys):
     assert main(["walk", "--help"]) == 0
     words = capsys.readouterr().out.replace("│", " ").split()
-    assert f"by default {RATE:g}." in " ".join(words)
+    assert f"[default: {RATE:g} Hz]" in " ".join(words)
 
 
 OWN = """

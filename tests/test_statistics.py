@@ -152,6 +152,12 @@ def test_no_scatter_decides_nothing():
     assert share([]).above(share([True])) is None
 
 
+@pytest.mark.parametrize("wrong", [[0.2, 1.0], [np.nan, 1.0, 0.0], [[1.0, 2.0]]])
+def test_a_share_is_one_of_true_and_false(wrong):
+    with pytest.raises(ParameterError, match=r"reached = .*: must be True or False; allowed: True, False, 1, 0"):
+        share(wrong)
+
+
 def test_as_many_trials_as_are_said_decide():
     asked = Estimate(0.5, 1.0 / np.sqrt(10.0), 9.0, 10).above()
     assert (asked.answer, asked.trials) == (None, 34.0)

@@ -158,9 +158,13 @@ def share(reached: ArrayLike) -> Interval:
     """Share of True in independent groups, shape (groups,) or (groups, members).
 
     The interval is Wilson's (1927), with as many trials as independent ones would scatter as the shares of the groups
-    do: the number of groups at least, that of all members at most.
+    do: the number of groups at least, that of all members at most. ParameterError for other values than True and False.
     """
     table = np.asarray(reached, dtype=np.float64)
+    if (wrong := table[(table != 0.0) & (table != 1.0)]).size:
+        raise ParameterError(
+            "must be True or False", field="reached", value=float(wrong[0]), allowed="True, False, 1, 0"
+        )
     if table.size == 0:
         return Interval(math.nan, math.nan, math.nan)
     table = table.reshape(len(table), -1)

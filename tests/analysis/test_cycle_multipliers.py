@@ -108,17 +108,23 @@ def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
     per_unit = STIFF.get(K1) / 75.0
 
     def measured(robot, **given):
-        value = np.exp(0.01 * (30.0 - robot.get(K1) / per_unit))
-        return SimpleNamespace(finite=(CycleMode(complex(value), 0.001, np.ones(5)),))
+        spring = robot.get(K1) / per_unit
+        bent = ("yaw1", 0.3) if spring < 25.0 else None
+        return SimpleNamespace(
+            finite=(CycleMode(complex(np.exp(0.01 * (30.0 - spring))), 0.001, np.ones(5)),), given_way=bent
+        )
 
     monkeypatch.setattr("chilopod.analysis.walk_multipliers", measured)
     arguments = ["stability", "aoi2022", "--engine", "twin", "--json", "--onset", K1]
-    found = printed(*arguments, "20 N*mm/deg", "50 N*mm/deg")
-    # Its error over the slope.
-    np.testing.assert_allclose(
-        np.array([found["onset_si"], *found["interval_si"]]) / per_unit, [30.0, 29.9, 30.1], atol=0.03
-    )
+    for low in ("26 N*mm/deg", "5 N*mm/deg"):
+        found = printed(*arguments, low, "50 N*mm/deg")
+        # Its error over the slope.
+        np.testing.assert_allclose(
+            np.array([found["onset_si"], *found["interval_si"]]) / per_unit, [30.0, 29.9, 30.1], atol=0.03
+        )
     assert "must hold an onset" in run(*arguments, "40 N*mm/deg", "50 N*mm/deg")[2]
+    said = run(*arguments, "10 N*mm/deg", "27 N*mm/deg")[2]
+    assert "must hold an onset; its ends have a walk that has given way and the multiplier 1.0305" in said
 
 
 def test_the_command_line_prints_them(straight, monkeypatch):
@@ -150,15 +156,42 @@ FALL = """<mujoco><option timestep="0.01"/><worldbody>
 @pytest.mark.parametrize(
     ("push", "travel", "complaint"),
     [
-        (0.0, (), "motion: must repeat: z changes by -[0-9.]+ in each cycle"),
-        (1.0, ("z",), "motion: must repeat: x changes by [0-9.]+ in each cycle"),
-        (1.0, ("x", "z"), "motion: must repeat: rate of x changes by 0.5 in each cycle"),
+        (0.0, (), "motion: must repeat: z changes by -[0-9.]+ m in each cycle"),
+        (1.0, ("z",), "motion: must repeat: x changes by [0-9.]+ m in each cycle"),
+        (1.0, ("x", "z"), "motion: must repeat: rate of x changes by 0.5 m/s in each cycle"),
     ],
 )
 def test_a_motion_that_moves_on_is_refused(push, travel, complaint):
     cycle = CycleMap(mujoco.MjModel.from_xml_string(FALL), np.full((50, 1), push), travel)
     with pytest.raises(AnalysisError, match=complaint):
         cycle_multipliers("fall", cycle, np.zeros(len(cycle.names)), ["rate of x"])
+
+
+JOINT = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
+  <joint name="yaw1" axis="0 0 1" stiffness="{}" damping="0.05"/>
+  <geom size="0.1" pos="0.5 0 0" mass="1" contype="0" conaffinity="0"/></body></worldbody>
+  <actuator><motor joint="yaw1"/></actuator></mujoco>"""
+
+
+# The joint without a spring turns at 0.4 rad/s for 30.9 s, less 5.08 s in which it begins, and 0.19 rad by its swing.
+@pytest.mark.parametrize(
+    ("stiffness", "push", "mean"),
+    [(2.0, 0.0, None), (2.0, 0.2, 0.1), (2.0, -0.2, -0.1), (2.0, 0.02, None), (0.0, 0.02, 0.4 * 25.82 + 0.19)],
+)
+def test_a_walk_that_bends_by_more_than_it_swings_has_given_way(stiffness, push, mean):
+    control = push + 0.1 * np.sin(2.0 * np.pi * np.arange(300) / 300)[:, None]
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(JOINT.format(stiffness)), control)
+    walker = SimpleNamespace(walk_cycle=lambda robot: (cycle, np.zeros(2)))
+    found = walk_multipliers(SimpleNamespace(name="one", body=SimpleNamespace(modules=2)), walker)
+    if mean is None:
+        assert found.given_way is None
+        assert found.stable is True
+        return
+    assert found.given_way == ("yaw1", pytest.approx(mean, rel=0.03))
+    assert found.stable is False
+    assert found.as_json()["given_way"]["mean_rad"] == found.given_way[1]
+    assert found.title.startswith("one: the straight walk has given way: it bends (yaw1 = ")
+    assert "The multipliers are those of the bent walk." in found.lines()[-1]
 
 
 @pytest.mark.parametrize(
@@ -175,6 +208,13 @@ def test_a_start_and_bends_that_are_none_are_refused(start, bends, complaint):
     cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), np.zeros((5, 2)), travel=("x",))
     with pytest.raises(ParameterError, match=complaint):
         cycle_multipliers("cart", cycle, start, bends)
+
+
+@pytest.mark.parametrize(("cycles", "said"), [(5, "must be more"), (20.5, "must be a whole number"), (10**5, "is too")])
+def test_cycles_must_be_enough(cycles, said):
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(CART), np.zeros((5, 2)), travel=("x",))
+    with pytest.raises(ParameterError, match=rf"cycles = {cycles}: {said}.*; allowed: 12 to 10000"):
+        cycle_multipliers("cart", cycle, np.zeros(3), ["y"], cycles=cycles)
 
 
 def test_controls_must_be_finite():
@@ -224,7 +264,7 @@ def test_bends_that_decay_are_no_stable_motion():
     found = cycle_multipliers("lim", CycleMap(mujoco.MjModel.from_xml_string(LIMITED), push), np.zeros(2), ["h"])
     assert not found.exact
     assert found.stable is None
-    assert found.title == "lim: bends of 1° decay; no periodic motion was found"
+    assert found.title == "lim: bends of 1° decay; no periodic motion was found from this start"
     assert any(words.startswith("limit of h at 0.9") for words in found.contacts)
 
 
@@ -405,7 +445,7 @@ def test_bends_that_meet_a_stop_to_one_side_do_not_grow():
 def test_modes_decay_each_within_its_own_error():
     modes = tuple(CycleMode(complex(value), error, np.ones(2)) for value, error in ((0.986, 2e-4), (0.258, 0.064)))
     found = CycleMultipliers("three", 0.6, np.zeros(2), 1e-3, (), None, 0.02, modes, np.zeros(2), ())
-    assert found.title == "three: bends of 1.15° decay; no periodic motion was found"
+    assert found.title == "three: bends of 1.15° decay; no periodic motion was found from this start"
 
 
 @pytest.mark.parametrize(

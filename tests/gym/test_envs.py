@@ -323,7 +323,11 @@ def test_an_action_that_is_none_is_one_line(action, words):
         ({"rewards": 5}, "rewards = 5: must be a Rewards"),
         ({"task": "Tern"}, "must be one of the tasks; did you mean 'Turn'. allowed: Turn, Course, TaskA, TaskB"),
         ({"task": 5}, "task = 5: must be one of the tasks"),
-        ({"task": "TaskA", "targets": 2}, "targets = 2: must be a field of OneTarget; allowed: rewards, target"),
+        (
+            {"task": "TaskA", "targets": 2},
+            "targets = 2: must be a field of OneTarget or an argument; did you mean 'target'",
+        ),
+        ({"pateince": 20}, r"did you mean 'patience'\? allowed: rewards, targets, task, robot, engine, springs, pat"),
         ({"task": "TaskA", "target": 5}, "target = 5: must be a Target"),
     ],
 )

@@ -25,6 +25,9 @@ def test_an_address_leads_to_its_settings_and_they_lead_to_it():
     begun.obey()
     assert begun.settings.robot.springs.stiffness[0] == pytest.approx(stiffness(8.0))
     assert query(begun.settings, before, SLIDERS, OWN) == "k1=8&friction=0.5&stride=2&seed=2"
+    begun.box.put(wishes.Steering("leg-yaw"))
+    begun.obey()
+    assert query(begun.settings, before, SLIDERS, OWN).endswith("&seed=2&strategy=leg-yaw")
     assert query(before, before, SLIDERS, "ten modules") == "robot=ten+modules&seed=1"
 
 

@@ -214,6 +214,7 @@ def test_what_is_used_of_viser_is_still_there(page):
         assert msgspec.convert(good, gate._KINDS[good["type"]])
     assert gate._scripts().count("'sha256-") == 3  # not 'unsafe-inline'
     assert b"<title>chilopod live</title>" in gate._page()
+    assert b"Viser client" not in gate._page()
 
 
 def test_a_viser_that_listens_in_another_way_is_not_used(monkeypatch):
@@ -283,14 +284,14 @@ def test_another_preset_is_another_robot(page):
 
 
 def test_an_address_sets_the_whole_walk(page):
-    """Sliders that it leaves out go back to the file."""
-    page.errand(partial(page._open_address, True), "friction=0.5&k3=8&seed=1")
-    page.errand(partial(page._open_address, True), "k1=8&seed=2")
-    end = time.monotonic() + 10.0
-    while page._query() != "k1=8&seed=2":
-        assert time.monotonic() < end, page._query()
-        assert page.failure is None
-        time.sleep(0.02)
+    """Sliders and the strategy that it leaves out are as at the start."""
+    for asked in ("k3=8&friction=0.5&seed=1&strategy=leg-yaw", "k1=8&seed=2"):
+        page.errand(partial(page._open_address, True), asked)
+        end = time.monotonic() + 10.0
+        while page._query() != asked or page._controls._strategy.value != page.session.settings.strategy:
+            assert time.monotonic() < end, page._query()
+            assert page.failure is None
+            time.sleep(0.02)
     page.errand(partial(page._open_address, True), "seed=1")
 
 

@@ -66,7 +66,7 @@ def test_a_straight_walk_that_sways_is_not_drawn_as_a_stable_one(spring, stretch
 
 def test_the_words_in_the_picture_keep_apart():
     """No line of a remark beside a branch reaches over the axis, or another line."""
-    remark = "the curved walks beside the pitchfork must be stable for a radius law: here the robot jumps"
+    remark = "subcritical: beside the pitchfork the curved walks are unstable, and the robot jumps"
     picture = drawn(Theory(PLANAR, stiffness(12.0), remark=remark), SPRINGS[1], [])
     texts = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="(\w+)">([^<]+)', picture)
     boxes = []
@@ -76,7 +76,7 @@ def test_the_words_in_the_picture_keep_apart():
         boxes.append((left, left + width, float(y) - 9.0, float(y) + 2.0))
     for one, other in combinations(boxes, 2):
         assert one[1] <= other[0] or other[1] <= one[0] or one[3] <= other[2] or other[3] <= one[2]
-    assert "a radius law" in picture
+    assert "subcritical: beside" in picture
     assert STABLE not in picture  # nobody has judged the straight walk
 
 

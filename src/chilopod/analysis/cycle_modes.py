@@ -91,19 +91,26 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
     unit: str = "rad"  # unit of bends: rad (shown in degrees), m, rad/s, m/s, or "" if they differ
     heading: bool = False  # whether the motion depends on the heading, which is divided out
     switch: bool = False  # whether the motion repeats, but lies on the switch of a contact, limit or slack spring
+    given_way: tuple[str, float] | None = None  # joint that bends most and its mean, if the straight walk does not hold
 
     @property
     def stable(self) -> bool | None:
-        """Stability of the periodic motion by the derivative; None without one, or where errors leave it undecided."""
-        return _verdict(self.exact)
+        """Stability of the periodic motion by the derivative; None without one, or where errors leave it undecided.
+        False where the straight walk has given way."""
+        return False if self.given_way else _verdict(self.exact)
 
     @property
     def title(self) -> str:
         """Verdict in words, without a derivative on bends of finite size."""
+        if self.given_way:
+            joint, mean = self.given_way
+            return (
+                f"{self.name}: the straight walk has given way: it bends ({joint} = {self._shown(mean, 2)} in the mean)"
+            )
         if self.exact:
             return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
         size = self._shown(self.amplitude, 3)
-        why = "the periodic motion has no derivative" if self.switch else "no periodic motion was found"
+        why = "the periodic motion has no derivative" if self.switch else "no periodic motion was found from this start"
         return f"{self.name}: bends of {size} {_GROWTH[_verdict(self.finite)]}; {why}"
 
     def as_json(self) -> dict[str, Any]:
@@ -122,12 +129,13 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
             "multipliers_of_amplitude": [mode.as_json(self.period) for mode in self.finite],
             "spread_rad": self.spread.tolist(),
             "contacts": list(self.contacts),
+            "given_way": dict(zip(("joint", "mean_rad"), self.given_way, strict=True)) if self.given_way else None,
         }
 
     def _shown(self, bend: float, digits: int) -> str:
         """A bend in words."""
         if self.unit == "rad":
-            return f"{math.degrees(bend):.{digits}g}°"
+            return f"{float(f'{math.degrees(bend):.{digits}g}'):g}°"
         return f"{bend:.{digits}g} {self.unit}".rstrip()
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
@@ -147,8 +155,9 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         return [], [head, *rows], [said + contacts, *self._remarks(size)]
 
     def _remarks(self, size: str) -> list[str]:
-        """Sentences about bends of the given size, in words, that differ from the smallest ones, and the heading."""
-        remarks = []
+        """Sentences about a bent walk, bends of the given size, in words, that differ from the smallest ones, and the
+        heading."""
+        remarks = ["The multipliers are those of the bent walk."] if self.given_way else []
         if not self.finite:
             remarks += [f"With bends of {size} the walk falls, or they grow too far: only smallest ones are shown."]
         elif self.stable and any(abs(mode.multiplier) > 1.0 + mode.error for mode in self.finite):

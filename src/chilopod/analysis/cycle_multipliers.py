@@ -61,7 +61,9 @@ def walk_multipliers(
     robot: Robot, engine: str | Engine = "twin", *, amplitude: float = AMPLITUDE, cycles: int = 20
 ) -> CycleMultipliers:
     """Leading Floquet multipliers and modes of the straight walk of a robot in an engine that has its cycle map: the
-    twin, also as :class:`chilopod.twin.Edited`; ``amplitude`` and ``cycles`` see :func:`cycle_multipliers`.
+    twin, also as :class:`chilopod.twin.Edited`; ``amplitude`` and ``cycles`` see :func:`cycle_multipliers`. The
+    straight walk has given way if, at the end, a yaw joint bends in the mean over a cycle by more than ``amplitude``
+    and by more than any of them swings within the cycle; the multipliers are then those of the walk that follows.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def walk_multipliers(
         raise ParameterError(said, field="engine", value=engine, allowed=allowed)
     cycle, standing = known.walk_cycle(robot)
     names = [f"yaw{i}" for i in range(1, robot.body.modules)]
-    return cycle_multipliers(robot.name, cycle, standing, names, amplitude, cycles)
+    return _found(robot.name, cycle, standing, names, amplitude, cycles, straight=True)
 
 
 def cycle_multipliers(
@@ -100,11 +102,17 @@ def cycle_multipliers(
         If the walk falls before multipliers of smallest bends are known, moves on in a coordinate in every cycle, or
         depends on its place.
     """
+    return _found(name, cycle, start, bends, amplitude, cycles, straight=False)
+
+
+def _found(
+    name: str, cycle: CycleMap, start: Array, bends: Sequence[str], amplitude: float, cycles: int, straight: bool
+) -> CycleMultipliers:
+    """Multipliers of :func:`cycle_multipliers`, and whether a walk that is to be straight has given way."""
     if not (isinstance(amplitude, Real) and 0.0 < amplitude < 1.0):
         allowed = "above 0, below 1, in the unit of the bends (rad)"
         raise ParameterError("must be a small number", field="amplitude", value=amplitude, allowed=allowed)
-    if checked_count("cycles", cycles, _MOST_CYCLES) < 3 * _BLOCK:
-        raise ParameterError("must be more", field="cycles", value=cycles, allowed=f"{3 * _BLOCK} to {_MOST_CYCLES}")
+    checked_count("cycles", cycles, _MOST_CYCLES, 3 * _BLOCK)
     at = _indices(cycle, bends)
     x = as_array("start", start)
     if x.shape != (len(cycle.names),) or not np.isfinite(x).all():
@@ -128,7 +136,8 @@ def cycle_multipliers(
         if not exact:
             raise
         finite, seen = (), np.array([x, cycle(x[None])[0][0]])
-    if not exact:
+    given_way = _given_way(cycle, seen[-1], at, amplitude) if straight else None
+    if not exact and given_way is None:
         _check_settled(cycle, seen)
     others = np.concatenate([x[None], beside]) if closes else seen
     reach, contacts = _reach(cycle, x, basis, step) if exact else (None, cycle.changing(others))
@@ -136,7 +145,7 @@ def cycle_multipliers(
     mismatch, spread = float(np.abs(ahead - here).max()), np.ptp(seen[:, at], axis=0)
     unit = cycle.units[at[0]] if len({cycle.units[each] for each in at}) == 1 else ""
     found_at = name, cycle.period, x, mismatch, exact, reach, amplitude, finite, spread, contacts, unit
-    return CycleMultipliers(*found_at, heading=bool(place), switch=closes and not exact)
+    return CycleMultipliers(*found_at, heading=bool(place), switch=closes and not exact, given_way=given_way)
 
 
 def finite_modes(
@@ -169,15 +178,24 @@ def _indices(cycle: CycleMap, bends: Sequence[str]) -> _Indices:
     return np.array([cycle.names.index(each) for each in bends])
 
 
+def _given_way(cycle: CycleMap, x: Array, at: _Indices, amplitude: float) -> tuple[str, float] | None:
+    """Name and mean over a cycle of the joint that bends most, if it is beyond a size and the joints' swing: in a
+    straight walk each half of the cycle mirrors the other, and the mean is 0."""
+    path = cycle.path(x)[:, at]
+    means, most = path.mean(axis=0), int(np.abs(path.mean(axis=0)).argmax())
+    bends = abs(means[most]) > max(amplitude, 0.5 * np.ptp(path, axis=0).max())
+    return (cycle.names[at[most]], float(means[most])) if bends else None
+
+
 def _check_settled(cycle: CycleMap, seen: Array) -> None:
     """AnalysisError if a coordinate changes by about the same in each cycle, from states before each, (cycles, n)."""
     moves = np.diff(seen, axis=0)
     least, most = np.abs(moves).min(axis=0), np.abs(moves).max(axis=0)
     even = (np.abs(np.sign(moves).sum(axis=0)) == len(moves)) & (most <= _EVEN * least)
     if (on := even & (np.abs(moves.sum(axis=0)) > _DRIFT)).any():
-        name, move = cycle.names[int(on.argmax())], float(moves[-1, on.argmax()])
-        allowed = "a motion that settles; the argument travel of CycleMap leaves out positions that may move on"
-        raise AnalysisError(f"must repeat: {name} changes by {move:.3g} in each cycle", field="motion", allowed=allowed)
+        name, move = cycle.names[on.argmax()], f"{moves[-1, on.argmax()]:.3g} {cycle.units[on.argmax()]}"
+        allowed = "a motion that settles, beside the joints that are named as the travel of its CycleMap"
+        raise AnalysisError(f"must repeat: {name} changes by {move} in each cycle", field="motion", allowed=allowed)
 
 
 def _closed(cycle: CycleMap, x: Array) -> tuple[Array, bool]:
@@ -342,20 +360,28 @@ def bend_onset(
     multipliers: Callable[[Robot], CycleMultipliers], robot: Robot, parameter: str, between: tuple[float, float]
 ) -> Interval:
     """Value of a parameter at which the multiplier of a bend of finite size passes 1, in SI units, by regula falsi
-    until 1 lies in the multiplier's interval; that interval over the slope is the interval of the value."""
+    until 1 lies in the multiplier's interval; that interval over the slope is the interval of the value. Where the
+    straight walk has given way, bends grow without a multiplier."""
 
     def shown(value: float) -> str:
         return units.format(value, robot.unit_of(parameter), digits=6)
 
     def excess(value: float) -> tuple[float, float]:
-        bends = [mode for mode in multipliers(robot.with_value(parameter, value)).finite if mode.shape == "bend"]
+        found = multipliers(robot.with_value(parameter, value))
+        if found.given_way:
+            return math.inf, 0.0
+        bends = [mode for mode in found.finite if mode.shape == "bend"]
         if not bends:
             raise AnalysisError("has no bend among its leading modes", field=parameter, value=shown(value))
         return bends[0].multiplier.real - 1.0, bends[0].error
 
     (a, b), (at_a, at_b) = between, [excess(end)[0] for end in between]
     if at_a * at_b > 0.0:
-        said = f"must hold an onset; the multiplier is {1.0 + at_a:.4f} and {1.0 + at_b:.4f} at its ends"
+        ends = [
+            f"the multiplier {1.0 + at:.4f}" if math.isfinite(at) else "a walk that has given way"
+            for at in (at_a, at_b)
+        ]
+        said = f"must hold an onset; its ends have {ends[0]} and {ends[1]}"
         given = f"{shown(a)} to {shown(b)}"
         raise ParameterError(said, field="onset", value=given, allowed="values on both sides of 1")
     return crossing(excess, (a, at_a), (b, at_b))
@@ -368,14 +394,17 @@ def crossing(
     tolerance: float = 0.0,
 ) -> Interval:
     """Value at which an excess passes 0, between two values with excesses of different signs, by regula falsi until the
-    excess is below its error or the tolerance; its error over the slope is the interval. ``excess`` returns both."""
+    excess is below its error or the tolerance; its error over the slope is the interval. ``excess`` returns both. An
+    interval with an infinite excess is halved."""
     (a, at_a), (b, at_b) = one, other
     for _ in range(_MOST):
         slope = (at_b - at_a) / (b - a)
-        value = a - at_a / slope
+        value = a - at_a / slope if math.isfinite(slope) else 0.5 * (a + b)
         at, error = excess(value)
-        if abs(at) <= max(error, tolerance):
+        if math.isfinite(slope) and abs(at) <= max(error, tolerance):
             break
         a, at_a, b, at_b = (value, at, b, at_b) if at * at_a > 0.0 else (a, at_a, value, at)
+    if not math.isfinite(slope):
+        raise AnalysisError("must hold bends that grow, before the straight walk has given way", field="onset")
     value -= at / slope
     return Interval(value, value - error / abs(slope), value + error / abs(slope))

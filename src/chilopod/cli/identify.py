@@ -86,7 +86,7 @@ _POINTS = 25
 class _PlanarOptions(_Options):
     """Argument and options of ``identify planar``, as they were typed."""
 
-    robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = "aoi2022-planar"
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file or preset.")] = "aoi2022-planar"
     points: Annotated[int, typer.Option(metavar="N", help="Number of points of the profile.", min=3, max=200)] = _POINTS
     measure: Annotated[bool, typer.Option("--next", help="Say which measurements would tell most.")] = False
     check: Annotated[
@@ -142,7 +142,7 @@ def planar(options: _PlanarOptions) -> None:
 class _TwinOptions(_Options):
     """Argument and options of ``identify twin``, as they were typed."""
 
-    robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset with a [twin].")] = "aoi2022"
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file or preset with a [twin].")] = "aoi2022"
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path(
         "identification-twin"
     )

@@ -43,7 +43,7 @@ class LiveOptions:
     """Argument and options of ``live``, as they were typed."""
 
     robot: Annotated[
-        str, typer.Argument(metavar="[ROBOT]", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
+        str, typer.Argument(metavar="ROBOT", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
     ] = "aoi2022-planar"
     engine: EngineOption = "planar"
     strategy: StrategyOption = "variable"

@@ -14,7 +14,7 @@ from chilopod.cli.progress import progress_bar
 
 def play(
     robot: Annotated[
-        str, typer.Argument(metavar="[ROBOT]", help="Robot file, or the preset aoi2022-planar.")
+        str, typer.Argument(metavar="ROBOT", help="Robot file, or the preset aoi2022-planar.")
     ] = "aoi2022-planar",
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="HTML file to write.")] = Path("play.html"),
     browser: Annotated[bool, typer.Option("--open", help="Open the page in a browser too.")] = False,

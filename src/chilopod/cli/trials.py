@@ -145,7 +145,8 @@ def clean(
     }
     lines = [f"{'would remove' if dry else 'removed'} {path}" for path in removed]
     lines += [f"left {path}: {why}" for path, why in left]
-    lines.append(f"{len(removed)} {'to be removed' if dry else 'removed'}, {len(left)} left")
+    done = "to be removed" if dry else "removed"
+    lines.append(f"{len(removed)} {done}, {len(left)} other files left beside the trials")
     print_result(found, lines, as_json)
 
 

@@ -31,7 +31,7 @@ def walk(
             "the robot starts straight.",
         ),
     ] = None,
-    rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second, by default 100.")] = None,
+    rate: Annotated[str, typer.Option(metavar="RATE", help='Samples per second, such as "10 Hz".')] = "100 Hz",
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE.nc", help="NetCDF file for everything over time.")
@@ -52,15 +52,16 @@ def walk(
         seconds = units.parse(duration, "s")
     with reading("initial_joints"):
         angles = joint_angles(initial_joints)
+    with reading("rate"):
+        samples = units.parse(rate, "Hz")
     free([out] if out else [], options.force, ".nc")
     with ExitStack() as stack:
         with options.walking("walk") as progress:
             how = options.steering  # before what takes seconds to import
-            from chilopod.record import RATE
             from chilopod.tasks import ends
             from chilopod.trials import Trial
 
-            one = Trial(described, seconds, 0, angles, rate=RATE if rate is None else rate, forces=forces, **how)
+            one = Trial(described, seconds, 0, angles, rate=samples, forces=forces, **how)
             trials = one.repeated(options.seed, options.repeats)
             file = stack.enter_context(_record_file(out, trials)) if out else None
             add = file.add if file else lambda index, record: None

@@ -54,15 +54,15 @@ def positive(field: str, value: object) -> float:
     return number
 
 
-def checked_count(field: str, value: object, most: int) -> int:
-    """A whole number from 1 to ``most``."""
+def checked_count(field: str, value: object, most: int, least: int = 1) -> int:
+    """A whole number from ``least``, 1 or more, to ``most``."""
     try:
         count = 0 if isinstance(value, bool) else operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         count = 0
-    if not 1 <= count <= most:
-        said = "is too large" if count > most else "must be a whole number"
-        raise ParameterError(said, field=field, value=value, allowed=f"1 to {most}" if most > 1 else "1")
+    if not least <= count <= most:
+        said = "is too large" if count > most else "must be more" if count > 0 else "must be a whole number"
+        raise ParameterError(said, field=field, value=value, allowed=f"{least} to {most}" if most > 1 else "1")
     return count
 
 

@@ -144,6 +144,9 @@ TASKS: Final[Mapping[str, Task]] = {
 """Tasks by name: random targets, and the two turning tasks of Aoi et al. (2022)."""
 
 
+_ARGUMENTS = ("task", "robot", "engine", "springs", "patience", "disturbance", "render_mode")  # of an environment
+
+
 def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
     """Return a task, given itself or by name, with other values of some fields. Raises ParameterError for an unknown
     task or field."""
@@ -153,6 +156,7 @@ def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
         raise ParameterError("must be one of the tasks", field="task", value=task, allowed=allowed, nearest=nearest)
     names = [each.name for each in fields(found)]
     for name in chosen.keys() - names:
-        problem = f"must be a field of {type(found).__name__}"
-        raise ParameterError(problem, field=name, value=chosen[name], allowed=", ".join(names))
+        problem, known = f"must be a field of {type(found).__name__} or an argument", (*names, *_ARGUMENTS)
+        near, value = nearest_name(name, known), chosen[name]
+        raise ParameterError(problem, field=name, value=value, allowed=", ".join(known), nearest=near)
     return replace(found, **chosen)

@@ -113,6 +113,8 @@ class Controls:
         self._walks.options = _walking_options(settings.paused)
         self._record.label = "End the recording (C)" if settings.recording else "Record (C)"
         self._seed.value = settings.seed
+        if settings.strategy != before.strategy:
+            self._strategy.value = settings.strategy
 
     def put_back(self, now: Settings) -> None:
         """Show the present value of every control, after a wish was refused or came from elsewhere."""

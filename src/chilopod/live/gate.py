@@ -348,7 +348,7 @@ def _policy(host: str) -> str:
 def _page() -> bytes:
     """Viser's page with our styles and our script in front of its own."""
     ours = f"<style>{_file('page.css')}</style><script>{_file('page.js')}</script><title>chilopod live</title>"
-    return _index().replace("<title>Viser</title>", ours).encode()
+    return _index().replace("<title>Viser</title>", ours).replace('"Viser client"', '"Robot that walks"').encode()
 
 
 @cache

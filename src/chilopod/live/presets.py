@@ -54,7 +54,8 @@ def query(settings: Settings, file: Settings, sliders: Mapping[str, Slider], pre
     """Part of an address that leads to the present settings from those of the file."""
     changed = (row for row in sliders.values() if row.name != ALL and row.read(settings) != row.read(file))
     parts = {row.key: f"{row.at_page(row.read(settings)):g}" for row in changed}
-    return urlencode({**({} if preset == OWN else {"robot": preset}), **parts, "seed": settings.seed})
+    steering = {} if settings.strategy == file.strategy else {"strategy": settings.strategy}
+    return urlencode({**({} if preset == OWN else {"robot": preset}), **parts, "seed": settings.seed, **steering})
 
 
 def preset_of(asked: str) -> str | None:

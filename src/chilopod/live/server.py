@@ -10,6 +10,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 
 from chilopod.analysis.parameters import ALL, K1
@@ -301,7 +302,8 @@ class Live:
         self.preset, self._challenge = name, None
         at_server(self.server, self._clear)
         self._compile(robot, engine)
-        self.session = Session(robot, engine, seed=before.settings.seed, strategy=before.settings.strategy)
+        self.session = Session(robot, engine, seed=before.settings.seed, strategy=before.first.strategy)
+        self.session.settings = replace(self.session.settings, strategy=before.settings.strategy)
         self.session.box = before.box
         self.seen, self._places = self.session.seen(), _places(robot, engine)
         at_server(self.server, self._furnish)
@@ -343,11 +345,12 @@ class Live:
         if preset is not None and preset != self.preset:
             self.choose(preset)
         session, (told, wrong) = self.session, read(asked, self.session.sliders)
-        if told:  # what an address leaves out is as in the file and its preset
+        if told or preset is not None:  # what an address leaves out is as in the file and its preset
             file = [
                 wishes.Set(row.name, row.read(session.first)) for row in session.sliders.values() if row.name != ALL
             ]
-            told = [*file, *read(PRESETS[self.preset].settings, session.sliders)[0], *told]
+            steering = wishes.Steering(session.first.strategy)
+            told = [*file, steering, *read(PRESETS[self.preset].settings, session.sliders)[0], *told]
         for wish in told:
             self.wish(wish)
         if wrong:

@@ -58,9 +58,10 @@ class RadiusLaw(ReadOnlyArrays):
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
         count = 1 + (len(good) if good.all() else int(np.argmin(good)))
         if count < 3:
-            problem = "the curved walks beside the pitchfork must tighten for a radius law"
+            problem = "beside the pitchfork the curved walks do not tighten, and no spring sets a radius"
             if not stable[1:3].all():
-                problem = "the curved walks beside the pitchfork must be stable for a radius law: here the robot jumps"
+                problem = "beside the pitchfork the curved walks are unstable, and the robot jumps"
+                problem = f"subcritical: {problem}" if values[1] > values[0] else problem
             raise AnalysisError(problem, field="branch")
         bent = np.concatenate([[np.inf], radii[1:count]])
         return cls(values[:count][::-1], bent[::-1], unit)

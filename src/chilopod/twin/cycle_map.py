@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -110,12 +111,21 @@ class CycleMap:
         from states before it, shape (runs, n) or (n,); AnalysisError if one falls."""
         return self._run(*map(np.atleast_2d, self.full(x)))
 
-    def _run(self, positions: Array, rates: Array) -> tuple[Array, NDArray[np.int32]]:
+    def path(self, x: Array) -> Array:
+        """States after every step of a cycle, (steps, n), from the state before it, (n,)."""
+        seen = self._rolled(*self.full(x[None]), ["qpos", "qvel"])[1]
+        return self.reduced(seen["qpos"][0], seen["qvel"][0])
+
+    def _rolled(self, positions: Array, rates: Array, record: list[str]) -> tuple[Batch, dict[Any, NDArray[Any]]]:
+        """Walks at the end of a cycle, and what is recorded of each of their steps."""
         batch = Batch(self.model, len(positions), cores())
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         batch.bind("qpos")[:], batch.bind("qvel")[:] = positions, rates
         with silence():
-            seen = batch.rollout(len(self.control), self.control, record=["ncon", "nl"])
+            return batch, batch.rollout(len(self.control), self.control, record=record)
+
+    def _run(self, positions: Array, rates: Array) -> tuple[Array, NDArray[np.int32]]:
+        batch, seen = self._rolled(positions, rates, ["ncon", "nl"])
         image = self.reduced(batch.bind("qpos"), batch.bind("qvel"))
         fallen = self._free and (np.cos(image[:, 1]) * np.cos(image[:, 2]) < _UPRIGHT).any()
         if fallen or batch.warning.any() or not np.isfinite(image).all():
