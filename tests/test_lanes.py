@@ -2,6 +2,7 @@
 
 import json
 import os
+import runpy
 import subprocess
 import sys
 from ctypes.util import find_library
@@ -9,6 +10,7 @@ from ctypes.util import find_library
 import numpy as np
 import pytest
 
+from chilopod import compiled
 from chilopod.compiled import njit
 from chilopod.dual import cos_sin, reciprocal
 from chilopod.lanes import LANES, any_less, as_lanes, choose, exponential, larger, square_root
@@ -73,51 +75,92 @@ def test_debug_information_does_not_change_which_sums_are_fused(monkeypatch):
         lanes[2] = product + lanes[2]
 
     monkeypatch.setattr("numba.config.DEBUGINFO_DEFAULT", 1)
-    compiled = njit(cache=False)(product_and_sum)
+    function = njit(cache=False)(product_and_sum)
     numbers = np.full((3, LANES), 1.0 + 2.0**-30)
     numbers[2] = -1.0 - 2.0**-29
-    compiled(numbers)
+    function(numbers)
     np.testing.assert_array_equal(numbers[2], 2.0**-60)
 
 
-def _python(code, **variables):
-    kept = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
-    command = [sys.executable, "-c", code]
-    return subprocess.run(command, env={**kept, **variables}, capture_output=True, text=True, timeout=60, check=False)
+# One process has imported what takes long; every command is a child of it, with variables of its own. Of what `doctor`
+# looks at, packages count here.
+RUNS = """
+import json, os, sys
+import numba, numpy, pydantic, scipy.linalg, scipy.optimize, typer, xarray
+
+for arguments, variables in json.loads(sys.argv[1]):
+    if not (child := os.fork()):
+        for number, name in enumerate(("out", "err"), 1):
+            os.dup2(os.open(" ".join([*variables, name]), os.O_WRONLY | os.O_CREAT), number)
+        os.environ.update(variables)
+        numba.config.reload_config()
+        from chilopod.cli import doctor, main
+        doctor._LOOKS.clear()
+        code = main(arguments)
+        sys.stdout.flush()
+        os._exit(code)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+WALK, DOCTOR = ["walk", "aoi2022-planar", "--duration", "0.1 s"], ["doctor", "--json"]
+LAYER = "NUMBA_THREADING_LAYER"
+ASKED = {
+    "NUMBA_DISABLE_JIT": (["stability", "aoi2022-planar"], "1"),
+    "NUMBA_CPU_NAME": (["stability", "aoi2022-planar"], "nosuch"),
+    LAYER: (WALK, "tbb"),
+    f"{LAYER}_PRIORITY": (DOCTOR, "zzz"),
+}
 
 
-@pytest.mark.parametrize(("name", "value", "shown"), [("DISABLE_JIT", "1", "1"), ("CPU_NAME", "nosuch", "'nosuch'")])
-def test_code_that_cannot_be_compiled_is_refused_in_one_line(name, value, shown):
-    code = "from chilopod.cli import main; raise SystemExit(main(['stability', 'aoi2022-planar']))"
-    done = _python(code, **{f"NUMBA_{name}": value})
-    assert done.returncode == 2
-    (error,) = [each for each in done.stderr.splitlines() if not each.startswith("stability: ")]  # of a loaded machine
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """Exit code, stdout and stderr of a command where a variable is what it must not be."""
+    if not hasattr(os, "fork"):
+        pytest.skip("runs are forked")
+    folder = tmp_path_factory.mktemp("runs")
+    asked = json.dumps([(arguments, {name: value}) for name, (arguments, value) in ASKED.items()])
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    runs = [sys.executable, "-c", RUNS, asked]
+    codes = subprocess.run(runs, cwd=folder, env=environment, stdout=subprocess.PIPE, timeout=120, check=True).stdout
+    return {
+        name: (int(code), *((folder / f"{name} {stream}").read_text() for stream in ("out", "err")))
+        for name, code in zip(ASKED, codes.split(), strict=True)
+    }
+
+
+def _errors(stderr):
+    """Lines of it but those by which the command of a loaded machine says first what it does."""
+    return [each for each in stderr.splitlines() if not each.startswith(("stability: ", "walk: "))]
+
+
+@pytest.mark.parametrize(("name", "shown"), [("DISABLE_JIT", "1"), ("CPU_NAME", "'nosuch'")])
+def test_code_that_cannot_be_compiled_is_refused_in_one_line(done, name, shown):
+    code, _, stderr = done[f"NUMBA_{name}"]
+    assert code == 2
+    (error,) = _errors(stderr)
     assert error.startswith(f"error: NUMBA_{name} = {shown}: ")
 
 
-@pytest.mark.parametrize(
-    ("command", "name", "value"),
-    [("['walk', 'aoi2022-planar', '--duration', '0.1 s']", "", "tbb"), ("['doctor', '--json']", "_PRIORITY", "zzz")],
-)
-def test_threads_that_cannot_be_had_are_one_line(command, name, value):
-    if value == "tbb" and find_library("tbb"):
+def test_threads_that_cannot_be_had_are_one_line(done):
+    if find_library("tbb"):
         pytest.skip("they can be had")
-    wish = {f"NUMBA_THREADING_LAYER{name}": value}
-    done = _python(f"from chilopod.cli import main; raise SystemExit(main({command}))", **wish)
-    line = f"NUMBA_THREADING_LAYER{name} = '{value}': cannot be loaded; allowed: "
-    if "doctor" in command:
-        assert done.returncode == 3
-        (found,) = [each for each in json.loads(done.stdout)["findings"] if each["mend"] and each["name"] == "numba"]
-        assert line in found["found"]
-        assert found["mend"] == f"unset NUMBA_THREADING_LAYER{name}"
-    else:
-        assert done.returncode == 2
-        # A loaded machine takes so long that it says first what it does.
-        (error,) = [each for each in done.stderr.splitlines() if not each.startswith("walk: ")]
-        assert error.startswith(f"error: {line}")
+    code, _, stderr = done[LAYER]
+    assert code == 2
+    (error,) = _errors(stderr)
+    assert error.startswith(f"error: {LAYER} = 'tbb': cannot be loaded; allowed: ")
 
 
-def test_threads_that_wait_sleep_unless_the_user_says_otherwise():
-    code = "import chilopod.compiled, os; print(os.environ['OMP_WAIT_POLICY'])"
-    assert _python(code).stdout == "passive\n"
-    assert _python(code, OMP_WAIT_POLICY="active").stdout == "active\n"
+def test_the_doctor_says_which_variable_of_threads_to_unset(done):
+    code, stdout, _ = done[f"{LAYER}_PRIORITY"]
+    assert code == 3
+    (found,) = [each for each in json.loads(stdout)["findings"] if each["mend"] and each["name"] == "numba"]
+    assert f"{LAYER}_PRIORITY = 'zzz': cannot be loaded; allowed: " in found["found"]
+    assert found["mend"] == f"unset {LAYER}_PRIORITY"
+
+
+@pytest.mark.parametrize(("chosen", "policy"), [(None, "passive"), ("active", "active")])
+def test_threads_that_wait_sleep_unless_the_user_says_otherwise(monkeypatch, chosen, policy):
+    monkeypatch.setenv("OMP_WAIT_POLICY", chosen or "")
+    if chosen is None:
+        monkeypatch.delenv("OMP_WAIT_POLICY")
+    runpy.run_path(compiled.__file__)
+    assert os.environ["OMP_WAIT_POLICY"] == policy

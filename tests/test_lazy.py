@@ -14,11 +14,46 @@ HEAVY = ("mujoco", "matplotlib", "xarray", "pandas", "h5netcdf", "av", "cmaes", 
 PACKAGES = (chilopod, analysis, planar, show, tasks, identify, trials)
 
 
+PAPER = tuple(f"chilopod.paper{part}" for part in ("", ".printed", ".scatter", ".section", ".registry", ".table"))
+THEORY = "from chilopod.analysis import bifurcations, pitchfork, straight_walk"
+WALKS = "from chilopod.tasks import turn, radius_law\nfrom chilopod.trials import NONE, Trial, run, together"
+PAGE = "import chilopod.live.server, chilopod.gym.envs, chilopod.show.files"
+NAMES = tuple(f"chilopod.{name}" for name in ("analysis.straight_walk", "tasks.turn", "tasks.radius_law", "trials.run"))
+IMPORTED = "import {0}\nfrom {1} import {2}\nassert callable({2}) and callable({0})"
+VERBS = {name: IMPORTED.format(name, *name.rpartition(".")[::2]) for name in NAMES}
+ASKED = {THEORY: HEAVY, WALKS: ("mujoco", "matplotlib", "cmaes", "distributed"), PAGE: PAPER}
+ASKED |= dict.fromkeys(VERBS.values(), ())
+# Each in a process of its own, which has everything of others loaded already.
+RUNS = """
+import os, sys
+import numba, numpy, pydantic, scipy.interpolate, scipy.linalg, scipy.optimize
+for code, asked in {asked}.items():
+    if "xarray" not in asked:
+        import xarray
+    if not (child := os.fork()):
+        exec(code, {{}})
+        print(*[name for name in asked if name in sys.modules], flush=True)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0, code
+"""
+
+
+def ran(code):
+    """What a fresh process prints, line by line."""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    return result.stdout.splitlines()
+
+
 def loaded(code, *modules):
     """Which of the modules a fresh process has after running some code."""
-    asked = f"import sys\n{code}\nprint(*[name for name in {modules!r} if name in sys.modules])"
-    result = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, timeout=120, check=True)
-    return set(result.stdout.split())
+    found = ran(f"import sys\n{code}\nprint(*[name for name in {modules!r} if name in sys.modules])")
+    return set(" ".join(found).split())
+
+
+@pytest.fixture(scope="module")
+def after():
+    """Which of the modules that are asked for are there after each import."""
+    return dict(zip(ASKED, ran(RUNS.format(asked=ASKED)), strict=True))
 
 
 def test_a_package_alone_loads_nothing():
@@ -29,8 +64,8 @@ def test_a_package_alone_loads_nothing():
     assert loaded(code, *HEAVY, "numpy", "scipy", "numba", "pydantic", *packages) == set(packages)
 
 
-def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records():
-    assert loaded("from chilopod.analysis import bifurcations, pitchfork, straight_walk", *HEAVY) == set()
+def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records(after):
+    assert after[THEORY] == ""
 
 
 def test_a_misspelt_name_is_noticed_before_the_command_loads_what_it_computes_with():
@@ -47,15 +82,12 @@ def test_a_misspelt_name_is_noticed_before_the_command_loads_what_it_computes_wi
     assert loaded(code, *HEAVY, "scipy", "numba") == set()
 
 
-def test_what_walks_loads_the_twin_only_where_it_walks():
-    code = "from chilopod.tasks import turn, radius_law\nfrom chilopod.trials import NONE, Trial, run, together"
-    assert loaded(code, "mujoco", "matplotlib", "cmaes", "distributed") == set()
+def test_what_walks_loads_the_twin_only_where_it_walks(after):
+    assert after[WALKS] == ""
 
 
-def test_the_live_page_and_the_environments_know_no_paper():
-    code = "import chilopod.live.server, chilopod.gym.envs, chilopod.show.files"
-    paper = [f"chilopod.paper{part}" for part in ("", ".printed", ".scatter", ".section", ".registry", ".table")]
-    assert loaded(code, *paper) == set()
+def test_the_live_page_and_the_environments_know_no_paper(after):
+    assert after[PAGE] == ""
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
@@ -67,24 +99,9 @@ def test_every_name_is_there_and_listed(package):
         _ = package.nonsense
 
 
-# Each in a process of its own, which has everything of others loaded already.
-VERBS = """
-import os
-import numba, pydantic, scipy.interpolate, scipy.optimize, xarray
-for name in {names}:
-    child = os.fork()
-    if not child:
+def test_a_verb_named_like_its_module_is_the_verb_whatever_was_loaded_first(after):
+    for name, code in VERBS.items():
+        assert after[code] == ""  # which it has asserted
         package, _, verb = name.rpartition(".")
-        code = f"import {{name}}\\nfrom {{package}} import {{verb}}\\nassert callable({{verb}}) and callable({{name}})"
-        exec(code, {{}})
-        os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0, name
-"""
-
-
-def test_a_verb_named_like_its_module_is_the_verb_whatever_was_loaded_first():
-    names = "analysis.straight_walk", "tasks.turn", "tasks.radius_law", "trials.run"
-    loaded(VERBS.format(names=[f"chilopod.{name}" for name in names]))
-    for package, _, verb in (f"chilopod.{name}".rpartition(".") for name in names):
-        module = importlib.import_module(f"{package}.{verb}")
+        module = importlib.import_module(name)
         assert getattr(module, verb) is getattr(sys.modules[package], verb)

@@ -14,15 +14,27 @@ from chilopod.stability import Kind
 from own_orbits import Crossing
 
 
-@pytest.fixture(scope="module")
-def followed():
-    """A bent resonance, with two folds."""
+def resonance(**options):
+    """A bent resonance, with two folds, and its branch."""
     terms = (
         own.Term(0, 1.0, (0, 1)), own.Term(1, -0.1, (0, 1)), own.Term(1, -1.0, (1, 0)), own.Term(1, -1.0, (3, 0)),
         own.Term(1, 0.0, (0, 0), 1.0, 1.8),
     )  # fmt: skip
-    asked = kinds.Drawn(own.Terms(2, terms, 2 * np.pi / 1.8), (0.2, 1.5), 0.2, True, np.array([0.0, 0.0]))
+    asked = kinds.Drawn(
+        own.Terms(2, terms, 2 * np.pi / 1.8), (0.2, 1.5), 0.2, True, np.array([0.0, 0.0]), options=options
+    )
     return asked, branches.branch_of(asked)[0]
+
+
+@pytest.fixture(scope="module")
+def followed():
+    return resonance()
+
+
+@pytest.fixture(scope="module")
+def begun():
+    """To behind the first fold."""
+    return resonance(points=20)
 
 
 def faults(asked, branch):
@@ -40,6 +52,11 @@ def test_a_branch_is_right(followed):
     found = checks.checked(asked, branch)
     assert found.faults == found.own == []
     assert found.counts["confirmed"] == len(branch.special_points) == 2
+
+
+def test_the_beginning_of_a_branch_is_right(begun):
+    assert faults(*begun) == []
+    assert len(begun[1].special_points) == 1
 
 
 def test_a_branch_may_turn_in_the_pitchfork_where_it_leaves():
@@ -72,15 +89,19 @@ def invented(branch, at):
             ["multipliers"],
         ),
         (lambda branch, at: with_point(branch, 2, orbit=branch.points[2].orbit * (1.0 + 1e-8)), "not closed"),
-        (lambda branch, at: replace(branch, points=branch.points[:-1]), "end"),
     ],
 )
-def test_a_planted_fault_is_found(followed, plant, found):
+def test_a_planted_fault_is_found(begun, plant, found):
     """As the only one, or beside others that follow from it."""
-    asked, branch = followed
+    asked, branch = begun
     at = next(i for i, point in enumerate(branch.points) if point.special is not None)
     said = faults(asked, plant(branch, at))
     assert said == found or found in said
+
+
+def test_a_branch_that_ends_too_early_is_found(followed):
+    asked, branch = followed
+    assert "end" in faults(asked, replace(branch, points=branch.points[:-1]))
 
 
 @pytest.mark.parametrize("kind", ["hybrid", "piecewise", "symmetric", "relaxation"])

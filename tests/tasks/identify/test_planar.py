@@ -146,10 +146,9 @@ def test_a_search_ends_among_robots_without_a_pitchfork(monkeypatch):
     assert len(tried) <= 7 * (planar_fit._MOST_LOST + 2)
 
 
-@pytest.mark.parametrize("tolerance", [0.05, 0.1])
-def test_every_end_of_a_wide_valley_is_found(tolerance):
+def test_every_end_of_a_wide_valley_is_found():
     """Linear constraints point among robots without a pitchfork, from which no search comes back."""
-    data = CriticalMode(**{**dict(DATA), "component_tolerance": tolerance})
+    data = CriticalMode(**{**dict(DATA), "component_tolerance": 0.1})
     best = planar_fit.best_of(planar_fit.fits_from_every_start(ROBOT, data))[0]
     ends = planar_fit.confidence_intervals(ROBOT, data, best)[0]
     assert np.isfinite(ends).all()

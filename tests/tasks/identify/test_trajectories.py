@@ -98,7 +98,7 @@ def test_a_heavy_robot_remembers_its_rates_for_cycles(tmp_path):
 
 def test_friction_and_springs_are_known_as_their_ratio_alone(tmp_path):
     robot = ROBOT.set_from_text(["springs.stiffness=12 N*mm/deg"])
-    record = walked(robot, 8.0).isel(time=slice(20, None))
+    record = walked(robot, 5.0).isel(time=slice(20, None))
     for seed, name in enumerate(("walk.nc", "again.nc")):
         noise = np.random.default_rng(seed).normal(0.0, 0.01, record.joint_angle.shape)
         (tmp_path / name).write_bytes(netcdf(record.assign(joint_angle=record.joint_angle + noise)))

@@ -292,7 +292,9 @@ def test_the_preset_is_the_first_of_the_known():
 
 @pytest.mark.slow
 def test_the_preset_meets_the_base_series():
-    assert np.sqrt(np.mean(residuals(ROBOT, base_series(ROBOT, DATA), DATA) ** 2)) <= 1.0
+    """As soon as walks are asked whether they are far off: 0.41, and 0.34 at their end."""
+    found = base_series(ROBOT, DATA, duration=twin_series._SOONER)
+    assert np.sqrt(np.mean(residuals(ROBOT, found, DATA) ** 2)) <= 1.0
 
 
 def test_a_fit_is_good_if_it_meets_every_datum_and_without_one_none_is_found():
