@@ -261,7 +261,7 @@ _PASSES = 40  # through the product: a gap of 1 leaves exp(-40) of the neighbour
 _AVERAGED = 20  # number of last passes over which the growth is averaged
 _AT_REST = 1e-8  # motion of a basis in a pass that has converged
 _DRAWS_OF_STIFF = 3  # each costs as much as the result
-_SHORTENINGS = 100
+_SHORTENINGS = 40
 _LEFT, _APART = 1e-12, 1e-4  # stretches over a short time above round-off, and that separate directions
 
 
@@ -397,14 +397,19 @@ def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
     slow = cut.section.shape[1] - 1
     if slow == 0:
         return np.eye(1)
+    short, long = 0.0, np.inf
     for _ in range(_SHORTENINGS):
         state, derivative = checked_flow(system, x, 0.0, duration)
         derivative = derivative * cut.units / cut.units[:, None]
         after = section_basis(system, state, cut.units)
         stretch, right = np.linalg.svd(after.T @ derivative @ cut.section)[1:]
-        if stretch[slow] >= _LEFT * max(1.0, stretch[0]):
-            if stretch[slow] <= _APART * stretch[slow - 1]:
-                return np.asarray(right[slow:].T)
+        largest = max(1.0, float(stretch[0]))
+        if _LEFT * largest <= stretch[slow] <= _APART * stretch[slow - 1]:
+            return np.asarray(right[slow:].T)
+        # Over a long time the least stretch is round-off, over a short one it has not fallen yet.
+        short, long = (duration, long) if stretch[slow] > _APART * largest else (short, duration)
+        duration = 0.5 * (short + long)
+        if np.isinf(long):
             break
-        duration *= 0.5
-    raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
+    said = "the flow contracts too strongly to be resolved"
+    raise ContractionError(said, field="flow", allowed="another state on the orbit")
