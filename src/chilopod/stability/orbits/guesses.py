@@ -92,8 +92,6 @@ def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
     """Further starts after Newton's method has failed at a guessed state, each with a flag for careful steps."""
     duration = return_duration(system)
     if is_autonomous(system):
-        with contextlib.suppress(AnalysisError):
-            yield from ((nodes, False) for nodes in own_return(system, x))
         # An orbit with a strongly stable direction is reached from a section only by guesses on its stable manifold.
         yield Nodes(x[None], duration), True
     with contextlib.suppress(AnalysisError, np.linalg.LinAlgError):
@@ -132,9 +130,14 @@ def _settled_autonomous(system: Autonomous, x: Array) -> Iterator[Nodes]:
         yield Nodes(x[None], float(times[back[0]]) / returns_per_period(system))
 
 
-def own_return(system: Autonomous, x: Array) -> Iterator[Nodes]:
+def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
     """A state that its own motion meets again within half to twice the guessed period, with that time, if it does."""
-    times, states, away = _marched(system, x, 2)
+    if not is_autonomous(system):
+        return
+    try:
+        times, states, away = _marched(system, x, 2)
+    except AnalysisError:
+        return
     units = np.maximum(sizes(system, x, system.guess_period), np.abs(states).max(axis=0))
     for i in (i for i in _minima(away) if times[i] >= 0.5 * system.guess_period):
         later, there = times[1], states[i]

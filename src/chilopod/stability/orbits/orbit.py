@@ -8,6 +8,7 @@ rounds is cut down to one (``closings``). ``with_bounds`` bounds the errors.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -181,15 +182,16 @@ def searched_orbit(
             raise
         if budget is not None:
             budget.take(_SETTLING)
-        for nodes, careful in nearer_orbits(system, x):
+        own = ((nodes, False) for nodes in own_return(system, x)) if shortened else ()
+        for nodes, careful in itertools.chain(own, nearer_orbits(system, x)):
             with contextlib.suppress(AnalysisError):
                 return near(nodes, careful=careful)
         raise failed
     size = sizes(system, x, duration)
-    if section is None and is_autonomous(system) and (off := _relative(found.state - x, size)) > _FAR:
+    if shortened and (off := _relative(found.state - x, size)) > _FAR:
         # The time may lead to another orbit although the state is on one.
-        with contextlib.suppress(AnalysisError):
-            for nodes in own_return(system, x):
+        for nodes in own_return(system, x):
+            with contextlib.suppress(AnalysisError):
                 other = near(nodes)
                 found = other if _relative(other.state - x, size) < off else found
     return found
