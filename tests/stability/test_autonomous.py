@@ -319,3 +319,17 @@ def test_an_orbit_given_beside_an_event_is_not_left_for_another(left):
     antiphase = from_rhs(lambda t, x: [1.3 - x[0], 1.3 - x[1]], 2, None, events=fire, guess_period=period)
     found = multipliers(antiphase, [1.3 - 1.3 * np.exp(-period / 2.0) - left, 1.0 - left])
     assert found.period == pytest.approx(period, rel=1e-9)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.35])
+def test_a_state_on_an_orbit_keeps_it_with_a_wrong_period(factor):
+    """Newton's method comes to an orbit of period 17.5 with the shorter time, though the motion returns after 5.88."""
+
+    def system(guess_period):
+        rhs = lambda t, x: [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - 5.7)]  # noqa: E731
+        return from_rhs(rhs, 3, None, guess_period=guess_period)
+
+    exact = find_orbit(system(5.88), [8.0, -3.0, 0.3], with_error=False)
+    found = find_orbit(system(factor * exact.period), exact.state, with_error=False)
+    assert found.period == pytest.approx(exact.period, rel=1e-9)
+    np.testing.assert_allclose(found.state, exact.state, atol=1e-8)

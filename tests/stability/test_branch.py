@@ -215,6 +215,7 @@ def area_preserving(c):
 
 def test_what_leaves_a_collision():
     (meeting,) = locate(area_preserving, (-1.5, 0.5), orbit=[0.0, 0.0])
+    assert meeting.modes is None  # two multipliers with one eigenvector
     (start,) = switch(area_preserving, meeting)
     doubled = follow(area_preserving, start, (-1.5, 0.5), points=4)
     assert (doubled.ending, doubled.periods) == (Ending.ENOUGH_POINTS, 2)
@@ -224,6 +225,23 @@ def test_what_leaves_a_collision():
     for start in switch(area_preserving, meeting):
         point = follow(area_preserving, start, (0.5, 1.5), points=3).points[-1]
         assert point.orbit == pytest.approx(1.0 - point.value, abs=1e-9)
+
+
+def turning(angle):
+    """The multipliers exp(+-i angle) of x = 0 meet at -1 with an eigenvector each: every direction is one."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return from_map(lambda x: (turn @ [x[0], x[1] + x[0] ** 3], turn @ [[1.0, 0.0], [3.0 * x[0] ** 2, 1.0]]), 2)
+
+
+def test_no_direction_is_made_up_at_a_collision_that_determines_none():
+    (meeting,) = locate(turning, (2.5, 4.0), orbit=[0.0, 0.0])
+    (special,) = follow(turning, begin(turning, 2.5, [0.0, 0.0]), (2.5, 4.0)).special_points
+    for point in (meeting, special.bifurcation):
+        assert point.kind is Kind.COLLISION
+        assert point.modes.shape == (2, 2)
+        assert abs(point.value - np.pi) <= point.error_bound
+        with pytest.raises(ParameterError, match=r"has 2 critical modes, which do not determine .* with `begin`$"):
+            switch(turning, point)
 
 
 def test_a_first_step_is_shortened_to_where_there_is_motion():

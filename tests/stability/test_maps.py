@@ -247,3 +247,25 @@ def test_a_quadratic_term_that_a_symmetry_allows_need_not_be_there(quadratic, ki
     (point,) = locate(family, (-0.3, 0.2))
     assert (point.kind, point.multiplicity) == (kind, 2)
     assert len(switch(family, point)) == 2
+
+
+@pytest.mark.parametrize("copies", [1, 2])
+def test_values_kept_as_memory_hide_no_crossing(copies):
+    """Zero multipliers of one chain have no left eigenvectors; that of -1 at a = 3/4 does not depend on them."""
+    memory = 4
+
+    def family(a):
+        def image(x):
+            newest = x[:copies]
+            derivative = np.eye(copies * memory, k=-copies)
+            derivative[range(copies), range(copies)] = -2.0 * a * newest
+            return np.concatenate([1.0 - a * newest**2, x[:-copies]]), derivative
+
+        return from_map(image, copies * memory)
+
+    x = np.full(copies * memory, 0.85)
+    (found,) = locate(family, (0.2, 1.0), orbit=x)
+    assert (found.kind, found.multiplicity) == (Kind.PERIOD_DOUBLING, copies)
+    assert abs(found.value - 0.75) <= found.error_bound < 1e-12
+    (special,) = follow(family, begin(family, 0.2, x), (0.2, 1.0)).special_points
+    assert abs(special.value - 0.75) < 1e-12

@@ -53,6 +53,18 @@ def test_relaxation_oscillations(mu, guess_period, units):
     assert found.multipliers.stable
 
 
+@pytest.mark.parametrize("state", [[1.219e-3, 2.879, 1.093e-3], [3.383e-3, 1.222, 1.918e-3]])
+def test_exponents_do_not_depend_on_the_state_on_the_orbit(state):
+    """From the first the least stretch of a whole return is round-off; from the second it falls within 0.4 of time."""
+
+    def rhs(t, x):  # Field and Noyes (1974), as Tyson scales it
+        a, b, c = x
+        return [(8e-4 * b - a * b + a * (1.0 - a)) / 4e-2, (-8e-4 * b - a * b + c) / 4e-3, a - c]
+
+    found = exponents(from_rhs(rhs, 3, None, guess_period=12.81, method="implicit"), state)
+    np.testing.assert_allclose(found.values, [-1.22814586, -367.5193297], rtol=1e-8)  # of the Taylor flow
+
+
 def test_period_by_either_method():
     """The Taylor series still get through a period."""
     (implicit, taylor) = (

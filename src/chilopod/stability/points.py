@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
@@ -183,6 +184,7 @@ _SETTLED = 1e-7  # change of the mean from half as many parts; its error is abou
 
 _ASIDE, _ROUNDS = 0.05, 20  # distance of a second orbit, in sizes of the states, and number of its corrections
 _CRITICAL = 1e-6  # distance from one of a critical multiplier, and relative singular value of its direction
+_MEETING = 1e-3  # distance from one of multipliers that meet there: they move as the root of an error
 _CLEAR = 3.0  # least quadratic coefficient, relative to its error, of a transcritical point
 _NEGLIGIBLE = 0.3  # largest negligible error of the quadratic term, relative to the cubic one as sampled
 _VANISHES = 1e-9  # residual, relative to the distance, that counts as zero
@@ -222,7 +224,11 @@ def described(
         count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
         said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
         raise ContinuumError(said)
-    modes = None if simple else _modes(spec, crossing, orbit, block, symmetry)
+    meeting = crossing.collision and not krein
+    apart = meeting and _have_own_modes(orbit.image.jacobian, crossing, block)
+    axial = symmetry is not None and bool(symmetry.branches)
+    single = simple or (meeting and not (apart or axial))
+    modes = None if single else _modes(spec, crossing, orbit, block, None if apart else symmetry)
     if kind is None:
         kind = _kind(crossing, returns, form, symmetry if breaking else None)
         if kind is Kind.TRANSCRITICAL and modes is not None and symmetry is not None:
@@ -393,6 +399,16 @@ def _modes(
     eigenvector = vectors[:, np.abs(values - spec.values[critical[0]]).argmin()]
     modes = phased(np.stack([block.mode(eigenvector, branch.direction) for branch in symmetry.branches], axis=1))
     return np.asarray(modes / np.linalg.norm(modes, axis=0))
+
+
+def _have_own_modes(jacobian: Array, crossing: Crossing, block: Block | None) -> bool:
+    """True if multipliers that meet at +1 or -1 have an eigenvector each; the two of a Jordan block share one."""
+    matrix, target = jacobian if block is None else block.reduced(jacobian), TARGETS[crossing.event]
+    units = numerical_balance(np.abs(matrix) + np.eye(len(matrix)))
+    matrix = matrix * units / units[:, None] - target * np.eye(units.size)
+    stretches = np.linalg.svd(matrix)[1]
+    there = int((np.abs(np.linalg.eigvals(matrix)) <= _MEETING).sum())
+    return int((stretches <= _CRITICAL * max(1.0, stretches[0])).sum()) >= max(there, 2)
 
 
 def kind_at_plus_one(form: NormalForm) -> Kind:

@@ -27,6 +27,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgeqrf, dorgqr
 
@@ -38,6 +39,8 @@ from chilopod.stability.returns import ReturnMap, flow_with_error, velocity_at
 
 EPSILON = float(np.finfo(float).eps)
 SAFETY, DRAWS = 10.0, 8  # factor on the largest change of a result under random changes, and their number
+_DEPENDENT = 1e12  # size of left eigenvectors of right ones that nearly coincide
+_PAIRED = 1e-6  # product of a left and a right unit eigenvector below which their eigenvalue is defective
 FIRST_ORDER = 1e-6  # error, relative to the largest eigenvalue, up to which first-order bounds hold
 VERDICTS = {True: "stable", False: "unstable", None: "undecided"}  # words for the results of stable_within
 
@@ -88,14 +91,20 @@ class Spectrum(ReadOnlyArrays):
 
 def eigensystem(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Eigenvalues by falling modulus, unit right eigenvectors as columns, and left ones with left[:, i]^H right[:, i] =
-    1; these are infinite for a defective matrix, whose conditions give no bound."""
+    1; these are infinite for a defective eigenvalue, whose condition gives no bound."""
     values, right = np.linalg.eig(matrix)
     order = falling(values)
     values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
-    try:
-        return values, right, np.linalg.inv(right).conj().T
-    except np.linalg.LinAlgError:
-        return values, right, np.full_like(right, np.inf)
+    with contextlib.suppress(np.linalg.LinAlgError):
+        inverse = np.linalg.inv(right)
+        if np.abs(inverse).max(initial=0.0) < _DEPENDENT:
+            return values, right, inverse.conj().T
+    # Right vectors of a defective eigenvalue coincide and leave the other left ones undetermined; the solver's are not.
+    others, left, _ = scipy.linalg.eig(matrix, left=True)
+    left = left[:, falling(others)].astype(np.complex128)
+    left = left @ np.linalg.pinv(right.conj().T @ left, rcond=_PAIRED)
+    left[:, np.abs((left.conj() * right).sum(axis=0) - 1.0) > _PAIRED] = np.inf
+    return values, right, left
 
 
 def falling(values: ComplexArray) -> NDArray[np.intp]:
@@ -252,7 +261,7 @@ _PASSES = 40  # through the product: a gap of 1 leaves exp(-40) of the neighbour
 _AVERAGED = 20  # number of last passes over which the growth is averaged
 _AT_REST = 1e-8  # motion of a basis in a pass that has converged
 _DRAWS_OF_STIFF = 3  # each costs as much as the result
-_SHORTENINGS = 100
+_SHORTENINGS = 40
 _LEFT, _APART = 1e-12, 1e-4  # stretches over a short time above round-off, and that separate directions
 
 
@@ -388,14 +397,19 @@ def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
     slow = cut.section.shape[1] - 1
     if slow == 0:
         return np.eye(1)
+    short, long = 0.0, np.inf
     for _ in range(_SHORTENINGS):
         state, derivative = checked_flow(system, x, 0.0, duration)
         derivative = derivative * cut.units / cut.units[:, None]
         after = section_basis(system, state, cut.units)
         stretch, right = np.linalg.svd(after.T @ derivative @ cut.section)[1:]
-        if stretch[slow] >= _LEFT * max(1.0, stretch[0]):
-            if stretch[slow] <= _APART * stretch[slow - 1]:
-                return np.asarray(right[slow:].T)
+        largest = max(1.0, float(stretch[0]))
+        if _LEFT * largest <= stretch[slow] <= _APART * stretch[slow - 1]:
+            return np.asarray(right[slow:].T)
+        # Over a long time the least stretch is round-off, over a short one it has not fallen yet.
+        short, long = (duration, long) if stretch[slow] > _APART * largest else (short, duration)
+        duration = 0.5 * (short + long)
+        if np.isinf(long):
             break
-        duration *= 0.5
-    raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
+    said = "the flow contracts too strongly to be resolved"
+    raise ContractionError(said, field="flow", allowed="another state on the orbit")

@@ -185,7 +185,8 @@ def switch(
     directions of the other branch. A period doubling has one: its two sides are the same orbits, a period apart. A Hopf
     point has one, at a small cycle on the side where cycles exist, towards larger ones. With several critical modes,
     due to a symmetry, these numbers hold for each of ``point.modes``. A collision at -1 is a period doubling,
-    one at +1 a branch point.
+    one at +1 a branch point. Several modes without axial branches do not determine directions and are refused, as those
+    of a collision whose multipliers have an eigenvector each.
     """
     check_arguments(family=family, periods=1 if periods is None else periods)
     old, known, along = None, None, None
@@ -220,18 +221,17 @@ def switch(
 
 def _along_modes(at: Start, point: BifurcationPoint, returns: int) -> tuple[Start, ...]:
     """The starts at a point along its critical modes, for a number of returns in a period."""
-    kind, axial = point.kind, point.symmetry is not None and bool(point.symmetry.branches)
-    modes = point.mode.real[None]
-    if point.modes is not None and (axial or kind is not Kind.COLLISION):  # two that meet have one eigenvector
-        modes = point.modes.real.T
+    kind, axes = point.kind, 0 if point.symmetry is None else len(point.symmetry.branches)
+    modes = point.mode.real[None] if point.modes is None else point.modes.real.T
+    if len(modes) > max(axes, 1):
+        said = f"has {len(modes)} critical modes, which do not determine the directions of new orbits"
+        raise ParameterError(said, field="point", value=point.value, allowed="a state on a new orbit, with `begin`")
     if kind is Kind.COLLISION and point.multiplier.real < 0.0:
         kind = Kind.PERIOD_DOUBLING if returns % 2 else Kind.PITCHFORK
     if kind is Kind.PERIOD_DOUBLING:
         at = replace(at, old=None, periods=2 * at.periods, period=at.period and 2.0 * at.period)
         return tuple(replace(at, mode=mode) for mode in modes)
-    # With several modes each has its own branch, and the equation for a crossing of two curves holds only where a
-    # symmetry separates them.
-    crossing = kind is not Kind.PITCHFORK and (len(modes) == 1 or axial)
+    crossing = kind is not Kind.PITCHFORK
     return tuple(replace(at, mode=sign * mode, crossing=crossing) for mode in modes for sign in (1.0, -1.0))
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from chilopod.errors import AnalysisError, ParameterError
@@ -30,6 +31,7 @@ _EARLIER, _JUMPS = 1e-10, 1e-6  # part of a return round a guess, and a motion w
 _LONGEST_SETTLING = 300  # returns
 _MARCHED, _MARCHES = 48, 8  # steps per guessed period, and guessed periods, within which a motion must return
 _COMES_BACK = 0.1  # distance of a return, relative to the size of the motion
+_CORRECTIONS, _RETURNS = 4, 1e-3  # of the time of a return, and its distance, relative to the states, on an orbit
 _STILL = 1e-3  # motion of a state, relative to the others, that counts as rest
 
 
@@ -117,24 +119,55 @@ def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:
 
 def _settled_autonomous(system: Autonomous, x: Array) -> Iterator[Nodes]:
     """As :func:`_settled`, with a new guess of the period: the first close return of the motion."""
-    step = system.guess_period / _MARCHED
     try:
         for _ in range(_LONGEST_SETTLING // 4):
             x = carried(system, x[None], 0.0, system.guess_period)[0]
-        path = [x]
-        for _ in range(_MARCHES * _MARCHED):
-            path.append(carried(system, path[-1][None], 0.0, step)[0])
+        times, _, away = _marched(system, x, _MARCHES)
     except AnalysisError:
         return
-    states = np.array(path)
-    if not np.isfinite(states).all():
+    back = _minima(away)
+    if back.size:
+        yield Nodes(x[None], float(times[back[0]]) / returns_per_period(system))
+
+
+def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
+    """A state that its own motion meets again within half to twice the guessed period, with that time, if it does."""
+    if not is_autonomous(system):
         return
+    try:
+        times, states, away = _marched(system, x, 2)
+    except AnalysisError:
+        return
+    units = np.maximum(sizes(system, x, system.guess_period), np.abs(states).max(axis=0))
+    for i in (i for i in _minima(away) if times[i] >= 0.5 * system.guess_period):
+        later, there = times[1], states[i]
+        for _ in range(_CORRECTIONS):  # to the plane across the motion
+            velocity = velocity_at(system, there) / units
+            later += float((x - there) / units @ velocity / (velocity @ velocity))
+            if not 0.0 <= later <= 2.0 * times[1]:
+                break
+            there = carried(system, states[i - 1][None], 0.0, later)[0]
+        if (np.abs(there - x) <= _RETURNS * units).all():
+            yield Nodes(x[None], float(times[i - 1] + later) / returns_per_period(system))
+            return
+
+
+def _marched(system: Autonomous, x: Array, periods: int) -> tuple[Array, Array, Array]:
+    """Times of a motion over guessed periods, its states, and their distances from the first, relative to the motion
+    and infinite where that gives no information."""
+    times, path = np.linspace(0.0, periods * system.guess_period, periods * _MARCHED + 1), [x]
+    for _ in times[1:]:
+        path.append(carried(system, path[-1][None], 0.0, float(times[1]))[0])
+    states = np.array(path)
     # A state that hardly moves, relative to its size, gives no information.
     size = sizes(system, x, system.guess_period)
     moves = np.ptp(states, axis=0) / size
     size = size * np.maximum(moves, _STILL * moves.max())
-    if size.all():
-        away = (np.abs(states - x) / size).max(axis=1)
-        back = (away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)
-        if back.any():
-            yield Nodes(x[None], float(1 + back.argmax()) * step / returns_per_period(system))
+    known = np.isfinite(states).all() and size.all()
+    return times, states, (np.abs(states - x) / size).max(axis=1) if known else np.full(times.size, np.inf)
+
+
+def _minima(away: Array) -> NDArray[np.intp]:
+    """Indices of close returns."""
+    back = (away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)
+    return 1 + np.flatnonzero(back)

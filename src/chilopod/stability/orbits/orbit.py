@@ -8,6 +8,7 @@ rounds is cut down to one (``closings``). ``with_bounds`` bounds the errors.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,7 +33,7 @@ from chilopod.stability.interface import (
     sizes,
 )
 from chilopod.stability.krylov import LARGE, RESTS, TangentMap, closed_orbit, tangent_map, tangent_sizes
-from chilopod.stability.orbits.guesses import nearer_orbits, past_impact, whole_orbit
+from chilopod.stability.orbits.guesses import nearer_orbits, own_return, past_impact, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, nodes_along, shot
 from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.shown import Shown
@@ -41,6 +42,7 @@ from chilopod.stability.symmetry.groups import symmetric_basis
 _RETURNED = 1e-12  # relative residual of a known orbit that is exact
 _MISSES = 1e-6  # error of a state, relative to its size, with which a return does not close
 _SINGULAR = 1e-13  # singular value of H - 1, relative to the largest, that counts as zero
+_FAR = 0.01  # distance of an orbit, relative to the states, beyond which the guess itself may be on another one
 _KNOWN = 1e-4  # largest relative residual of a known orbit, which is then corrected
 _SETTLING = 100  # cost of settling in return maps, without derivatives
 _MOST_PARTS = 100  # ratio of the period found first to the shortest, below which that is found
@@ -170,7 +172,7 @@ def searched_orbit(
     shortened = shortest and section is None
     try:
         x = past_impact(system, x, duration) if section is None else x
-        return near(Nodes(x[None], duration), section)
+        found = near(Nodes(x[None], duration), section)
     except TooManySteps as error:
         allowed = ", ".join(filter(None, ("a guess closer to the orbit and its period", error.allowed)))
         said = f"the motion from the guess {error.problem}"
@@ -180,10 +182,19 @@ def searched_orbit(
             raise
         if budget is not None:
             budget.take(_SETTLING)
-        for nodes, careful in nearer_orbits(system, x):
+        own = ((nodes, False) for nodes in own_return(system, x)) if shortened else ()
+        for nodes, careful in itertools.chain(own, nearer_orbits(system, x)):
             with contextlib.suppress(AnalysisError):
                 return near(nodes, careful=careful)
         raise failed
+    size = sizes(system, x, duration)
+    if shortened and (off := _relative(found.state - x, size)) > _FAR:
+        # The time may lead to another orbit although the state is on one.
+        for nodes in own_return(system, x):
+            with contextlib.suppress(AnalysisError):
+                other = near(nodes)
+                found = other if _relative(other.state - x, size) < off else found
+    return found
 
 
 def find_large_orbit(system: Capabilities, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
