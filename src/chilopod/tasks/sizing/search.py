@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from cmaes import CMA
@@ -347,9 +346,11 @@ class Search:
             return any((gain >= -_MET).all() and (gain > _MET).any() for gain in gains)
 
         kept = [place for place, own in zip(found, missed, strict=True) if (own < _FAR).all() and not surpassed(own)]
-        ordered = sorted(kept, key=lambda place: tuple(place.tolist()))
-        # No place twice.
-        return ordered[:1] + [place for last, place in pairwise(ordered) if np.abs(place - last).max() > _AT_END]
+        apart: list[Array] = []  # no place twice
+        for place in sorted(kept, key=lambda place: tuple(place.tolist())):
+            if not apart or np.abs(place - apart[-1]).max() > _AT_END:
+                apart.append(place)
+        return apart
 
 
 def _met(deviations: Array) -> bool:
