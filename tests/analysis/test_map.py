@@ -214,6 +214,24 @@ def test_folds_begin_where_the_pitchfork_turns(monkeypatch):
     assert found.remarks == ("a curve that begins at a pitchfork is not followed to its end: no fold is near",)
 
 
+def test_a_fold_begins_at_the_point_where_the_pitchfork_turns(monkeypatch):
+    """There no gap is left between both curves; the fold is made up of the pitchfork's own curve."""
+    whole, followed = map_curves.follow2, []
+
+    def either(family, begin, **how):
+        followed.append(whole(family, begin, **how) if begin is not None else followed[0])
+        return followed[-1]
+
+    monkeypatch.setattr(map_curves, "switch2", lambda *given: [None])
+    monkeypatch.setattr(map_curves, "follow2", either)
+    monkeypatch.setattr(map_curves, "_LONGEST", 0.2)
+    found = mapped(ROBOT, (K1, 0.675, 0.686), (OFFSET[0], 0.0474, 0.0482), points=3, also=["folds"])
+    pitchfork, fold = found.curves
+    np.testing.assert_array_equal(fold.values, [pitchfork.special[0].values, *pitchfork.values])
+    assert fold.error_bound.shape == fold.values.shape
+    assert np.isnan(fold.coefficient[0])
+
+
 @pytest.fixture(scope="module")
 def subcritical():
     """A robot of three modules whose pitchfork is subcritical, far from where it turns; an axis; the fold on it."""
