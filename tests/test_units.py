@@ -94,6 +94,8 @@ def test_writes_the_shortest_text(value, unit, text):
 
 def test_writes_given_digits():
     assert units.format(1.0 / 3.0, "cm", digits=3) == "33.3 cm"
+    assert units.format(144.0, "N*s/m", digits=2) == "140 N*s/m"
+    assert units.format(1.44e7, "N*s/m", digits=2) == "1.4e+07 N*s/m"
     assert units.from_si(0.5, "mm") == 500.0
     assert math.isnan(units.from_si(math.nan, "N*mm/deg"))
     assert units.from_si(-math.inf, "N*mm/deg") == -math.inf

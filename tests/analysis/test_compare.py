@@ -56,6 +56,26 @@ def test_many_differences_are_changed_in_sampled_orders():
     assert "64 of the orders" in found.lines()[-1]
 
 
+def test_parts_of_sampled_orders_have_intervals(monkeypatch):
+    """The second of two changes has the whole effect: in half of the orders that is the first number."""
+    low = ROBOT.body.mass, ROBOT.ground.friction
+
+    def margin(self, robot):
+        return float(robot.body.mass > low[0] and robot.ground.friction > low[1])
+
+    monkeypatch.setattr(Measured, "margin", margin)
+    paths = ["body.mass", "ground.friction", "body.length", "legs.half_width", "legs.forward_offset", "gait.stride"]
+    other = ROBOT
+    for count, path in enumerate([*paths, *(f"springs.stiffness[{joint}]" for joint in range(1, 5))]):
+        other = other.with_value(path, 1.01 * ROBOT.get(path) + 1e-4 * count)
+    found = compare(ROBOT, other, quantities=("margin",))
+    mean, error = found.effects["margin"].mean, found.effects["margin"].error
+    at = found.paths.index("body.mass")
+    assert abs(mean[at] - 0.5) < error[at]
+    assert error == pytest.approx(1.9983 * np.sqrt(mean * (1.0 - mean) / 63.0), rel=1e-4, abs=1e-12)  # Student's t
+    assert "64 of the orders of the changes, ± half of their 95 % interval" in found.lines()[-1]
+
+
 def test_nine_differences_take_no_more_robots_than_all_subsets(monkeypatch):
     asked = []
     monkeypatch.setattr(Measured, "margin", lambda self, robot: asked.append(robot) or robot.body.mass)
@@ -106,7 +126,7 @@ def test_what_a_robot_in_between_has_not_is_unknown():
     found = compare(ROBOT, ROBOT.with_value("body.mass", 9.0), Onset(at=stiffness(20.0)), ("radius",))
     assert np.isnan(found.effects["radius"].mean).all()
     assert found.as_json()["quantities"]["radius"]["values_si"] == [None, None]
-    assert any("unknown" in line for line in found.lines())
+    assert found.lines()[-1].strip() == "unknown: not both robots have a value of radius"
     springs = Onset(between=(stiffness(20.0), stiffness(75.0)))
     lines = compare(ROBOT, ROBOT.with_value("body.mass", 9.0), springs, ("onset", "growth")).lines()
     assert "onset none and none, growth -0.235 1/s" in lines[0]

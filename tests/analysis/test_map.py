@@ -214,6 +214,24 @@ def test_folds_begin_where_the_pitchfork_turns(monkeypatch):
     assert found.remarks == ("a curve that begins at a pitchfork is not followed to its end: no fold is near",)
 
 
+def test_a_fold_begins_at_the_point_where_the_pitchfork_turns(monkeypatch):
+    """There no gap is left between both curves; the fold is made up of the pitchfork's own curve."""
+    whole, followed = map_curves.follow2, []
+
+    def either(family, begin, **how):
+        followed.append(whole(family, begin, **how) if begin is not None else followed[0])
+        return followed[-1]
+
+    monkeypatch.setattr(map_curves, "switch2", lambda *given: [None])
+    monkeypatch.setattr(map_curves, "follow2", either)
+    monkeypatch.setattr(map_curves, "_LONGEST", 0.2)
+    found = mapped(ROBOT, (K1, 0.675, 0.686), (OFFSET[0], 0.0474, 0.0482), points=3, also=["folds"])
+    pitchfork, fold = found.curves
+    np.testing.assert_array_equal(fold.values, [pitchfork.special[0].values, *pitchfork.values])
+    assert fold.error_bound.shape == fold.values.shape
+    assert np.isnan(fold.coefficient[0])
+
+
 @pytest.fixture(scope="module")
 def subcritical():
     """A robot of three modules whose pitchfork is subcritical, far from where it turns; an axis; the fold on it."""
@@ -233,7 +251,7 @@ def test_folds_at_numbers_of_modules_are_those_of_branches(subcritical, monkeypa
     (fold,) = (curve for curve in found.curves if curve.kind is Kind.FOLD)
     assert abs(fold.values[0, 0] - there) <= 2.0 * fold.error_bound[0, 0]
     between = (found.x_values > found.curves[0].values[0, 0]) & (found.x_values < there)
-    np.testing.assert_array_equal(found.folded, [np.zeros(9, dtype=bool), between])
+    np.testing.assert_array_equal(found.folded, [np.full(9, np.nan), between])  # two modules bend at no such spring
     assert between.any()
     monkeypatch.setattr(map_curves, "_PIECES", 0)
     lost = mapped(robot, x, ("modules", 2, 3), points=9, also=["folds"])
@@ -279,6 +297,32 @@ def test_between_a_fold_and_a_subcritical_pitchfork_curved_walks_exist_too():
     np.testing.assert_array_equal(some.folded, np.where(both.folded, 1.0, np.nan))
     assert (some.as_json()["folded_share"], "beside curved walks" in str(some)) == (None, False)
     assert "curved walks too" in [text.get_text() for text in some.plot(Figure().add_subplot()).get_legend().texts]
+
+
+def test_curved_walks_in_a_corner_between_curves_that_leave_by_other_edges():
+    """No row and no column of the corner has both the pitchfork and the fold."""
+    found = mapped(ROBOT, (K1, "11 N*mm/deg", "12 N*mm/deg"), (OFFSET[0], "31 mm", "32 mm"), points=9, also=["folds"])
+    assert (found.as_json()["folded_share"], found.curves) == (None, ())
+    (remark,) = found.remarks
+    assert remark == "beside 81 stable straight walks curved ones are not known: their pitchfork is not on the map"
+    low, wide = np.array([stiffness(11.0), 0.031]), np.array([stiffness(1.0), 0.001])
+    about = {"error_bound": np.zeros((2, 2)), "special": (), "line": True}
+    fork, fold = ([[0.0, 0.6], [0.4, 1.0]], [[0.6, 0.0], [1.0, 0.4]])
+    pitchfork = MapCurve(kind=Kind.PITCHFORK, values=low + wide * fork, coefficient=np.ones(2), **about)
+    curves = pitchfork, MapCurve(kind=Kind.FOLD, values=low + wide * fold, coefficient=np.full(2, np.nan), **about)
+    u, v = np.meshgrid((found.x_values - low[0]) / wide[0], (found.y_values - low[1]) / wide[1])
+    fate = (v > u + 0.6).astype(np.int8)
+    np.testing.assert_array_equal(replace(found, fate=fate, curves=curves).folded, (abs(u - v) < 0.6))
+    for k in (0, 1):  # mirrored, so that the fold is above or on the left
+        mirrored = [
+            replace(each, values=np.where(np.arange(2) == k, 2.0 * low + wide - each.values, each.values))
+            for each in curves
+        ]
+        turned = replace(found, fate=np.flip(fate, 1 - k), curves=tuple(mirrored)).folded
+        np.testing.assert_array_equal(turned, np.flip(abs(u - v) < 0.6, 1 - k))
+    # Beyond a supercritical pitchfork there are none.
+    gentle = replace(pitchfork, coefficient=-np.ones(2))
+    assert not replace(found, fate=fate, curves=(gentle,)).folded.any()
 
 
 def test_coefficients_of_a_map_are_those_of_its_robots():

@@ -1,6 +1,7 @@
 """Sizing: robots that do what is wished, in theory and in walks."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,7 +90,34 @@ def test_a_wish_that_nobody_meets_says_what_stands_in_the_way():
     assert both.front.shape[1] == 3
     steps = np.abs(np.diff(both.front[:, 0])) / np.ptp(both.front[:, 0])
     assert (steps > 1e-4).all()  # no place twice
-    assert both.plot(Figure().add_subplot()).get_legend()
+    axes = both.plot(Figure().add_subplot())
+    assert axes.get_legend()
+    assert {axes.get_xlabel(), axes.get_ylabel()} == {"growth (1/s)", "speed (m/s)"}
+    onset = replace(both, wishes=(Wish("onset", stiffness(14.0)), both.wishes[1])).plot(Figure().add_subplot())
+    assert "onset (N*mm/deg)" in {onset.get_xlabel(), onset.get_ylabel()}
+    assert max(float(line.get_data()["xy".index(k)].max()) for line in onset.lines for k in "xy") == pytest.approx(14.0)
+
+
+def test_no_place_of_a_front_is_surpassed_by_another(monkeypatch):
+    """Onsets from p = 1/2 on meet their limit alike; of these the growth is least at p = 0.7 and q = 0."""
+
+    def made_up(search, place, measured):
+        p, q = place
+        return np.array([max(0.5 - p, 0.0), 0.2 + (p - 0.7) ** 2 + q**2])
+
+    def left_out(search, wish, start):
+        place = np.array([0.6, 0.3])
+        return place, made_up(search, place, None)
+
+    monkeypatch.setattr(Search, "_found", made_up)
+    monkeypatch.setattr(Search, "_left_out", left_out)
+    axes = tuple(axis(ROBOT, each, "free") for each in (SPRING, ("legs.forward_offset", "10 mm", "60 mm")))
+    search = Search(ROBOT, (Wish("onset", 0.1, 1), Wish("growth", -1.0, -1)), axes, Onset(), 600, 0, silent)
+    outcome = search.run()
+    front = np.array(search.reasons(outcome)[1])
+    assert outcome is not Outcome.MET
+    np.testing.assert_allclose(front, len(front) * [[0.7, 0.0]], atol=5e-3)
+    assert len(front) > 0
 
 
 def test_a_walk_that_settles_for_hours_is_said_to_be_settling():

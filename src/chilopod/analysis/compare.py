@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from chilopod import units
 from chilopod.analysis.parameters import numbers_read
@@ -25,6 +26,7 @@ from chilopod.notebook import Summary, finite, tornado
 from chilopod.planar.step_count import steps
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
+from chilopod.statistics import LEVEL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,8 +41,8 @@ _DERIVED = "body.yaw_inertia"
 @dataclass(frozen=True, eq=False)
 class Effects(ReadOnlyArrays):
     """A quantity of two robots, SI, and the part of each differing number in the difference: alone, as the last change,
-    and in the mean over orders, with its standard error, zero for all orders; shape (numbers,) each. NaN where a robot
-    in between has no such quantity."""
+    and in the mean over orders, with half its 95 % interval, zero for all orders; shape (numbers,) each. NaN where a
+    robot in between has no such quantity."""
 
     first: float
     second: float
@@ -121,8 +123,12 @@ class RobotComparison(Summary):
             cells.append(row)
         sampled = any(found.error.any() for found in self.effects.values())
         orders = f"{_ORDERS} of the orders" if sampled else "all orders"
-        said = [f"parts are means over {orders} of the changes, and add up to the difference"]
-        if any(np.isnan(found.mean).any() for found in self.effects.values()):
+        interval = ", ± half of their 95 % interval" * sampled
+        said = [f"parts are means over {orders} of the changes{interval}, and add up to the difference"]
+        lacking = [name for name, found in self.effects.items() if not np.isfinite([found.first, found.second]).all()]
+        if lacking:
+            said.append(f"unknown: not both robots have a value of {', '.join(lacking)}")
+        if any(np.isnan(found.mean).any() for name, found in self.effects.items() if name not in lacking):
             said.append("unknown: a robot in between has no such quantity, or its motion is far faster than theirs")
         return [], cells, [*said, *tail]
 
@@ -280,5 +286,6 @@ def _effects(
                 known_yet = not np.isnan(parts[:, at]).any()
                 row[at] = value(so_far | {at}) - value(so_far) if known_yet else math.nan
                 so_far |= {at}
-        means, scatter = parts.mean(axis=0), parts.std(axis=0, ddof=1) / math.sqrt(_ORDERS)
+        means = parts.mean(axis=0)
+        scatter = stdtrit(_ORDERS - 1, 0.5 + 0.5 * LEVEL) * parts.std(axis=0, ddof=1) / math.sqrt(_ORDERS)
     return Effects(*ends, np.array(alone), np.array(last), means, scatter)

@@ -12,6 +12,7 @@ import hashlib
 import io
 import time
 from collections.abc import Callable, Collection
+from dataclasses import replace as replace_fields
 from pathlib import Path
 
 import numpy as np
@@ -114,12 +115,17 @@ def map(
     if search.with_folds and any(curve.kind is Kind.TRANSCRITICAL for curve in search.curves):
         search.remarks.append("curved walks beside transcritical points are not followed to their folds")
     growth, frequency, error, unstable, fate = grid.values
-    return StabilityMap(
+    result = StabilityMap(
         robot, plane.x, plane.y, grid.x, grid.y, growth, frequency, error, unstable.astype(np.int16),
         fate.astype(np.int8), grid.computed, radius, curves=tuple(search.curves),
         remarks=(*dict.fromkeys(search.remarks), *_invalid(grid), *_failed(grid), *lost),
         folds_known=search.with_folds and not (search.lost or search.remarks),
     )  # fmt: skip
+    unknown = int(np.isnan(result.folded).sum())
+    if not (unknown and result.folds_known):
+        return result
+    said = f"beside {unknown} stable straight walks curved ones are not known: their pitchfork is not on the map"
+    return replace_fields(result, remarks=(*result.remarks, said))
 
 
 def _invalid(grid: Grid) -> list[str]:

@@ -245,7 +245,7 @@ class Search:
                 return
             for turn in turns:
                 # Both starts are mirror images of one curve.
-                self._add(follow2(loose, switch2(family, turn, between)[0], **few), edge)
+                self._add(follow2(loose, switch2(family, turn, between)[0], **few), edge, turn)
             leading = [each for each in curve.points if np.abs(each.multipliers).max() < _ON_CIRCLE]
             subcritical = [each for each in leading if (each.coefficient or 0.0) > 0.0]
             if curve.kind is Kind.PITCHFORK and subcritical and not turns:
@@ -256,13 +256,15 @@ class Search:
         except ChilopodError as error:
             self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
 
-    def _add(self, curve: Curve2, edge: Edge) -> None:
-        """Keep a curve in the order of the map's axes, and say where it ends before it should."""
+    def _add(self, curve: Curve2, edge: Edge, *begin: Any) -> None:
+        """Keep a curve in the order of the map's axes, from where it begins, and say where it ends before it should."""
         order = [*edge.ordered(0, 1)]
         special = tuple(MapPoint(each.kind, each.values[order], each.error_bound[order]) for each in curve.special)
         coefficients = [self._coefficient(curve.kind, each, each.values[order]) for each in curve.points]
-        errors = np.array([each.error_bound for each in curve.points])[:, order]
-        self.curves.append(MapCurve(curve.kind, curve.values[:, order], errors, np.array(coefficients), special))
+        points = [(each.values[order], each.error_bound[order]) for each in (*begin, *curve.points)]
+        values, errors = (np.array(column) for column in zip(*points, strict=True))
+        coefficient = np.array([np.nan] * len(begin) + coefficients)
+        self.curves.append(MapCurve(curve.kind, values, errors, coefficient, special))
         for ending in dict.fromkeys(each for each in curve.endings if each in _CUT_OFF):
             self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {ending.sentence}")
 

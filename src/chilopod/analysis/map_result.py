@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from chilopod.analysis.growth import FATES, NEAR, Fate
 from chilopod.analysis.map_axes import Axis
@@ -24,6 +25,7 @@ from chilopod.stability.shown import bounded
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_BEYOND = 1e-6  # part of its last piece by which a curve goes on
 _SAME = 3.0  # bounds within which two points of codimension two are one
 
 
@@ -80,18 +82,36 @@ class StabilityMap(Summary, ReadOnlyArrays):
 
     @cached_property
     def folded(self) -> Array:
-        """1 where curved walks exist beside a stable straight one, else 0, shape (rows, columns): along a row or a
-        column, between a fold and the nearest subcritical pitchfork. NaN for 0 if not all folds are known."""
+        """1 where curved walks exist beside a stable straight one, else 0, shape (rows, columns). NaN where it is not
+        known: for 0 if not all folds are known, and in parts that no pitchfork and no fold bounds.
+
+        Folds cut the values with a stable straight walk into parts. Curved walks exist in a part that begins at a
+        subcritical pitchfork and ends at a fold.
+        """
         straight = self.fate == FATES.index(Fate.STRAIGHT)
-        found = np.zeros_like(straight)
-        axes = self.x_values, self.y_values
-        for axis, rows in ((0, found), (1, found.T)):
-            for row, value in zip(rows, axes[1 - axis].tolist(), strict=True):
-                folds, forks = (_crossed(self.curves, kind, axis, value) for kind in (Kind.FOLD, Kind.PITCHFORK))
-                for fold in folds if forks.size else ():
-                    low, high = np.sort([fold, forks[np.abs(forks - fold).argmin()]])
-                    row |= (axes[axis] >= low) & (axes[axis] <= high)
-        return read_only(np.where(found & straight, 1.0, 0.0 if self.folds_known else np.nan))
+        joined = np.zeros([2 * count - 1 for count in straight.shape], dtype=bool)  # values, and links between them
+        joined[::2, ::2] = straight
+        index, begins = np.arange(straight.size).reshape(straight.shape), np.zeros(straight.shape)
+        cuts = [np.empty((2, 0), dtype=int)]
+        axes = (self.x, self.x_values), (self.y, self.y_values)
+        for at, (axis, values) in enumerate(axes):
+            if axis.whole:
+                continue
+            own, links, places, senses = (each.swapaxes(0, at) for each in (straight, joined, index, begins))
+            cut, sense = _between(self.curves, at, values, axes[1 - at][1])
+            links[::2, 1::2] = own[:, 1:] & own[:, :-1] & ~cut
+            senses[:, 1:] += sense
+            senses[:, :-1] += sense
+            cuts.append(np.stack([places[:, :-1][cut], places[:, 1:][cut]]))
+        part = label(joined)[0][::2, ::2]
+        begun = np.bincount(part.ravel(), (begins * straight).ravel())
+        pairs = part.ravel()[np.hstack(cuts)]
+        one, other = np.hstack([pairs, pairs[::-1]])
+        ends = (begun[one] > 0.0) & (begun[other] <= 0.0)
+        found = np.where(begun < 0.0, 0.0, np.nan)
+        found[0] = 0.0  # the straight walk is unstable
+        found[other[ends]], found[one[ends]] = 0.0, 1.0
+        return read_only(np.where(self.folds_known | (found > 0.0), found, np.nan)[part])
 
     @property
     def shares(self) -> dict[Fate, float]:
@@ -194,17 +214,33 @@ class StabilityMap(Summary, ReadOnlyArrays):
         return xr.Dataset(found, coords, attrs)
 
 
-def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) -> Array:
-    """Places along an axis where folds, or subcritical pitchforks, have a value of the other number, in SI units."""
-    places = [np.empty(0)]
+def _between(curves: Sequence[MapCurve], axis: int, values: Array, others: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Folds between neighbours along an axis, True for one, and the sense of pitchforks there: above 0 if a part with
+    curved walks begins, below 0 if one without; shape (others, values - 1) each."""
+    cut, sense = np.zeros((others.size, values.size - 1), dtype=bool), np.zeros((others.size, values.size - 1))
+    for row, other in enumerate(others.tolist()):
+        cut[row] = np.histogram(_crossed(curves, Kind.FOLD, axis, other)[0], values)[0] % 2 == 1
+        forks, coefficients = _crossed(curves, Kind.PITCHFORK, axis, other)
+        sense[row] = np.histogram(forks, values, weights=np.sign(coefficients))[0]
+    return cut, np.where(cut, -np.abs(sense), sense)  # a stable straight walk there lies beyond the fold
+
+
+def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) -> tuple[Array, Array]:
+    """Places along an axis where curves of a kind have a value of the other number, in SI units, and the coefficients
+    there, 0 where these are not known."""
+    places, coefficients = [np.empty(0)], [np.empty(0)]
     for curve in curves:
         if curve.kind is kind:
-            along, across = curve.values[:, axis], curve.values[:, 1 - axis]
-            chosen = (np.nan_to_num(curve.coefficient) > 0.0) | (kind is Kind.FOLD)
-            if curve.line:
-                meets = (np.diff(np.sign(across - value)) != 0.0) & chosen[:-1]
-                part = (value - across[:-1][meets]) / np.diff(across)[meets]
-                places.append(along[:-1][meets] + part * np.diff(along)[meets])
+            columns = np.column_stack([curve.values[:, [axis, 1 - axis]], np.nan_to_num(curve.coefficient)])
+            if curve.line and len(columns) > 1:
+                # Its ends lie on the edges of the map but for rounding.
+                beyond = columns[[0, -1]] + _BEYOND * (columns[[0, -1]] - columns[[1, -2]])
+                columns = np.vstack([beyond[:1], columns, beyond[1:]])
+                meets = np.flatnonzero(np.diff(columns[:, 1] <= value))
+                part = (value - columns[meets, 1]) / (columns[meets + 1, 1] - columns[meets, 1])
+                columns = columns[meets] + part[:, None] * (columns[meets + 1] - columns[meets])
             else:  # points at numbers of modules
-                places.append(along[chosen & (across == value)])
-    return np.concatenate(places)
+                columns = columns[columns[:, 1] == value]
+            places.append(columns[:, 0])
+            coefficients.append(columns[:, 2])
+    return np.concatenate(places), np.concatenate(coefficients)

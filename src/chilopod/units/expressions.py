@@ -228,7 +228,7 @@ def format(value: float, unit_text: str, digits: int | None = None) -> str:
     if not math.isfinite(value):
         raise UnitError("must be a finite number", value=value)
     if digits is not None:
-        number = f"{from_si(value, unit_text):.{digits}g}"
+        number = f"{float(f'{from_si(value, unit_text):.{digits}g}'):.{max(digits, 6)}g}"  # 100 of one digit, not 1e+02
     elif value == 0.0:
         number = "0"
     else:

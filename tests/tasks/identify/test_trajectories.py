@@ -133,6 +133,22 @@ def test_changes_of_a_constant_that_is_about_zero_are_relative_to_its_range():
     assert said[2].endswith("legs.half_width +10 %")
 
 
+def test_a_recording_in_rad_that_is_called_deg_is_hinted_at():
+    free = FreeConstants.read({"ground.friction": ["100 N*s/m", "500 N*s/m"]})
+    estimates = Estimates(ROBOT, free, np.array([236.0]), np.array([[100.0, 389.0]]), np.array([[144.0**2]]))
+
+    def found(degrees):
+        angles = np.deg2rad(degrees)
+        walks = xr.Dataset({"measured": (("sample", "joint"), np.array([[angles, np.nan]]))})
+        return trajectories.RecordedIdentification(estimates, walks, (0.0,), 2e-3, 305.0, True)
+
+    _, cells, said = found(-0.53)._content()
+    assert cells[1][2].startswith("100 N*s/m to 389 N*s/m")  # no power of ten
+    assert "the model or the recording is off; intervals are 17.5 times as wide" in said[-2]
+    assert said[-1] == "no joint angle exceeds 0.53 deg: numbers in rad must have the unit rad"
+    assert "in rad" not in " ".join(found(30.0)._remarks())
+
+
 def test_residuals_that_are_alike_enlarge_variances():
     rng = np.random.default_rng(1)
     off = rng.normal(size=(20000, 5))
@@ -165,8 +181,9 @@ ANGLES = np.full((200, 5), 10.0)
             "must be the joints, front to rear.*rise by 1",
         ),
         (as_csv(TIMES, ANGLES), "rad", "contradicts unit = 'rad'"),
-        (as_csv(TIMES, ANGLES).replace("10.0000", "abc", 1), None, "of 6 numbers, .*: line 2, .*'abc'"),
-        ("# from the lab\n\n" + as_csv(TIMES, ANGLES) + "\n1", None, "of 6 numbers, .*: line 204, "),
+        (as_csv(TIMES, ANGLES).replace("10.0000", "abc", 1), None, "of 6 numbers with .*: line 2, .*'abc'"),
+        ("# from the lab\n\n" + as_csv(TIMES, ANGLES) + "\n1", None, "of 6 numbers .*: line 204 has 1 cells"),
+        (as_csv(TIMES, ANGLES).replace("0.0500", '"0,0500"'), None, "decimal points, .*: line 3 has 7 cells"),
         (as_csv(TIMES[::-1], ANGLES), None, r"times of samples 1 and 2 = \[9.95, 9.9\]: must rise"),
         (as_csv(TIMES, ANGLES).replace("10.0000", "1e400", 1), None, r"joint .* = inf: must be finite, .*: sample 1"),
             ('name = "aoi2022"\nstride = 1\n', None, "must be a line of names"),

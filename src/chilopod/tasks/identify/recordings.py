@@ -156,11 +156,13 @@ def _csv(text: str) -> tuple[list[str], Array, list[str]]:
     names, *rows = ([cell.strip(' "') for cell in line.split(comma)] for line in lines.values() or [""])
     table = np.empty((len(rows), len(names)))
     for row, at, cells in zip(table, list(lines)[1:], rows, strict=True):
+        problem = f"must be a line of names, then lines of {len(names)} numbers with decimal points, empty in gaps"
+        if len(cells) != len(names):
+            raise RobotFileError(f"{problem}: line {at} has {len(cells)} cells")
         try:
-            row[:] = np.array([float(cell or "nan") for cell in cells]).reshape(len(names))
+            row[:] = [float(cell or "nan") for cell in cells]
         except ValueError as error:
-            problem = f"must be a line of names, then lines of {len(names)} numbers, empty in gaps: line {at}, {error}"
-            raise RobotFileError(problem) from None
+            raise RobotFileError(f"{problem}: line {at}, {error}") from None
     told = [_NUMBER.search(_UNIT.sub("", name)) for name in names[1:]]
     numbers = [int(each[1]) for each in told if each]
     if len(numbers) == len(told) > 0 and numbers != list(range(numbers[0], numbers[0] + len(numbers))):

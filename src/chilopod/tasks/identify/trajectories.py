@@ -80,6 +80,8 @@ class RecordedIdentification(Identified):
         if self.variance_factor > _ALIKE and self.scatter > _RESOLVED:  # else they are rounding
             wide = f"intervals are {np.sqrt(self.variance_factor):.1f} times as wide as those of independent ones"
             said.append(f"neighbouring residuals are alike: the model or the recording is off; {wide}")
+            if (largest := float(np.rad2deg(np.abs(self.walks.measured).max()))) <= 0.5 * np.pi:  # angles in rad too
+                said.append(f"no joint angle exceeds {largest:.2g} deg: numbers in rad must have the unit rad")
         return said
 
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from chilopod import units
 from chilopod.analysis.map_axes import Axis
-from chilopod.analysis.quantities import QUANTITIES, Onset, unit_of
+from chilopod.analysis.quantities import Onset, unit_of
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, axes_for, finite
 from chilopod.robot import Robot
@@ -125,10 +125,13 @@ class Sizing(Summary, ReadOnlyArrays):
             values = self.front[:, len(self.free) :]
             pair = np.argsort(-np.ptp(values, axis=0))[:2]  # the two that conflict
             wishes = [self.wishes[i] for i in pair]
-            axes.plot(*values[:, pair].T, "o-")
-            axes.plot(*(wish.value for wish in wishes), "x", color="C3", label="wish")
-            x, y = (f"{wish.quantity} ({QUANTITIES[wish.quantity] or 'SI'})" for wish in wishes)
-            axes.set(xlabel=x, ylabel=y)
+            shown = [unit_of(wish.quantity, self.robot, self.onset) for wish in wishes]
+            points = [*values[:, pair].tolist(), [wish.value for wish in wishes]]
+            x, y = np.array([list(map(units.from_si, point, shown)) for point in points]).T
+            axes.plot(x[:-1], y[:-1], "o-")
+            axes.plot(x[-1], y[-1], "x", color="C3", label="wish")
+            labels = [f"{wish.quantity} ({unit})".removesuffix(" ()") for wish, unit in zip(wishes, shown, strict=True)]
+            axes.set(xlabel=labels[0], ylabel=labels[1])
             axes.legend()
         else:
             low, high = (np.array([getattr(each, name) for each in self.free]) for name in ("low", "high"))

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from cmaes import CMA
@@ -331,23 +330,27 @@ class Search:
         return min(tried, key=lambda found: float(norm(weights * found[1])))
 
     def _front(self, pair: Sequence[int], ends: Sequence[tuple[Array, Array]], start: Array) -> list[Array]:
-        """Places that no other found one surpasses in both wishes of a pair: with either left out, and between."""
-        found = [ends[i] for i in pair]
+        """Places that no other found one surpasses in a wish of a pair and equals in the other: the best place, those
+        with either wish left out, and between."""
+        found = [start, *(ends[i][0] for i in pair)]
         # Each deviation counts relative to that where its own wish is left out.
         largest = [max(abs(ends[i][1][i]), _MET) for i in pair]
         for share in _SHARES:
             weights = np.full(len(self.wishes), _OTHERS)
             weights[pair] = np.sqrt([1.0 - share, share]) / largest
-            found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights))
-        missed = [self._missed(deviations) for _, deviations in found]
+            found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights)[0])
+        missed = [self._missed(self._found(place, self.again)) for place in found]
 
         def surpassed(own: Array) -> bool:
-            return any((other[pair] < own[pair] - _MET).all() for other in missed)
+            gains = [own[pair] - other[pair] for other in missed]
+            return any((gain >= -_MET).all() and (gain > _MET).any() for gain in gains)
 
-        kept = [f[0] for f, own in zip(found, missed, strict=True) if (own < _FAR).all() and not surpassed(own)]
-        ordered = sorted(kept, key=lambda place: tuple(place.tolist()))
-        # No place twice.
-        return ordered[:1] + [place for last, place in pairwise(ordered) if np.abs(place - last).max() > _AT_END]
+        kept = [place for place, own in zip(found, missed, strict=True) if (own < _FAR).all() and not surpassed(own)]
+        apart: list[Array] = []  # no place twice
+        for place in sorted(kept, key=lambda place: tuple(place.tolist())):
+            if not apart or np.abs(place - apart[-1]).max() > _AT_END:
+                apart.append(place)
+        return apart
 
 
 def _met(deviations: Array) -> bool:
