@@ -17,6 +17,7 @@ from chilopod.stability import (
     exponents,
     find_orbit,
     follow,
+    follow2,
     from_rhs,
     locate,
     multipliers,
@@ -203,9 +204,13 @@ def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
 
 @pytest.mark.parametrize("state", [[3.0, 0.0, 0.1], [0.0, 3.0, 0.1], [-3.0, 0.0, 0.05]])
 def test_coefficients_do_not_hang_on_where_an_orbit_is_met(state):
-    """Rössler's period doubling, on three sections."""
+    """Rössler's period doubling, on three sections, located and followed."""
     (point,) = locate(roessler, (2.0, 3.3), orbit=state)
-    assert abs(point.coefficient + 0.3705827166) <= point.coefficient_error + 1e-10 < 1e-7
+    box = ((2.0, 3.3), (-0.1, 0.1))
+    curve = follow2(lambda c, more: roessler(c + more), point, box, second=0.0, rising=True, points=1)
+    for each in (point, *curve.points):
+        assert abs(each.coefficient + 0.3705827166) <= each.coefficient_error + 1e-10 < 1e-7
+    np.testing.assert_allclose(curve.points[0].mode, point.mode * np.sign(point.mode @ curve.points[0].mode), atol=1e-7)
 
 
 @pytest.mark.parametrize("state", [[1.0, 0.0, -0.3], [1.0, 0.0, 0.3], [1.2, 0.0, 0.0], [0.54, 0.84, 0.0]])
