@@ -177,12 +177,29 @@ def test_a_doubled_branch_has_no_points_that_are_not_there(step):
     (start,) = switch(roessler, doubling)
     branch = follow(roessler, start, (2.0, 3.0), points=4, step=step)
     assert [point.value for point in branch.special_points] == [doubling.value]
+    assert branch.remarks == ()
     # The first value is known to some 1e-9, which is a hundredth of its distance from the doubling.
     last = branch.points[-1]
     rate = (1.0 - last.multipliers[0].real) / (last.value - doubling.value)
     for point in branch.points[1:]:
         assert point.value > doubling.value
         assert (1.0 - point.multipliers[0].real) / (point.value - doubling.value) == pytest.approx(rate, rel=0.05)
+
+
+def test_a_doubled_branch_does_not_remark_its_start():
+    """Beside the period doubling of Chua's circuit the doubled orbit's multiplier is below 1 by less than its error."""
+
+    def rhs(t, x, a):
+        return [a * (x[1] - x[0] ** 3 / 16.0 + x[0] / 6.0), x[0] - x[1] + x[2], -14.0 * x[1]]
+
+    def chua(a):
+        return from_rhs(rhs, 3, None, args=(a,), guess_period=2.3)
+
+    (doubling,) = locate(chua, (8.15, 8.25), orbit=[0.346, 0.02, 0.457], normal_form=False)
+    (start,) = switch(chua, doubling)
+    branch = follow(chua, start, (8.0, 9.0), points=1, step=0.02)
+    assert branch.remarks == ()
+    assert [point.value for point in branch.special_points] == [doubling.value]
 
 
 def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
