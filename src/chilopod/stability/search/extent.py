@@ -92,7 +92,7 @@ def _lost(samples: Samples) -> str:
     image, units = last.image, samples.size
 
     def derivative(distance: float) -> Array:
-        beyond = value + _PER_UNIT * distance * samples.width
+        beyond = min(max(value + _PER_UNIT * distance * samples.width, samples.low), samples.high)
         section = None if image.normal is None else Section(last.orbit, image.normal, image.duration)
         there = return_map(samples.family(beyond), samples.ahead(beyond), False, section)
         return np.asarray(there.jacobian * units / units[:, None])
