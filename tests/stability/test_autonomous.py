@@ -17,6 +17,7 @@ from chilopod.stability import (
     exponents,
     find_orbit,
     follow,
+    follow2,
     from_rhs,
     locate,
     multipliers,
@@ -176,12 +177,29 @@ def test_a_doubled_branch_has_no_points_that_are_not_there(step):
     (start,) = switch(roessler, doubling)
     branch = follow(roessler, start, (2.0, 3.0), points=4, step=step)
     assert [point.value for point in branch.special_points] == [doubling.value]
+    assert branch.remarks == ()
     # The first value is known to some 1e-9, which is a hundredth of its distance from the doubling.
     last = branch.points[-1]
     rate = (1.0 - last.multipliers[0].real) / (last.value - doubling.value)
     for point in branch.points[1:]:
         assert point.value > doubling.value
         assert (1.0 - point.multipliers[0].real) / (point.value - doubling.value) == pytest.approx(rate, rel=0.05)
+
+
+def test_a_doubled_branch_does_not_remark_its_start():
+    """Beside the period doubling of Chua's circuit the doubled orbit's multiplier is below 1 by less than its error."""
+
+    def rhs(t, x, a):
+        return [a * (x[1] - x[0] ** 3 / 16.0 + x[0] / 6.0), x[0] - x[1] + x[2], -14.0 * x[1]]
+
+    def chua(a):
+        return from_rhs(rhs, 3, None, args=(a,), guess_period=2.3)
+
+    (doubling,) = locate(chua, (8.15, 8.25), orbit=[0.346, 0.02, 0.457], normal_form=False)
+    (start,) = switch(chua, doubling)
+    branch = follow(chua, start, (8.0, 9.0), points=1, step=0.02)
+    assert branch.remarks == ()
+    assert [point.value for point in branch.special_points] == [doubling.value]
 
 
 def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
@@ -203,9 +221,13 @@ def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
 
 @pytest.mark.parametrize("state", [[3.0, 0.0, 0.1], [0.0, 3.0, 0.1], [-3.0, 0.0, 0.05]])
 def test_coefficients_do_not_hang_on_where_an_orbit_is_met(state):
-    """Rössler's period doubling, on three sections."""
+    """Rössler's period doubling, on three sections, located and followed."""
     (point,) = locate(roessler, (2.0, 3.3), orbit=state)
-    assert abs(point.coefficient + 0.3705827166) <= point.coefficient_error + 1e-10 < 1e-7
+    box = ((2.0, 3.3), (-0.1, 0.1))
+    curve = follow2(lambda c, more: roessler(c + more), point, box, second=0.0, rising=True, points=1)
+    for each in (point, *curve.points):
+        assert abs(each.coefficient + 0.3705827166) <= each.coefficient_error + 1e-10 < 1e-7
+    np.testing.assert_allclose(curve.points[0].mode, point.mode * np.sign(point.mode @ curve.points[0].mode), atol=1e-7)
 
 
 @pytest.mark.parametrize("state", [[1.0, 0.0, -0.3], [1.0, 0.0, 0.3], [1.2, 0.0, 0.0], [0.54, 0.84, 0.0]])

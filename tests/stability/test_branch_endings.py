@@ -14,6 +14,7 @@ from chilopod.stability import (
     follow,
     from_map,
     from_rhs,
+    locate,
 )
 from chilopod.stability.returns import jumps_at_ends
 from chilopod.stability.search.samples import Samples
@@ -181,6 +182,9 @@ def test_what_cannot_be_is_one_line():
         follow(linear, [0.1], (-1e308, 1e308))
     with pytest.raises(ParameterError, match="must contain the start"):
         follow(linear, begin(linear, 2.0, [0.1]), (0.0, 1.0))
+    for refused in (begin(linear, 2.0, [0.1]), [0.1]):
+        with pytest.raises(ParameterError, match=r"symmetric = True: must be False for systems without a symmetry"):
+            follow(linear, refused, (2.0, 3.0), symmetric=True)
     pitchfork = {p: of_map(lambda x, p=p: (1 + p) * x - x**3, 1) for p in (0.0,)}
     with pytest.raises(AnalysisError, match="branches meet here"):
         follow(lambda p: of_map(lambda x: (1 + p) * x - x**3, 1), begin(pitchfork.get, 0.0, [0.0]), (-1.0, 1.0))
@@ -201,6 +205,10 @@ def test_an_event_that_passes_time_0_is_named():
     branch = follow(family, begin(family, 2.0, [0.0138, 0.331]), (2.0, 7.5))
     assert branch.ending is Ending.LOST
     assert branch.reason.startswith("an event passes time 0 of the orbit")
+    found = locate(family, (2.0, 7.5), orbit=[0.0138, 0.331])
+    assert found.searched[1] == pytest.approx(branch.points[-1].value, abs=1e-3)
+    assert found.ending.startswith("the orbit cannot be followed beyond 6.9")
+    assert found.ending.endswith(branch.reason)
 
 
 def test_a_grazing_is_named():

@@ -396,6 +396,8 @@ def test_advice_names_what_is_not_set_yet(monkeypatch):
     with pytest.raises(AnalysisError, match=r"too many steps, though they are implicit") as refused:
         system.flow(np.array([2.0, 0.1]), 0.0, 80.0)
     assert "method" not in str(refused.value)
+    with pytest.raises(ParameterError, match=r"method = 'implict': is not known; did you mean 'implicit'\?"):
+        from_rhs(lambda t, x: [-x[0]], 1, 1.0, method="implict")
     with pytest.raises(ParameterError, match=r"allowed: above 0 to 0\.001$"):
         from_rhs(oscillator, 2, 1.0, tolerance=0.0)
 

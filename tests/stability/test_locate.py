@@ -387,6 +387,8 @@ def test_a_symmetry_of_one_system_is_none_of_its_family(name, times, at):
     (point,), (other,) = found, locate(lambda p: family(p, 0.5), (0.0, 0.3), orbit=[0.0, 0.0])
     assert point.kind is Kind.TRANSCRITICAL
     assert abs(point.value - other.value) <= point.error_bound + other.error_bound
-    branch = follow(family, [0.0, 0.0], (0.0, 0.3), symmetric=True)
+    branch = follow(family, [0.0, 0.0], (0.0, 0.3))
     assert branch.ending is Ending.LEFT_INTERVAL
     assert [each.special for each in branch.special_points] == [Kind.TRANSCRITICAL]
+    with pytest.raises(ParameterError, match="must be False for systems without a symmetry in time"):
+        follow(family, [0.0, 0.0], (0.0, 0.3), symmetric=True)

@@ -248,6 +248,17 @@ def test_special_points_are_marked_in_tables():
     assert (np.diff(two["values"][:, 1]) > 0.0).all()
 
 
+def test_tables_have_what_their_results_have():
+    """Multipliers of a return without a symmetry in time, and errors of coefficients along a branch."""
+    assert some_multipliers().half_period is None
+    assert "half_period" not in some_multipliers().to_csv()
+    assert "half_period_real" in replace(some_multipliers(), half_period=some_multipliers().values).to_dataset()
+    (point,), data = doubling().special_points, doubling().to_dataset()
+    at = data.special.values == "period doubling"
+    assert data.coefficient.values[at] == point.bifurcation.coefficient
+    assert data.coefficient_error.values[at] == point.bifurcation.coefficient_error
+
+
 def test_a_table_of_nothing_has_the_same_columns():
     empty, some = locate(logistic, (0.1, 0.2), orbit=[0.0]), located()
     assert empty.to_dataset().sizes["point"] == 0

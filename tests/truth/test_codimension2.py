@@ -288,6 +288,32 @@ def test_chenciner():
     check_next(curve.special[0], -0.5 * 2.0**2)  # |z| is sqrt(2) of the amplitude along the unit mode
 
 
+def test_chenciner_of_a_cycle():
+    """z' = (p - 0.3 + (q - 0.1) |z|^2 - 0.4 |z|^4 + 0.6 i) z beside the unit circle, seen as (2 + cos phi) z: the mean
+    square of that factor is 4.5, wherever the orbit starts."""
+
+    def family2(p, q):
+        def rhs(t, x):
+            wide, square = 2.0 + x[0], 1.0 - x[0] * x[0] - x[1] * x[1]
+            size = (x[2] * x[2] + x[3] * x[3]) / wide**2
+            u, v = x[0] * square - x[1], x[1] * square + x[0]
+            grow = p - 0.3 + (q - 0.1) * size - 0.4 * size * size + u / wide
+            return [u, v, grow * x[2] - 0.6 * x[3], grow * x[3] + 0.6 * x[2]]
+
+        return from_rhs(rhs, 4, None, guess_period=6.2)
+
+    (start,) = locate(lambda p: family2(p, 0.05), (0.2, 0.43), orbit=[-0.8, 0.6, 0.0, 0.0])
+    box = ((0.2, 0.43), (0.0, 0.2))
+    curve = follow2(family2, start, box, second=0.05, rising=True, step=0.4, longest=0.4, points=1)
+    share = 2.0 / 4.5  # |z|^2 of the amplitude 1
+    for point in (start, curve.points[0]):
+        assert abs(point.coefficient + 0.1 * np.pi * share) <= point.coefficient_error < 1e-7
+    (turn,) = curve.special
+    assert turn.kind is CodimensionTwo.CHENCINER
+    assert (np.abs(turn.values - [0.3, 0.1]) <= turn.error_bound).all()
+    assert abs(turn.next_coefficient + 0.8 * np.pi * share**2) <= turn.next_coefficient_error < 1e-5
+
+
 @pytest.mark.parametrize("off", [1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("order", [3, 4])
 def test_chenciner_near_a_resonance(off, order):

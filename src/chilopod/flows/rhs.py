@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError, known_names
 from chilopod.flows.arguments import (
     LARGEST,
     SIZES,
@@ -150,9 +150,7 @@ class RightHandSide:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
-        method: object = self.method
-        if not (isinstance(method, str) and method in get_args(Method)):
-            raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
+        known_names([str(self.method)], get_args(Method), "method")
         self.dimension = checked_count("dimension", self.dimension, LARGEST)
         if not 0.0 < finite_array(self.tolerance, (), "tolerance") <= _COARSEST:
             allowed = f"above 0 to {_COARSEST:g}"

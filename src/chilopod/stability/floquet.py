@@ -100,11 +100,11 @@ class Multipliers(Result, ReadOnlyArrays):
         return axes
 
     def to_dataset(self) -> xr.Dataset:
-        """Dataset of the multipliers of the full period, and ``half_period`` of the return map, over ``multiplier``."""
-        half = self.values if self.half_period is None else self.half_period
+        """Dataset over ``multiplier``: those of the full period, and ``half_period`` with a symmetry in time."""
+        half = {} if self.half_period is None else {"half_period": self.half_period}
         values = {"multipliers": self.values, "modulus": np.abs(self.values), "error_bounds": self.error_bounds}
         about = {"period": self.period, "verdict": VERDICTS[self.stable], "remarks": "; ".join(self.remarks)}
-        return dataset("multiplier", {**values, "half_period": half}, **about)
+        return dataset("multiplier", {**values, **half}, **about)
 
 
 @dataclass(frozen=True, eq=False)

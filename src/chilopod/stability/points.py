@@ -260,7 +260,7 @@ def _critical(
     frequency of a conjugate pair."""
     nu, mode, left = complex(spec.values[index]), spec.right[:, index], spec.left[:, index]
     peak = mode[np.abs(mode).argmax()]
-    scale = np.abs(peak) / peak / _mean_size(system, orbit, mode)
+    scale = np.abs(peak) / peak / mean_size(system, orbit.state, orbit.image.duration, mode)
     mode, left = mode * scale, left / scale.conjugate()
     if event is not CircleEvent.PAIR:
         turns = event is CircleEvent.MINUS and orbit.image.returns % 2
@@ -271,14 +271,13 @@ def _critical(
     return nu, mode, left, angle / orbit.period
 
 
-def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
+def mean_size(system: SystemLike, state: Array, duration: float, mode: ComplexArray) -> float:
     """Root mean square of a mode over a return, across the motion; 1 for a given period, which fixes time 0."""
     if not is_autonomous(system):
         return 1.0
     # The flow carries the velocity as it carries the mode.
-    start = np.stack([mode, velocity_at(system, orbit.state)], axis=1)
-    moves: list[tuple[Array, ComplexArray]] = [(orbit.state, start)]
-    duration = orbit.image.duration
+    start = np.stack([mode, velocity_at(system, state)], axis=1)
+    moves: list[tuple[Array, ComplexArray]] = [(state, start)]
 
     def carried(x: Array, directions: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
         x, derivative = checked_flow(system, x, 0.0, part * duration)

@@ -25,7 +25,15 @@ from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchPoint, OnCurve
-from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
+from chilopod.stability.branches.branch_starts import (
+    IN_FOLD,
+    Start,
+    anchored,
+    begin,
+    branch_sizes,
+    check_symmetric,
+    switch,
+)
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, by_energy, inspect
 from chilopod.stability.continuation.equations import Step
@@ -172,7 +180,8 @@ class Branch(Result):
         """Dataset over ``point``; ``special`` is empty at ordinary points. Multipliers are of the full period."""
         verdicts = [VERDICTS[None if point.special else point.stable] for point in self.points]
         values = columns(self.points, "value", "special", "period", "orbit", "multipliers")
-        about = columns((each.bifurcation for each in self.points), "error_bound", "criticality", "coefficient")
+        names = ("error_bound", "criticality", "coefficient", "coefficient_error")
+        about = columns((each.bifurcation for each in self.points), *names)
         errors = {"multipliers_error_bound": [each.error_bound for each in self.points]}
         errors["value_error_bound"] = about.pop("error_bound")
         end = {"ending": self.ending.label, "reason": self.reason, "remarks": "; ".join(self.remarks)}
@@ -250,6 +259,7 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
     if not curve.between[0] <= start.value <= curve.between[1]:
         raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
     curve.periods = start.periods
+    check_symmetric(curve.system(start.value), curve.symmetric)
     curve.sizes = branch_sizes(curve, start)
     if isinstance(start, Start):
         inward = dict(zip(curve.between, (True, False), strict=True))
@@ -383,9 +393,10 @@ def find_fold(
     """
     between = value - scale, value + scale
     with contextlib.suppress(ChilopodError):
-        curve = Curve(family, 2.0 * scale, between=between, symmetric=True, budget=budget or Budget(np.inf))
+        symmetric, allowed = family(value).symmetry is not None, budget or Budget(np.inf)
+        curve = Curve(family, 2.0 * scale, between=between, symmetric=symmetric, budget=allowed)
         with curve.budget:
-            start = begin(family, value, orbit, rising, symmetric=True)
+            start = begin(family, value, orbit, rising, symmetric=symmetric)
             branch = followed(curve, *opened(curve, start, _FIRST), LONGEST, _FOLD_STEPS, False, until=Kind.FOLD)
             return next((each.bifurcation for each in branch.special_points if each.special is Kind.FOLD), None)
     return None

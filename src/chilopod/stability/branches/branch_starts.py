@@ -126,6 +126,7 @@ def begin(
     value = float(finite_array(value, (), "value"))
     with Deadline(seconds), UserCode("family", value):
         system = system_of(family, value)
+        check_symmetric(system, symmetric)
         guess = known_state(system) if orbit is None else orbit
         studied = system if symmetric else whole_period(system, periods)
         try:
@@ -137,6 +138,13 @@ def begin(
         _check_periods(studied, found, periods)
     period = found.period if is_autonomous(system) else None
     return Start(value, found.state, rising, periods=periods, period=period)
+
+
+def check_symmetric(system: SystemLike, symmetric: bool) -> None:
+    """Check that a system has a symmetry in time if its orbits are to have it."""
+    if symmetric and system.symmetry is None:
+        said = "must be False for systems without a symmetry in time"
+        raise ParameterError(said, field="symmetric", value=True, allowed="systems with `symmetry`")
 
 
 def _check_periods(system: SystemLike, found: Orbit, periods: int) -> None:

@@ -83,13 +83,15 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
         near, event = _near(within, place.crossing.value), place.crossing.event
         breaking = place.block is not None and not place.block.trivial
         lone = event is CircleEvent.PLUS and not (place.crossing.collision or place.branching or place.fold or breaking)
+        if leaving and event is CircleEvent.PLUS and not _confirmed(within, place):
+            continue  # the start itself, whose multiplier is critical beside it within its error
         if lone:
             if place.crossing.change == 0:
                 remarks += (f"{near}: a multiplier comes to +1 and goes back, and no other orbit is near",)
             elif not any(each.fold for each in places):  # else it is that of the fold, uncertain because it is flat
                 remarks += (f"{near}: a multiplier passes +1, but no fold and no other orbit is near",)
             continue
-        if (sure or (leaving and event is CircleEvent.PLUS)) and not _confirmed(within, place):
+        if sure and not _confirmed(within, place):
             remarks += (f"{near}: {event.sentence} by no more than its error, which does not count",)
             continue
         try:

@@ -30,7 +30,7 @@ from chilopod.stability.continuation.tracer import Parts
 from chilopod.stability.interface import SystemLike
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, Quintic, normal_form, quintic
-from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
+from chilopod.stability.points import WITHOUT_CRITICALITY, Kind, mean_size
 from chilopod.stability.returns import returned_states
 from chilopod.stability.spectrum import EPSILON, spectrum
 from chilopod.stability.symmetry.groups import reverses
@@ -70,9 +70,8 @@ class Critical:
     """A place of a curve, with the critical multipliers separated from the others, and its normal form.
 
     ``spectrum`` has all multipliers, ``others`` the indices of those that are not critical, shape (others,).
-    ``multiplier`` is +1, -1, or on the unit circle with positive imaginary part, ``mode`` its unit right eigenvector
-    and ``left`` the left one with left^H mode = 1, shape (n,), ``overlap`` that of the two, each a unit vector in the
-    frame: 0 for a double multiplier; 1 for a pair.
+    ``multiplier`` is +1, -1, or on the unit circle with positive imaginary part. ``overlap`` is that of its two
+    eigenvectors, each a unit vector in the frame: 0 for a double multiplier; 1 for a pair.
     """
 
     def __init__(self, curve: CriticalCurve, at: Evaluated) -> None:
@@ -98,7 +97,7 @@ class Critical:
             turn = np.abs(mode).max() / mode[np.abs(mode).argmax()]
             mode, left = mode * turn, left * turn
         self.others = np.delete(np.arange(values.size), own)
-        self.mode, self.left = mode, left
+        self._modes = mode, left
 
     @functools.cached_property
     def system(self) -> SystemLike:
@@ -110,7 +109,9 @@ class Critical:
         """The orbit, as normal forms take it."""
         place, image = self.at.place, self.at.image
         image = image if np.isfinite(image.error).all() else replace(image, error=0.0)
-        return CriticalOrbit(place.state, image, self.multiplier, self.mode, self.left)
+        mode, left = self._modes
+        size = mean_size(self.system, place.state, image.duration, mode)
+        return CriticalOrbit(place.state, image, self.multiplier, mode / size, left * size)
 
     @functools.cached_property
     def form(self) -> NormalForm:
@@ -119,7 +120,7 @@ class Critical:
         if isinstance(at, Spot):  # whose errors are known
             state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
             moved = state > 0.0  # the left mode of a double multiplier is infinite
-            orbit_error = float(np.abs(self.left[moved]) @ state[moved])
+            orbit_error = float(np.abs(self.orbit.left[moved]) @ state[moved])
         return normal_form(self._returned, self.orbit, scale=at.frame.size, orbit_error=orbit_error)
 
     def fifth(self, *beside: Critical) -> Quintic | None:
@@ -277,7 +278,8 @@ def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.
     image, place, nu = here.at.image, here.at.place, here.multiplier
     both = (None, None) if np.isnan(coefficient[0]) else coefficient
     frequency = abs(float(np.angle(nu**image.returns))) / image.period
-    return Point2(place.values, bound, place.state, here.mode, nu, here.spectrum.values, frequency, image.period, *both)
+    mode, multipliers = here.orbit.right, here.spectrum.values
+    return Point2(place.values, bound, place.state, mode, nu, multipliers, frequency, image.period, *both)
 
 
 def _zero(test: Test, length: float) -> tuple[float, float, float] | None:

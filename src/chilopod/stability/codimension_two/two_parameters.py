@@ -330,7 +330,7 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         if off <= _NEAR and missed <= _NEAR * way and inside.all():
             outward = np.concatenate([place.state - origin.state, place.values - origin.values])
             value, bound, state = float(values[0]), float(across(found)[0]), found.place.state
-            mode, period = Critical(folds, found).mode, found.image.period
+            mode, period = Critical(folds, found).orbit.right, found.image.period
             fold = BifurcationPoint(Kind.FOLD, value, bound, state, mode, 1.0 + 0j, 0.0, period=period)
             return Start2(fold, float(values[1]), outward, periods)
     raise AnalysisError("no curve of folds was found where one is predicted to leave", field="point") from cause

@@ -48,7 +48,7 @@ class CriticalOrbit(ReadOnlyArrays):
     state: Array  # the fixed point, shape (n,)
     image: ReturnMap  # return map there, with the errors of its derivative
     multiplier: complex  # nu: exactly +1, exactly -1, or the one of a complex pair with the mode ``right``
-    right: ComplexArray  # critical eigenvectors, shape (n,), of unit length in the user's units, and left^H right = 1
+    right: ComplexArray  # critical eigenvectors, shape (n,), of unit size in the user's units, and left^H right = 1
     left: ComplexArray
 
     @property

@@ -18,6 +18,7 @@ from chilopod.stability.crossing_place import Sample
 from chilopod.stability.equilibria import SHRINKS, has_centre
 from chilopod.stability.interface import checked_flow, returns_per_period
 from chilopod.stability.points import BifurcationPoint
+from chilopod.stability.returns import Section, event_beside, return_map
 from chilopod.stability.search.samples import NEAR_FOLD, Samples
 
 _BEFORE = 1e-6  # distance from a fold at which the search for crossings ends, relative to the interval
@@ -29,6 +30,7 @@ _COMES, _FARTHER = 1e-5, 100.0  # distance from a fold, relative to the interval
 _MERGING = 1e-4  # distance from a meeting of orbits, relative to the interval, at which multipliers are uncertain
 _BETWEEN_POWERS = 0.75  # mean of the powers one half and one
 _AT_REST = 0.03  # motion, relative to the first orbit's, that counts as rest
+_PER_UNIT = 16.0  # part of the interval that counts as a unit beyond the path, whose last step may be as short
 _PARTS = 5  # parts of a return at which the extent of the motion is sampled
 
 
@@ -73,8 +75,7 @@ def extent(samples: Samples) -> Extent:
         ending = f"{SHRINKS} near {here[0]:.9g}: a Hopf point"
         return Extent(start, last.value, folds, ending, shrinks=True, beside=beside)
     if fold is None:
-        ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
-        end = last.value
+        ending, end = "" if last.value == high else _lost(samples), last.value
         if samples.merges:
             lost = "a multiplier comes to +1 and the corrector loses the orbit"
             ending = f"near {end:.9g} {lost}: it touches +1 there, or another orbit meets it"
@@ -83,6 +84,22 @@ def extent(samples: Samples) -> Extent:
     # Near the fold multipliers move as a root of the distance, which a search cannot resolve.
     end = max(first.value, min(last.value, fold.value - beside))
     return Extent(start, end, folds + (fold,) * (fold.value <= high + fold.error_bound), beside=beside)
+
+
+def _lost(samples: Samples) -> str:
+    """Sentence on the end of the path, with the event that is there if one is."""
+    last, value = samples.path[-1], samples.path[-1].value
+    image, units = last.image, samples.size
+
+    def derivative(distance: float) -> Array:
+        beyond = min(max(value + _PER_UNIT * distance * samples.width, samples.low), samples.high)
+        section = None if image.normal is None else Section(last.orbit, image.normal, image.duration)
+        there = return_map(samples.family(beyond), samples.ahead(beyond), False, section)
+        return np.asarray(there.jacobian * units / units[:, None])
+
+    said = f"the orbit cannot be followed beyond {value:.9g}"
+    event = event_beside(samples.family(value), last.orbit, image.duration, derivative)
+    return f"{said}: {event}" if event else said
 
 
 def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising: bool) -> BifurcationPoint | None:

@@ -146,6 +146,10 @@ class Samples:
         """True if an orbit is so far from its prediction that it must be another one."""
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
 
+    def ahead(self, value: float) -> Array:
+        """The orbit at a value beyond the path, as its end predicts it."""
+        return self._predicted(self.path[: -_BEHIND - 1 : -1], value)
+
     def _keep(self, *samples: Sample) -> None:
         for sample in samples:
             self.count += 1
