@@ -18,7 +18,6 @@ from chilopod.paper.robot.figures import walks as walk_figures
 from chilopod.paper.robot.rows import turning_rows, walk_rows
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks, by_duration, lower_steps, uniform_modes, walk_ends, walk_records
-from chilopod.paper.section import Size
 from chilopod.paper.table import Kind, Verdict
 from chilopod.paper.turning.trials import turning_task, without_leg_yaw
 from chilopod.steering import Target
@@ -48,7 +47,7 @@ def base(records):
 
 @pytest.fixture(scope="module")
 def walks(base, records, folder):
-    uniform = uniform_modes(ROBOT, (26.0, 20.0, 17.0), size=Size.TINY, folder=folder)
+    uniform = uniform_modes(ROBOT, (26.0, 20.0, 17.0), folder=folder)
     examples = xr.Dataset(
         {"joint_angle": (("time", "spring", "joint"), np.linspace(-0.1, 0.3, 30).reshape(3, 2, 5))},
         coords={"time": [0.0, 1.0, 2.0], "spring": [41.0, 15.0], "joint": np.arange(1, 6)},
