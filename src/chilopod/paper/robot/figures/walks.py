@@ -241,9 +241,10 @@ def _draw_durations(data: xr.Dataset, narrow: bool) -> Figure:
         shapes.errorbars(axes["B"], times, radii, errors, color, marker, label, joined=True)
     axes["B"].set(ylabel="radius of the body axis (m)", title="B  Radius")
     springs = sorted({*printed.RADII, *statements.SLOWEST.values()})
-    for spring, (color, marker) in zip(springs, _SPRINGS, strict=False):
-        share = 100.0 * data.curved.sel(spring=spring).values
-        axes["C"].plot(times, share, color=color, marker=marker, lw=1.0, label=f"{k(1)} = {spring:g}")
+    # Shares of several springs are often equal: each curve is thinner than those below it.
+    for i, (spring, (color, marker)) in enumerate(zip(springs, _SPRINGS, strict=False)):
+        share, label = 100.0 * data.curved.sel(spring=spring).values, f"{k(1)} = {spring:g}"
+        axes["C"].plot(times, share, color=color, marker=marker, lw=3.4 - 0.8 * i, ms=10.0 - 2.0 * i, label=label)
     axes["C"].set(ylabel="walks that curve (%)", title="C  Share that curves")
     for letter, each in axes.items():
         shapes.finish(
