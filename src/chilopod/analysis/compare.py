@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import stdtrit
 
 from chilopod import units
 from chilopod.analysis.parameters import numbers_read
@@ -26,7 +25,7 @@ from chilopod.notebook import Summary, finite, tornado
 from chilopod.planar.step_count import steps
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.statistics import LEVEL
+from chilopod.statistics import half_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -286,6 +285,5 @@ def _effects(
                 known_yet = not np.isnan(parts[:, at]).any()
                 row[at] = value(so_far | {at}) - value(so_far) if known_yet else math.nan
                 so_far |= {at}
-        means = parts.mean(axis=0)
-        scatter = stdtrit(_ORDERS - 1, 0.5 + 0.5 * LEVEL) * parts.std(axis=0, ddof=1) / math.sqrt(_ORDERS)
+        means, scatter = parts.mean(axis=0), half_interval(parts)
     return Effects(*ends, np.array(alone), np.array(last), means, scatter)

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig
-from scipy.special import stdtrit
 
 from chilopod import units
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
@@ -30,7 +29,7 @@ from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.stability.krylov import whole_pairs
 from chilopod.stability.spectrum import eigensystem, falling
-from chilopod.statistics import LEVEL, Interval
+from chilopod.statistics import Interval, half_interval
 
 if TYPE_CHECKING:
     from chilopod.twin import CycleMap
@@ -324,9 +323,8 @@ def _modes(matrices: Array, angles: Array, block: int, least: float = _ROUNDING,
     # To first order, a matrix changes an eigenvalue by left^H (M - mean) right.
     each = np.einsum("ji,kjl,li->ik", left.conj(), matrices, right)
     blocks = each[:, len(matrices) % block :].reshape(len(values), -1, block).mean(axis=2)
-    count = blocks.shape[1]
     with np.errstate(over="ignore", invalid="ignore"):  # a nearly defective matrix
-        errors = stdtrit(count - 1, 0.5 + 0.5 * LEVEL) * blocks.std(axis=1, ddof=1) / math.sqrt(count)
+        errors = half_interval(blocks, axis=1)
         if apart is not None:
             errors += np.abs(np.einsum("ji,kjl,li->ki", left.conj(), apart, right)).sum(axis=0)
         rounding = least * np.linalg.norm(matrices.mean(axis=0)) * np.linalg.norm(left, axis=0)
