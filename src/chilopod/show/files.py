@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -144,10 +144,19 @@ def _contents(figure: Any, done: Any, files: list[Path]) -> Iterator[tuple[Path,
 
 
 def csv(data: xr.Dataset) -> str:
-    """A table with one line per point, units in the header, attributes in comment lines (#) above it."""
-    table = storable(data)
-    frame = table.to_dataframe().reset_index()
-    units = {str(name): variable.attrs.get("units", "") for name, variable in table.variables.items()}
-    frame = frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items() if unit})
-    notes = "".join(f"# {key} = {value}\n" for key, value in table.attrs.items())
-    return notes + str(frame.to_csv(index=False, lineterminator="\n"))
+    """A table with one line per point, units in the header, attributes in comment lines (#) above it.
+
+    Variables of different points have a table each, and an empty line between: a table has the variables that share its
+    dimensions or some of them.
+    """
+    stored = storable(data)
+    over = [frozenset(each.dims) for each in stored.data_vars.values()]
+    largest = [each for each in dict.fromkeys(over) if not any(each < other for other in over)]
+    tables: dict[frozenset[Hashable], list[Hashable]] = {each: [] for each in largest}
+    for name, dims in zip(stored.data_vars, over, strict=True):
+        tables[next(each for each in largest if dims <= each)].append(name)
+    units = {str(name): variable.attrs.get("units", "") for name, variable in stored.variables.items()}
+    headers = {name: f"{name} [{unit}]" for name, unit in units.items() if unit}
+    notes = "".join(f"# {key} = {value}\n" for key, value in stored.attrs.items())
+    frames = [stored[names].to_dataframe().reset_index().rename(columns=headers) for names in tables.values()]
+    return notes + "\n".join(str(frame.to_csv(index=False, lineterminator="\n")) for frame in frames)

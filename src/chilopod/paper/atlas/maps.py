@@ -93,7 +93,7 @@ CHARTS = {
 }
 """Maps by the letter of their axes."""
 
-_LAW = 40  # values on an axis, for the line of the law
+_LAW = 40  # most values on an axis, for the line of the law
 _ROW, _ONE = 3.9, 3.6  # inches, height of a row of two maps, and of one
 
 
@@ -162,7 +162,10 @@ def _draw(maps: Mapping[str, StabilityMap], curves: xr.Dataset | None, narrow: b
 def _law(axes: Axes, found: StabilityMap, curves: xr.Dataset) -> None:
     """Line on which k1 is the critical spring that the scaling law predicts."""
     plane = Plane(found.robot, found.x, found.y)
-    x, y = (each[np.linspace(0, each.size - 1, _LAW).astype(int)] for each in (found.x_values, found.y_values))
+    x, y = (
+        each[np.linspace(0, each.size - 1, min(_LAW, each.size)).astype(int)]
+        for each in (found.x_values, found.y_values)
+    )
     robots = [[plane.at(float(a), float(b)) for a in x] for b in y]
     ratio = [[each.get(K1) / spring_scale(each) / predicted(each, curves) for each in row] for row in robots]
     axes.contour(
