@@ -231,8 +231,8 @@ def test_an_onset_that_is_met_is_the_first_one():
 def test_an_onset_that_jumps_is_no_crash():
     """Over the phase between modules the first loss jumps from 74 to 121 degrees as the spring rises."""
     number = Onset("gait.module_phase", tuple(np.radians([60.0, 130.0])))
-    found = size(ROBOT, {"onset": np.radians(90.0)}, [(K1, "11.5 N*mm/deg", "13 N*mm/deg")], onset=number)
-    assert found.outcome is Outcome.UNMET
+    found = size(ROBOT, {"onset": np.radians(90.0)}, [(K1, "11.5 N*mm/deg", "13 N*mm/deg")], onset=number, budget=60)
+    assert found.outcome is not Outcome.MET
     assert np.isfinite(found.values[0])
 
 
