@@ -136,12 +136,25 @@ PLACES: dict[str, tuple[str, str, str]] = {
     "imported inside": ("", "", "__import_inside()"),
     "helper by name": ("import own_helper", "", "getattr(own_helper, 'GA' + 'IN')"),
     "helper of a helper": ("import own_helper", "", "own_helper.second()"),
+    "lookup of a module": ("import own_lazy", "", "own_lazy.gain"),
+    "class of a module": ("import own_classed", "", "own_classed.gain"),
     "package": ("import own_package.deep as deep", "", "deep.GAIN"),
     "imported by name": ("", "", "importlib.import_module('own_' + 'helper').GAIN"),
     "state of a generator": ("F = np.random.default_rng(int(100 * V))", "", "F.random()"),
 }
 _HELPER = "import own_second\nGAIN = V\ndef gain(): return GAIN\ndef second(): return own_second.GAIN\n"
 _ROBOT = load_robot("aoi2022-planar")
+_LAZY = "def __getattr__(name):\n    from own_second import GAIN\n    return GAIN\n"
+_CLASSED = """
+import sys, types
+class Own(types.ModuleType):
+    @property
+    def gain(self):
+        from own_second import GAIN
+        return GAIN
+sys.modules[__name__].__class__ = Own
+"""
+_BESIDE = {"helper": _HELPER, "second": "GAIN = V\n", "lazy": _LAZY, "classed": _CLASSED}
 
 
 class EditedControllers:
@@ -188,7 +201,7 @@ def _described(where: str, value: str, folder: Path) -> tuple[str, str, float]:
     text = text.replace("return Command(leg_yaw=[[__import_inside(), 0.0]])", inside)
     (folder / "own_package").mkdir(parents=True, exist_ok=True)
     (folder / "own_package" / "__init__.py").write_text("")
-    files = {"own_controller.py": text, "own_helper.py": _HELPER, "own_second.py": "GAIN = V\n"}
+    files = {"own_controller.py": text} | {f"own_{name}.py": beside for name, beside in _BESIDE.items()}
     for name, content in {**files, "own_package/deep.py": "GAIN = V\n"}.items():
         (folder / name).write_text(content.replace("V", value))
     with _imported(folder) as own:

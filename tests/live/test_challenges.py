@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chilopod.analysis.parameters import stiffness
+from chilopod.engine import Status
 from chilopod.live import Session, wishes
 from chilopod.live.challenges import Left, Onset, Pole
 from chilopod.live.theory import Theory
@@ -61,6 +62,14 @@ def test_the_pole_counts_without_help_only(seen, helped, said):
     challenge.look(replace(aimed, **helped))
     assert said in challenge.said
     assert not challenge.done
+
+
+def test_no_pole_is_set_up_for_a_robot_that_has_stopped():
+    challenge = Pole()
+    stopped = replace(Session(PLANAR).seen(), status=Status.OUT_OF_RANGE, pose=np.full(3, np.nan))
+    assert challenge.begin(stopped) is None
+    challenge.look(stopped)
+    assert challenge.said.startswith("The robot has stopped.")
 
 
 def test_left_twice_in_a_row_and_why():

@@ -12,11 +12,13 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import msgspec
+import numpy as np
 import pytest
 import viser
 import xarray as xr
@@ -29,6 +31,7 @@ import outcomes
 import workers
 from chilopod import process
 from chilopod.cli import main
+from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.live import Live, Session, gate, wishes
 from chilopod.live.controls import HELP
@@ -339,6 +342,18 @@ def test_a_flood_of_messages_is_slowed_down(page):
 def test_a_slider_that_cannot_be_set_is_an_error_in_python(page, asked, part):
     with pytest.raises(ParameterError, match=part):
         page.wish(asked)
+
+
+def test_a_robot_that_has_stopped_is_not_sent_to_a_place(page, monkeypatch):
+    """It has none, and the page says to press R."""
+    put, controls = [], page._controls
+    monkeypatch.setattr(controls, "_put", put.append)
+    monkeypatch.setattr(controls, "_seen", replace(page.seen, status=Status.OUT_OF_RANGE, pose=np.full(3, np.nan)))
+    controls._go()
+    assert put == []
+    monkeypatch.setattr(controls, "_seen", page.seen)
+    controls._go()
+    assert [type(each) for each in put] == [wishes.Target]
 
 
 def test_the_largest_seed_reaches_later_browsers(page):

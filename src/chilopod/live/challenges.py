@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.engine import Status
 from chilopod.live import wishes
 from chilopod.live.state import Seen
 from chilopod.live.theory import Theory
@@ -73,8 +74,12 @@ class Pole(Challenge):
         "Lead module 1 to the green pole with the slider of the first spring alone: no strategy, no pull at a joint. "
         "You cannot choose the side, but every circle comes round."
     )
+    _place: tuple[float, float] | None = None  #: None for a robot that has stopped
 
     def begin(self, seen: Seen) -> wishes.Wish | None:
+        if seen.status is not Status.WALKED:
+            self.said = "The robot has stopped. Press R, and choose the challenge again."
+            return None
         x, y, heading = (float(each) for each in seen.pose)
         way = heading + _BEARING
         self._place = x + _DISTANCE * math.cos(way), y + _DISTANCE * math.sin(way)
@@ -82,7 +87,7 @@ class Pole(Challenge):
         return wishes.Target(self._place, by_hand=True)
 
     def look(self, seen: Seen) -> None:
-        if self.done:
+        if self.done or self._place is None:
             return
         away = math.hypot(seen.pose[0] - self._place[0], seen.pose[1] - self._place[1])
         self._pulled |= bool(seen.pulled.any())

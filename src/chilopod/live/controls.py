@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import viser
 
+from chilopod.engine import Status
 from chilopod.live import wishes
 from chilopod.live.challenges import CHALLENGES, Challenge
 from chilopod.live.plots import Pitchfork, Plots
@@ -256,6 +257,8 @@ class Controls:
         self._bearing.value = (self._bearing.value + angle + 180.0) % 360.0 - 180.0
 
     def _go(self) -> None:
+        if self._seen.status is not Status.WALKED:  # it has no place; the page says what to press
+            return
         x, y, heading = self._seen.pose
         way, distance = heading + math.radians(self._bearing.value), self._distance.value
         self._put(wishes.Target((float(x + distance * np.cos(way)), float(y + distance * np.sin(way)))))

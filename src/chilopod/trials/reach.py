@@ -185,7 +185,7 @@ class Reach:
                 yield from self._reached(names, vars(value), f"{prefix}{name}.", inside | {id(value)})
 
     def _module(self, module: ModuleType, path: str) -> Parts:
-        """Text of a user module, and of all user modules that it imports."""
+        """Text of a user module, its own lookup of attributes, and all user modules that it imports."""
         file = getattr(module, "__file__", None)
         if file is None and hasattr(module, "__path__"):
             return
@@ -194,6 +194,9 @@ class Reach:
         content = Path(file).read_bytes()
         code = _compiled(content) if file.endswith(".py") else None
         yield "", content if code is None else code
+        # No name leads to these two, and they may import more.
+        yield ".__getattr__", vars(module).get("__getattr__")
+        yield ".__class__", type(module)
         outer = module.__name__.rpartition(".")[0]
         found = self._imported(code, vars(module), path, nested=False) if code else {}
         for name, each in sorted({**found, outer: sys.modules.get(outer)}.items()):
