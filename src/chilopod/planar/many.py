@@ -43,8 +43,8 @@ def return_maps(robots: Sequence[Robot]) -> tuple[Array, Array]:
     maps, errors = np.full((len(robots), *from_joint.shape), np.nan), np.full(len(robots), np.nan)
     steps = linear.steps(widths, decay, frequency[:, None])
     followed = np.flatnonzero((steps < _MOST_STEPS) & (steps * (2 * n + 1) ** 3 < MOST_WORK))
-    clocks = np.array([robot.gait.period for robot in robots])
-    _propagate(followed, widths, upper, decay, frequency, clocks, from_joint.copy(), maps, errors)
+    clocks, maps[followed] = np.array([robot.gait.period for robot in robots]), from_joint
+    _propagate(followed, widths, upper, decay, frequency, clocks, maps, errors)
     maps = to_joint @ maps
     if half:
         maps[:, 1:] *= -1.0
@@ -60,11 +60,10 @@ def shape(robot: Robot) -> tuple[int, bool, int]:
 
 @njit
 def _propagate(
-    chosen: Any, widths: Any, upper: Any, decay: Any, frequency: Any, clocks: Any, start: Any, maps: Any, errors: Any
+    chosen: Any, widths: Any, upper: Any, decay: Any, frequency: Any, clocks: Any, maps: Any, errors: Any
 ) -> None:
     stop = np.zeros(1)  # never
     for r in chosen:
-        maps[r] = start
         errors[r] = linear.propagate_all(widths[r], upper[r], decay[r], frequency[r], clocks[r], maps[r], stop)[0]
 
 
