@@ -120,7 +120,14 @@ class FreeConstants:
         return np.array([robot.get(path) for path in self.paths])
 
     def check(self, robot: Robot) -> None:
-        """ParameterError if the robot cannot have the constants at the ends of their ranges."""
+        """ParameterError if two constants change one number, or the robot cannot have them at the ends of their
+        ranges."""
+        taken: set[str] = set()
+        for path in self.paths:
+            if both := taken & (numbers := {*robot.numbers(path)}):
+                said = f"must not change a number that another range changes: {', '.join(sorted(both))}"
+                raise ParameterError(said, field=f"free[{path}]")
+            taken |= numbers
         for ends in (np.zeros(len(self.each)), np.ones(len(self.each))):
             self.robot_with(robot, self.values_at(ends))
 
@@ -186,9 +193,12 @@ class Estimates:
 
     def identified(self, source: str) -> Robot:
         """The same, with the intervals as provenance."""
-        best, known = self.best, self.as_json()["constants"].items()
-        texts = {path: f"identified from {source}; 90 %: {each['interval_text']}{self.remark}" for path, each in known}
-        return best.with_(name="identified", provenance={**best.provenance, **texts})
+        best, known = self.best, self.as_json()["constants"]
+        texts = {path: text for path, text in best.provenance.items() if path not in known}
+        for path, each in known.items():
+            text = f"identified from {source}; 90 %: {each['interval_text']}{self.remark}"
+            texts |= dict.fromkeys(best.numbers(path), text)
+        return best.with_(name="identified", provenance=texts)
 
     def as_json(self) -> dict[str, Any]:
         """Constants with their intervals, correlations, and combinations that are independent: relative changes by half
