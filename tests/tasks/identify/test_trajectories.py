@@ -129,7 +129,7 @@ def test_changes_of_a_constant_that_is_about_zero_are_relative_to_its_range():
     assert known["of_range"] == ["springs.damping"]
     assert [max(each["changes"].values()) for each in known["combinations"]] == pytest.approx([0.02, 0.1])
     _, cells, said = found._content()
-    assert cells[1][1:] == ("0 N*m*s/rad", "0 N*m*s/rad to 0.02 N*m*s/rad (cut by the range searched)")
+    assert cells[1][1:] == ("0 N*m*s/rad", "0 N*m*s/rad to 0.02 N*m*s/rad (lower end cut by the range searched)")
     assert "springs.damping +2 % of its range" in said[1]
     assert said[2].endswith("legs.half_width +10 %")
 

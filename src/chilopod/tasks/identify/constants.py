@@ -175,7 +175,8 @@ class Estimates:
     remark
         Words that the provenance of each constant ends with.
     cut
-        Mask of the constants whose interval ends where another constant is at the end of its range; by default none.
+        Mask of the ends that lie where another constant is at the end of its range, shape (constants, 2); by default
+        none.
     """
 
     given: Robot
@@ -184,7 +185,7 @@ class Estimates:
     ends: Array
     spread: Array
     remark: str = ""
-    cut: Sequence[bool] = ()
+    cut: Array | None = None
 
     @property
     def best(self) -> Robot:
@@ -227,18 +228,20 @@ class Estimates:
         value, known = float(self.values[at]), ends.tolist() if np.isfinite(ends).all() else None
         found = {"value_si": value, "text": self._text(at, value, ends), "interval_si": known}
         none = "none found" if np.isnan(self.ends).all() else "no end found"
-        return {**found, "interval_text": self.between(at, ends, at in np.flatnonzero(self.cut)) or none}
+        cut = np.zeros(2, dtype=bool) if self.cut is None else self.cut[at]
+        return {**found, "interval_text": self.between(at, ends, cut) or none}
 
-    def between(self, at: int, ends: Array, cut: bool) -> str:
+    def between(self, at: int, ends: Array, cut: Array) -> str:
         """Range of a constant in words, and whether the data or the search end it; nothing if it is NaN."""
-        (low, high), half = self.free.limits(self.values)[at], float(np.sqrt(self.spread[at, at]))
+        low, high = limits = self.free.limits(self.values)[at]
         if not np.isfinite(ends).all():
             return ""
-        cut = cut or min(ends[0] - low, high - ends[1]) <= _AT * (high - low)
-        remark = " (cut by the range searched)" if cut else ""
+        cut = cut | (np.abs(ends - limits) <= _AT * (high - low))
+        which = "" if cut.all() else "lower end " if cut[0] else "upper end "
+        remark = f" ({which}cut by the range searched)" if cut.any() else ""
         # At the end of a range the data ask for values beyond it.
         inside = min(self.values[at] - low, high - self.values[at]) > _AT * (high - low)
-        remark = " (left open by the data)" if inside and half > _OPEN * (high - low) else remark
+        remark = " (left open by the data)" if inside and np.ptp(ends) > 2.0 * _OPEN * (high - low) else remark
         return " to ".join(self._text(at, end, ends) for end in ends.tolist()) + remark
 
     def _text(self, at: int, value: float, ends: Array) -> str:
