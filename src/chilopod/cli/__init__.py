@@ -11,7 +11,8 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated
 
 import typer
@@ -92,7 +93,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger("chilopod").disabled = True  # the progress bar says it
     try:
         _check_completion()
-        code = app(arguments, prog_name="chilopod", standalone_mode=False)
+        with _told_once():
+            code = app(arguments, prog_name="chilopod", standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", INTERRUPTED)
     except Exception as error:
@@ -123,6 +125,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     if code == INTERRUPTED:  # recent versions of typer make this of a KeyboardInterrupt
         return _fail("interrupted", INTERRUPTED)
     return code if isinstance(code, int) else 0
+
+
+@contextmanager
+def _told_once() -> Iterator[None]:
+    """Let folders of trials log a line once in this block, however many studies use them."""
+    logger, told = logging.getLogger("chilopod.trials.store"), set[str]()
+
+    def is_new(line: logging.LogRecord) -> bool:
+        is_known = line.getMessage() in told
+        told.add(line.getMessage())
+        return not is_known
+
+    logger.addFilter(is_new)
+    try:
+        yield
+    finally:
+        logger.removeFilter(is_new)
 
 
 def _not_imported(error: Exception) -> str | None:
