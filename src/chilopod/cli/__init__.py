@@ -11,8 +11,7 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -91,10 +90,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     logging.getLogger("chilopod").disabled = True  # the progress bar says it
+    trials_log, told = logging.getLogger("chilopod.trials.store"), list[str]()
+
+    def is_new(line: logging.LogRecord) -> bool:  # a command may run several studies in one folder
+        told.append(line.getMessage())
+        return told.count(told[-1]) == 1
+
+    trials_log.addFilter(is_new)
     try:
         _check_completion()
-        with _told_once():
-            code = app(arguments, prog_name="chilopod", standalone_mode=False)
+        code = app(arguments, prog_name="chilopod", standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", INTERRUPTED)
     except Exception as error:
@@ -122,26 +127,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
             INTERNAL_ERROR,
         )
+    finally:
+        trials_log.removeFilter(is_new)
     if code == INTERRUPTED:  # recent versions of typer make this of a KeyboardInterrupt
         return _fail("interrupted", INTERRUPTED)
     return code if isinstance(code, int) else 0
-
-
-@contextmanager
-def _told_once() -> Iterator[None]:
-    """Let folders of trials log a line once in this block, however many studies use them."""
-    logger, told = logging.getLogger("chilopod.trials.store"), set[str]()
-
-    def is_new(line: logging.LogRecord) -> bool:
-        is_known = line.getMessage() in told
-        told.add(line.getMessage())
-        return not is_known
-
-    logger.addFilter(is_new)
-    try:
-        yield
-    finally:
-        logger.removeFilter(is_new)
 
 
 def _not_imported(error: Exception) -> str | None:

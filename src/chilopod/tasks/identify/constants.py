@@ -185,7 +185,7 @@ class Estimates:
     ends: Array
     spread: Array
     remark: str = ""
-    cut: Array | None = None
+    cut: Array | bool = False
 
     @property
     def best(self) -> Robot:
@@ -228,7 +228,7 @@ class Estimates:
         value, known = float(self.values[at]), ends.tolist() if np.isfinite(ends).all() else None
         found = {"value_si": value, "text": self._text(at, value, ends), "interval_si": known}
         none = "none found" if np.isnan(self.ends).all() else "no end found"
-        cut = np.zeros(2, dtype=bool) if self.cut is None else self.cut[at]
+        cut = np.broadcast_to(self.cut, self.ends.shape)[at]
         return {**found, "interval_text": self.between(at, ends, cut) or none}
 
     def between(self, at: int, ends: Array, cut: Array) -> str:
