@@ -84,6 +84,18 @@ def test_a_file_of_a_full_disk_is_kept_elsewhere(capsys, tmp_path, monkeypatch):
     assert os.listdir(tmp_path / "there") == []
 
 
+def test_trials_that_a_full_disk_does_not_keep_are_printed_and_said_once(capsys, tmp_path, monkeypatch, caplog):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    folder = tmp_path / "trials"
+    assert main(["turn", ROBOT, "--target", "45 deg, 1.3 m", "--trials", str(folder)]) == 0  # of several studies
+    assert "spring by the settled radius" in capsys.readouterr().out
+    told = [each.getMessage() for each in caplog.records if each.name == "chilopod.trials.store"]
+    assert told == [f"{folder}: trials run but are not kept: cannot be written (No space left on device)"]
+
+
 def test_one_size_of_the_report(capsys):
     assert main(["reproduce", "--quick", "--all"]) == 2
     assert "must be given alone; allowed: one of" in capsys.readouterr().err

@@ -167,6 +167,13 @@ def test_override_of_all_springs(robot):
     assert uniform.springs.stiffness == (0.5,) * 5
     assert uniform.get("springs.stiffness") == 0.5
     assert {uniform.provenance_of(f"springs.stiffness[{i}]") for i in range(5)} == {"set by override"}
+    assert robot.with_value("springs.stiffness[01]", 1.0).provenance_of("springs.stiffness[1]") == "set by override"
+
+
+def test_the_longest_provenance_can_be_copied(robot):
+    told = "from the scales " * 62
+    copy = robot.with_(provenance={"body.mass": told}).copied()
+    assert copy.provenance_of("body.mass") == f"copied from {PRESET}: {told}"[:1000]
 
 
 def test_setting_the_same_value_changes_nothing(robot):

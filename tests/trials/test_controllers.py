@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
-from chilopod.engine import Command, Event, Observation
+from chilopod.engine import Command, Event, Observation, engine_named
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.gait import Gait
 from chilopod.steering import LegYawController, Target
@@ -314,6 +314,18 @@ def test_equal_trials_have_one_file_whatever_kinds_of_numbers_they_were_given():
 def test_our_own_controllers_have_the_sources_of_chilopod_instead_of_a_text():
     assert trial(LegYawController()).code == ("", "", "")
     assert '"class": "chilopod.steering.leg_yaw:LegYawController"' in trial(LegYawController()).text
+
+
+@pytest.mark.parametrize("engine", ["planar", "twin"])
+def test_events_within_a_step_of_the_twin_see_one_state(engine):
+    robot = PLANAR if engine == "planar" else WHOLE
+    walk = engine_named(engine).start([robot], initial=engine_named(engine).initial_states(robot, [[0.2] * 5]))
+    seen = []
+    for time in np.arange(1, 12) * 0.001:
+        walk.advance(time)
+        seen.append(walk.observe().joint_angles[0])
+    same = (np.diff(seen, axis=0) == 0.0).all(axis=1)
+    assert same.tolist() == ([False] * 10 if engine == "planar" else [True, False] * 5)
 
 
 @pytest.mark.parametrize("engine", ["planar", "twin"])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import errno
+import os
 import sys
 from contextlib import ExitStack
 
@@ -81,6 +82,22 @@ def test_an_interruption_leaves_no_claim(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(TRIALS, tmp_path, interrupted)
     assert files(tmp_path) == sorted(NAMES)
+
+
+def test_trials_that_a_full_disk_does_not_keep_are_given_all_the_same(tmp_path, walked_here, monkeypatch, caplog):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", full)
+        records = run(TRIALS, tmp_path)
+        assert files(tmp_path) == []
+    assert [each.getMessage() for each in caplog.records if each.name == "chilopod.trials.store"] == [
+        f"{tmp_path}: trials run but are not kept: cannot be written (No space left on device)"
+    ]
+    again = run(TRIALS, tmp_path)
+    assert walked_here == 2 * [0, 1, 2, 3]
+    assert all(one.identical(other) for one, other in zip(records, again, strict=True))
 
 
 def test_where_there_are_no_locks_nobody_shares(tmp_path, monkeypatch):

@@ -19,7 +19,6 @@ from chilopod.errors import ChilopodError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
-from chilopod.robot.parameters import place_of
 
 Given = tuple[str, float | str, float | str]
 """Path of a number, or the name of a derived axis, and both ends of its range: in SI units, or text with a unit."""
@@ -89,8 +88,7 @@ class Axis:
         """Paths of all numbers that it changes, springs one by one."""
         if self.path in DERIVED:
             return set(DERIVED[self.path][1])
-        place, stem = place_of(self.path), self.path.partition("[")[0]
-        return {f"{stem}[{i}]" for i in place.joints(robot.body.modules - 1)} if place.quantity.each else {stem}
+        return set(robot.numbers(self.path))
 
 
 def axis(robot: Robot, given: Given, field: str) -> Axis:

@@ -90,6 +90,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     logging.getLogger("chilopod").disabled = True  # the progress bar says it
+    trials_log, told = logging.getLogger("chilopod.trials.store"), list[str]()
+
+    def is_new(line: logging.LogRecord) -> bool:  # a command may run several studies in one folder
+        told.append(line.getMessage())
+        return told.count(told[-1]) == 1
+
+    trials_log.addFilter(is_new)
     try:
         _check_completion()
         code = app(arguments, prog_name="chilopod", standalone_mode=False)
@@ -120,6 +127,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
             INTERNAL_ERROR,
         )
+    finally:
+        trials_log.removeFilter(is_new)
     if code == INTERRUPTED:  # recent versions of typer make this of a KeyboardInterrupt
         return _fail("interrupted", INTERRUPTED)
     return code if isinstance(code, int) else 0

@@ -121,7 +121,7 @@ def _walk(pipe: Connection, names: Sequence[str], context: Context) -> None:
 def _settle() -> None:
     """Say nothing, and end with the parent."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    logging.getLogger("chilopod").disabled = True
+    logging.disable()
     warnings.simplefilter("ignore")
 
 

@@ -23,6 +23,7 @@ from chilopod.units import Description, Flag, Quantity, quantities
 
 _OVERRIDDEN: Final = "set by override"
 _COPIED: Final = "copied from "
+_LONGEST: Final = 1000  # characters of a provenance
 _DERIVED: Final = "body.yaw_inertia"  # the one optional number that has a value where none is given
 
 
@@ -54,7 +55,7 @@ def _provenance(table: object) -> Table:
             pending.extendleft((f"{path}.{key}", item) for key, item in reversed([*text.items()]))
             continue
         try:
-            flat[path] = _printable(text, longest=1000)
+            flat[path] = _printable(text, _LONGEST)
         except ParameterError as error:
             error.field = path
             raise
@@ -178,6 +179,11 @@ class Robot(Description):
             paths += [f"{path}[{index}]" for index in range(count)] if quantity.each else [path]
         return tuple(paths)
 
+    def numbers(self, path: str) -> tuple[str, ...]:
+        """Return the paths of all numbers that a path means, springs one by one."""
+        place, stem = self._locate(path), path.partition("[")[0]
+        return tuple(f"{stem}[{i}]" for i in place.joints(self.body.modules - 1)) if place.quantity.each else (stem,)
+
     def get(self, path: str) -> float:
         """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``.
 
@@ -246,12 +252,13 @@ class Robot(Description):
     def copied(self) -> Self:
         """Return this robot with provenance that names it as what numbers were copied from, but for those that were
         overridden, or copied before."""
+        before = f"{_COPIED}{self.name}"
         texts = {
-            path: text if text == _OVERRIDDEN or text.startswith(_COPIED) else f"{_COPIED}{self.name}: {text}"
+            path: text if text == _OVERRIDDEN or text.startswith(_COPIED) else f"{before}: {text}"[:_LONGEST]
             for path, text in self.provenance.items()
         }
         rest = (path for path in self.parameters() if self.provenance_of(path) is None)
-        return self.with_(provenance={**texts, **dict.fromkeys(rest, f"{_COPIED}{self.name}")})
+        return self.with_(provenance={**texts, **dict.fromkeys(rest, before)})
 
     def provenance_of(self, path: str) -> str | None:
         """Return the provenance of a parameter; a spring falls back on that of all springs."""
@@ -352,9 +359,7 @@ class Robot(Description):
         texts = dict(self.provenance)
         if joints != self.body.modules - 1:
             texts = {name: text for name, text in texts.items() if spring_index(name, path) < joints}
-        own = [path]
-        if isinstance(place.index, slice):
-            own = [f"{path.partition('[')[0]}[{joint}]" for joint in place.joints(self.body.modules - 1)]
+        own = (path,) if place.index is None else self.numbers(path)
         changes["provenance"] = Table({**texts, **dict.fromkeys(own, _OVERRIDDEN)})
         return self.model_copy(update=changes)
 

@@ -156,7 +156,7 @@ class _Study:
             while left:
                 for walked in self._walked(self._executor.cut(batches(left)), free):
                     for trial, record in walked:
-                        store.write(trial, record)
+                        store.keep(trial, record)
                     store.sync()
                     for trial, _ in walked:
                         claims.release(trial.file_name)

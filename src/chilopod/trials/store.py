@@ -72,13 +72,19 @@ class Store:
             problem = "must belong to this trial and to this code"
             raise OutputError(problem, field="record", allowed=f"a record for {trial.file_name}")
         if NOT_KEPT in record.attrs:
-            words = trial.not_kept(record.attrs.pop(NOT_KEPT))
-            if words not in self._said:
-                self._tell(words)
-            self._said.add(words)
+            self._tell_once(trial.not_kept(record.attrs.pop(NOT_KEPT)))
             return
         # A folder that is deleted while trials walk is created again; only its old content is lost.
         write_atomic(self.folder / trial.file_name, content_of(record), durable=True, temporary=_UNFINISHED)
+
+    def keep(self, trial: Trial, record: xr.Dataset) -> None:
+        """Keep a record as :meth:`write` does, or say in one line why its file, and others, cannot be written."""
+        try:
+            self.write(trial, record)
+        except OutputError as error:
+            if error.source is None:  # the record is faulty
+                raise
+            self._tell_once(f"{self.folder}: trials run but are not kept: {error.problem}")
 
     @contextmanager
     def claims(self) -> Iterator[Claims]:
@@ -90,6 +96,11 @@ class Store:
         """Make all written records survive a power failure."""
         with suppress(FileNotFoundError):  # it was deleted
             sync_folder(self.folder)
+
+    def _tell_once(self, words: str) -> None:
+        if words not in self._said:
+            self._tell(words)
+        self._said.add(words)
 
     def _move_aside(self, path: Path, why: str) -> None:
         aside, count = path.with_name(f"{path.name}.aside"), 1

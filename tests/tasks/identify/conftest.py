@@ -14,6 +14,6 @@ def found():
     constants, residuals = planar_fit._fit(robot, data, np.array([robot.get(path) for path in planar_fit.FREE]))
     ranges = planar_fit.allowed_ranges(robot, data, constants)[0]
     rest = {"starts": constants[None], "preset_residuals": residuals, "intervals": ranges, "profile": None}
-    rest["cut"] = np.zeros((2, 3), dtype=bool)
+    rest["cut"] = np.zeros((2, 3, 2), dtype=bool)
     rest["spread"] = planar_fit.spread(robot, data, constants)
     return Identification(given=robot, data=data, constants=constants, residuals=residuals, ranges=ranges, **rest)

@@ -67,7 +67,8 @@ def test_ranges_hold_the_constants_of_a_robot_of_another_size():
 
 
 def test_a_range_that_the_bound_of_another_constant_cuts_says_so(monkeypatch):
-    """Within its own bounds the friction of a robot of three modules ends where the forward offset is at its bound."""
+    """Within its own bounds the friction of a robot of three modules ends, below, where the forward offset is at its
+    bound; above, the data end it."""
     settings = ["body.modules=3", "body.length=6 cm", "body.mass=10 g", "springs.stiffness=0.000219 N*m/rad"]
     settings += ["legs.forward_offset=4.4 mm", "legs.half_width=5.4 mm", "ground.friction=0.92 N*s/m"]
     settings += ["gait.stride=6 mm", "gait.stance=0.2 s", "gait.swing=0.15 s", "gait.module_phase=90 deg"]
@@ -76,9 +77,13 @@ def test_a_range_that_the_bound_of_another_constant_cuts_says_so(monkeypatch):
     )
     monkeypatch.setattr(planar, "_profile", lambda *_: xr.Dataset())
     found = planar.identify_planar(ROBOT.set_from_text(settings), data)
-    texts = [each["allowed_text"] for each in found.as_json()["constants"].values()]
-    assert texts[0].endswith("(cut by the range searched)")
-    assert [each.endswith("(left open by the data)") for each in texts[1:]] == [True, True]
+    texts = [each["allowed_text"].partition("(")[2] for each in found.as_json()["constants"].values()]
+    assert texts[:2] == ["lower end cut by the range searched)", "cut by the range searched)"]
+    # Two places are within 0.2 % of the least offset: one at the bound of the half-width, and one that the data set.
+    assert texts[2] in ("upper end cut by the range searched)", "cut by the range searched)")
+    assert (
+        found.lines()[-3].strip().startswith("ranges searched: ground.friction 0.0286 N*s/m to 11.4 N*s/m, legs.half")
+    )
     assert found.lines()[-1].strip() == "too few data for 3 constants: 2 independent numbers, as the mode has norm 1"
 
 

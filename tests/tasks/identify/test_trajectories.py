@@ -1,6 +1,7 @@
 """The planar model's constants from recorded walks."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from chilopod.errors import ChilopodError
 from chilopod.netcdf import netcdf
 from chilopod.planar import PlanarModel, initial_states, simulate
 from chilopod.planar.sampled import states_at
-from chilopod.robot import load_robot
+from chilopod.robot import Robot, load_robot
 from chilopod.tasks.identify import RecordedWalks, identify_recorded, trajectories
 from chilopod.tasks.identify.constants import Estimates, FreeConstants
 from chilopod.tasks.identify.recordings import read_recordings
@@ -128,7 +129,7 @@ def test_changes_of_a_constant_that_is_about_zero_are_relative_to_its_range():
     assert known["of_range"] == ["springs.damping"]
     assert [max(each["changes"].values()) for each in known["combinations"]] == pytest.approx([0.02, 0.1])
     _, cells, said = found._content()
-    assert cells[1][1:] == ("0 N*m*s/rad", "0 N*m*s/rad to 0.02 N*m*s/rad (cut by the range searched)")
+    assert cells[1][1:] == ("0 N*m*s/rad", "0 N*m*s/rad to 0.02 N*m*s/rad (lower end cut by the range searched)")
     assert "springs.damping +2 % of its range" in said[1]
     assert said[2].endswith("legs.half_width +10 %")
 
@@ -217,9 +218,38 @@ def test_settings_that_contradict_the_record_of_a_simulation_are_refused(tmp_pat
         read_recordings(ROBOT, given, tmp_path)
 
 
-def test_a_setting_of_a_walk_cannot_be_free(tmp_path):
-    with pytest.raises(ChilopodError, match=r"free.springs.stiffness.0.*: must not be a setting"):
-        read_recordings(ROBOT, data("walk.csv", free={"springs.stiffness[0]": (0.2, 0.8)}), tmp_path)
+@pytest.mark.parametrize(
+    ("path", "setting"),
+    [
+        ("springs.stiffness[0]", SPRING),
+        ("springs.stiffness[:1]", SPRING),
+        ("springs.stiffness[2]", "springs.stiffness[1:]=41 N*mm/deg"),
+        ("springs.stiffness", "springs.stiffness[0:5]=41 N*mm/deg"),
+    ],
+)
+def test_a_setting_of_a_walk_cannot_be_free(tmp_path, path, setting):
+    given = data("walk.csv", free={path: (0.2, 0.8)}, settings=[setting])
+    with pytest.raises(ChilopodError, match=rf"free.{re.escape(path)}.*: must not be a setting"):
+        read_recordings(ROBOT, given, tmp_path)
+
+
+@pytest.mark.parametrize("second", ["springs.stiffness[1:5]", "springs.stiffness[03]", "springs.stiffness"])
+def test_two_ranges_of_one_number_are_refused(tmp_path, second):
+    free = {"springs.stiffness[1:]": (1.0, 5.0), second: (1.0, 5.0)}
+    with pytest.raises(ChilopodError, match=rf"free.{re.escape(second)}.: must not change .*springs.stiffness\[3\]"):
+        read_recordings(ROBOT, data("walk.csv", free=free), tmp_path)
+
+
+def test_groups_of_springs_have_their_intervals_as_provenance():
+    free = FreeConstants.read({"springs.stiffness[1:]": ["20 N*mm/deg", "80 N*mm/deg"], "springs.damping": (0.0, 1.0)})
+    ends = np.array([[2.2, 2.4], [0.4, 0.6]])
+    found = Estimates(ROBOT, free, ends.mean(axis=1), ends, np.diag([0.1, 0.1]) ** 2).identified("mine.toml")
+    told = {path: origin for path, _, origin in Robot.from_toml(found.to_toml()).listed()}
+    assert told["springs.stiffness[0]"] == ROBOT.provenance_of("springs.stiffness[0]")
+    for joint in range(5):
+        assert told[f"springs.damping[{joint}]"] == "identified from mine.toml; 90 %: 0.4 N*m*s/rad to 0.6 N*m*s/rad"
+        assert joint == 0 or told[f"springs.stiffness[{joint}]"].startswith("identified from mine.toml; 90 %: 38.")
+    assert "springs.damping" not in found.provenance
 
 
 @pytest.mark.parametrize(
@@ -240,8 +270,16 @@ def test_a_fault_of_the_data_names_their_file(capsys, tmp_path, monkeypatch, set
 def test_the_command_writes_walks_and_a_robot_with_its_intervals(capsys, tmp_path):
     (tmp_path / "walk.nc").write_bytes(netcdf(walked(SOFT, 9.0).isel(time=slice(20, None))))
     free = '[free]\n"ground.friction" = ["100 N*s/m", "500 N*s/m"]\n'
-    (tmp_path / "mine.toml").write_text(f'{free}[[trajectory]]\nfile = "walk.nc"\nsettings = ["{SPRING}"]\n')
-    arguments = ["identify", "planar", "--data", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out"), "--json"]
+    (tmp_path / "my\tdata.toml").write_text(f'{free}[[trajectory]]\nfile = "walk.nc"\nsettings = ["{SPRING}"]\n')
+    arguments = [
+        "identify",
+        "planar",
+        "--data",
+        str(tmp_path / "my\tdata.toml"),
+        "--out",
+        str(tmp_path / "out"),
+        "--json",
+    ]
     for option in (["--next"], ["--check", "2"], ["--points", "5"]):
         assert main([*arguments, *option]) == 2
         assert capsys.readouterr().err.startswith(f"error: {option[0]}: must not be given with recorded walks")
@@ -250,7 +288,7 @@ def test_the_command_writes_walks_and_a_robot_with_its_intervals(capsys, tmp_pat
     best = load_robot(tmp_path / "out" / "identified.toml")
     assert best.get("ground.friction") == pytest.approx(246.5, rel=1e-4)
     interval = found["constants"]["ground.friction"]["interval_text"]
-    assert best.provenance["ground.friction"] == f"identified from mine.toml; 90 %: {interval}"
+    assert best.provenance["ground.friction"] == f"identified from my\\tdata.toml; 90 %: {interval}"
     assert (tmp_path / "out" / "identification.nc").exists()
 
 

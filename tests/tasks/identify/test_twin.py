@@ -100,6 +100,7 @@ def test_a_series_of_ones_own_is_fitted_as_well(tmp_path, monkeypatch):
         ('["50 mm", "100 mm"]', '["100 mm", "50 mm"]', "free[legs.half_width] = ['100 mm', '50 mm']: must be a rising"),
         ('["0.02 s"', '["0.02 m"', "free[twin.servo_damping/twin.servo_stiffness] = '0.02 m': is a length"),
         ('"70 mm"]', '"70 mm"]\n"springs.stiffness" = [1, 2]', "free[springs.stiffness]: must not be k1"),
+        ('"70 mm"]', '"70 mm"]\n"springs.stiffness[0:2]" = [1, 2]', "free[springs.stiffness[0:2]]: must not be k1"),
         (
             "/twin.servo_stiffness",
             "/body.mass",

@@ -120,7 +120,14 @@ class FreeConstants:
         return np.array([robot.get(path) for path in self.paths])
 
     def check(self, robot: Robot) -> None:
-        """ParameterError if the robot cannot have the constants at the ends of their ranges."""
+        """ParameterError if two constants change one number, or the robot cannot have them at the ends of their
+        ranges."""
+        taken: set[str] = set()
+        for path in self.paths:
+            if both := taken & (numbers := {*robot.numbers(path)}):
+                said = f"must not change a number that another range changes: {', '.join(sorted(both))}"
+                raise ParameterError(said, field=f"free[{path}]")
+            taken |= numbers
         for ends in (np.zeros(len(self.each)), np.ones(len(self.each))):
             self.robot_with(robot, self.values_at(ends))
 
@@ -168,7 +175,8 @@ class Estimates:
     remark
         Words that the provenance of each constant ends with.
     cut
-        Mask of the constants whose interval ends where another constant is at the end of its range; by default none.
+        Mask of the ends that lie where another constant is at the end of its range, shape (constants, 2); by default
+        none.
     """
 
     given: Robot
@@ -177,7 +185,7 @@ class Estimates:
     ends: Array
     spread: Array
     remark: str = ""
-    cut: Sequence[bool] = ()
+    cut: Array | bool = False
 
     @property
     def best(self) -> Robot:
@@ -186,9 +194,12 @@ class Estimates:
 
     def identified(self, source: str) -> Robot:
         """The same, with the intervals as provenance."""
-        best, known = self.best, self.as_json()["constants"].items()
-        texts = {path: f"identified from {source}; 90 %: {each['interval_text']}{self.remark}" for path, each in known}
-        return best.with_(name="identified", provenance={**best.provenance, **texts})
+        best, known = self.best, self.as_json()["constants"]
+        texts = {path: text for path, text in best.provenance.items() if path not in known}
+        for path, each in known.items():
+            text = f"identified from {source}; 90 %: {each['interval_text']}{self.remark}"
+            texts |= dict.fromkeys(best.numbers(path), text)
+        return best.with_(name="identified", provenance=texts)
 
     def as_json(self) -> dict[str, Any]:
         """Constants with their intervals, correlations, and combinations that are independent: relative changes by half
@@ -217,18 +228,20 @@ class Estimates:
         value, known = float(self.values[at]), ends.tolist() if np.isfinite(ends).all() else None
         found = {"value_si": value, "text": self._text(at, value, ends), "interval_si": known}
         none = "none found" if np.isnan(self.ends).all() else "no end found"
-        return {**found, "interval_text": self.between(at, ends, at in np.flatnonzero(self.cut)) or none}
+        cut = np.broadcast_to(self.cut, self.ends.shape)[at]
+        return {**found, "interval_text": self.between(at, ends, cut) or none}
 
-    def between(self, at: int, ends: Array, cut: bool) -> str:
+    def between(self, at: int, ends: Array, cut: Array) -> str:
         """Range of a constant in words, and whether the data or the search end it; nothing if it is NaN."""
-        (low, high), half = self.free.limits(self.values)[at], float(np.sqrt(self.spread[at, at]))
+        low, high = limits = self.free.limits(self.values)[at]
         if not np.isfinite(ends).all():
             return ""
-        cut = cut or min(ends[0] - low, high - ends[1]) <= _AT * (high - low)
-        remark = " (cut by the range searched)" if cut else ""
+        cut = cut | (np.abs(ends - limits) <= _AT * (high - low))
+        which = "" if cut.all() else "lower end " if cut[0] else "upper end "
+        remark = f" ({which}cut by the range searched)" if cut.any() else ""
         # At the end of a range the data ask for values beyond it.
         inside = min(self.values[at] - low, high - self.values[at]) > _AT * (high - low)
-        remark = " (left open by the data)" if inside and half > _OPEN * (high - low) else remark
+        remark = " (left open by the data)" if inside and np.ptp(ends) > 2.0 * _OPEN * (high - low) else remark
         return " to ".join(self._text(at, end, ends) for end in ends.tolist()) + remark
 
     def _text(self, at: int, value: float, ends: Array) -> str:

@@ -13,11 +13,12 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from chilopod import units
-from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT
+from chilopod.analysis.parameters import ALL, PAPER_UNIT
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, RobotFileError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.robot.files import described, parsed
+from chilopod.robot.parameters import place_of
 from chilopod.tasks.identify.constants import FreeConstants
 from chilopod.text_file import read_text
 from chilopod.units import Description, Quantity
@@ -149,8 +150,8 @@ class BaseSeries(Description):
             if len(given := getattr(self, name)) not in allowed:
                 shown = [units.format(each, PAPER_UNIT if name == "onset" else "1", digits=6) for each in given]
                 raise ParameterError("must be two numbers", field=name, value=shown)
-        if k1 := {K1, ALL} & {*self.free.paths}:
-            raise ParameterError("must not be k1, which the walks change", field=f"free[{k1.pop()}]")
+        if k1 := next((path for path in self.free.paths if path.startswith(ALL) and place_of(path).joints(1)), ""):
+            raise ParameterError("must not be k1, which the walks change", field=f"free[{k1}]")
         if unread := next((path for path in self.free.paths if path.startswith(_UNREAD)), ""):
             problem, sections = "must have an effect on walks of the twin", "[body], [gait], [legs], [springs], [twin]"
             raise ParameterError(problem, field=f"free[{unread}]", allowed=f"numbers of {sections}")

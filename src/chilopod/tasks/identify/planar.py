@@ -20,6 +20,7 @@ import numpy as np
 import xarray as xr
 from scipy.stats import chi2
 
+from chilopod import units
 from chilopod.analysis.parameters import ALL, PAPER_UNIT
 from chilopod.analysis.straight_walk import first_loss, pitchfork
 from chilopod.errors import AnalysisError
@@ -63,10 +64,10 @@ class Identification(Identified):
     ``residuals`` are critical k1 and components of the mode less the data, in units of their tolerance, shape (N,), at
     the best constants, and ``preset_residuals`` those of the given robot. With ``ranges`` every datum is met within its
     tolerance; ``intervals`` are 90 % profiles of chi-square, if tolerances are standard errors: shape (3, 2), SI, NaN
-    where there is none. ``cut`` says of both whether the bounds of the search, of any constant, end them, shape (2, 3).
-    ``spread`` has squares of the halves of the intervals for linear residuals, and products between them, SI, shape
-    (3, 3), NaN where standard errors do not explain the residuals. ``profile`` has, over ``forward_offset``, the fitted
-    constants, the largest residual, and predictions of numbers that were not fitted.
+    where there is none. ``cut`` says of their ends whether the bounds of the search, of any constant, cut them, shape
+    (2, 3, 2). ``spread`` has squares of the halves of the intervals for linear residuals, and products between them,
+    SI, shape (3, 3), NaN where standard errors do not explain the residuals. ``profile`` has, over ``forward_offset``,
+    the fitted constants, the largest residual, and predictions of numbers that were not fitted.
     """
 
     given: Robot
@@ -99,7 +100,7 @@ class Identification(Identified):
         """The constants with their intervals."""
         free = free_constants(self.given, self.data)
         remark = "; no constants meet all data" if np.isnan(self.ranges).any() else ""
-        return Estimates(self.given, free, self.constants, self.intervals, self.spread, remark, tuple(self.cut[1]))
+        return Estimates(self.given, free, self.constants, self.intervals, self.spread, remark, self.cut[1])
 
     def as_json(self) -> dict[str, Any]:
         """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
@@ -122,11 +123,16 @@ class Identification(Identified):
 
     def _columns(self) -> dict[str, list[str]]:
         ranges = enumerate(zip(self.ranges, self.cut[0], strict=True))
-        texts = [self.estimates.between(at, ends, cut=is_cut) or "nothing" for at, (ends, is_cut) in ranges]
+        texts = [self.estimates.between(at, ends, is_cut) or "nothing" for at, (ends, is_cut) in ranges]
         return {"allowed by the data": texts}
 
     def _remarks(self) -> list[str]:
-        said = ["tolerances are largest errors in what the data allow, and standard errors in the interval"]
+        searched = []
+        for each in free_constants(self.given, self.data).each:
+            ends = (units.format(end, self.given.unit_of(each.path), 3) for end in (each.low, each.high))
+            searched.append(f"{each.path} {' to '.join(ends)}")
+        said = [f"ranges searched: {', '.join(searched)}"]
+        said.append("tolerances are largest errors in what the data allow, and standard errors in the interval")
         if np.isnan(self.ranges).any():
             names = ["k1", *(f"component {joint}" for joint in range(1, len(self.residuals)))]
             off = ", ".join(f"{name} {each:+.1f}" for name, each in zip(names, self.residuals, strict=True))

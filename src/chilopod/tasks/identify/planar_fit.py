@@ -47,10 +47,10 @@ _MOST_LOST = 20  # robots without a pitchfork, in one search for an end
 
 
 Ends = tuple[Array, NDArray[np.bool_]]
-"""Least and largest value of each constant in a set of constants, shape (3, 2), SI, and whether the bounds of the
-search, of this or another constant, end it there, shape (3,)."""
+"""Least and largest value of each constant in a set of constants, SI, and whether the bounds of the search, of this or
+another constant, cut the set there, shape (3, 2) each."""
 
-NONE: Ends = np.full((len(FREE), 2), np.nan), np.zeros(len(FREE), dtype=bool)
+NONE: Ends = np.full((len(FREE), 2), np.nan), np.zeros((len(FREE), 2), dtype=bool)
 
 Critical = tuple[float, Array]
 """Critical k1, N*m/rad, and joint angles of the mode, of unit norm and positive sum, shape (N-1,)."""
@@ -239,7 +239,7 @@ def _ends(
             at_limit = np.abs(found[constant] - limits[constant]).min() <= _STEP  # to rounding
             if left >= -_ROOM and (left <= _EDGE or at_limit):
                 ends[constant, side] = found
-    cut = (np.abs(ends[..., None] - limits) <= _STEP).any(axis=(1, 2, 3))
+    cut = (np.abs(ends[..., None] - limits) <= _STEP).any(axis=(2, 3))
     return np.array([ends[i, :, i] for i in range(len(FREE))]) * scale[:, None], cut
 
 

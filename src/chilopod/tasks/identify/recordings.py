@@ -49,15 +49,15 @@ def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Rec
     data.free.check(robot)
     robots = []
     for at, each in enumerate(data.trajectory):
-        fixed = {text.partition("=")[0].strip() for text in each.settings}
-        for path in data.free.paths:
-            if {path, path.partition("[")[0]} & fixed:
-                raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
         try:
-            robots.append(robot.set_from_text(each.settings))
+            robots.append(own := robot.set_from_text(each.settings))
+            fixed = {number for text in each.settings for number in own.numbers(text.partition("=")[0].strip())}
         except ChilopodError as error:
             error.field = f"trajectory.{at}.settings {error.field or ''}".strip()
             raise
+        for path in data.free.paths:
+            if fixed.issuperset(own.numbers(path)):
+                raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
     free = {path.partition("[")[0] for path in data.free.paths}
     walks = [_read(*pair, folder / pair[0].file, free) for pair in zip(data.trajectory, robots, strict=True)]
     for one, other in combinations(walks, 2):
