@@ -274,6 +274,24 @@ def test_time_limits_reach_flows_of_the_user_and_settling():
         assert len(asked) < 20
 
 
+@pytest.mark.parametrize("budget", [160, 200])
+def test_an_orbit_that_is_traced_through_a_steep_place_stays_within_the_budget(budget):
+    """Twice as many return maps follow the orbit x^3 + x / 1000 = p, and again serve the search."""
+    calls = []
+
+    def family(p):
+        def image(x):
+            calls.append(p)
+            return [x[0] - 0.5 * (x[0] ** 3 + 1e-3 * x[0] - p)], [[1.0 - 0.5 * (3.0 * x[0] ** 2 + 1e-3)]]
+
+        return from_map(image, 1)
+
+    found = locate(family, (-1.0, 1.3), orbit=[-0.9997], budget=budget)
+    assert found.status is SearchStatus.BUDGET
+    assert found.evaluations < budget
+    assert len(calls) < 4 * budget
+
+
 def test_a_search_for_a_fold_ends_with_its_budget():
     """x' = p - x^2 as a map: the fold is at 0."""
 

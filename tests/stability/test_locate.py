@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
@@ -392,3 +393,77 @@ def test_a_symmetry_of_one_system_is_none_of_its_family(name, times, at):
     assert [each.special for each in branch.special_points] == [Kind.TRANSCRITICAL]
     with pytest.raises(ParameterError, match="must be False for systems without a symmetry in time"):
         follow(family, [0.0, 0.0], (0.0, 0.3), symmetric=True)
+
+
+def steep_map(p, power, bend):
+    """Its orbits are x^power + bend x = p; the radius of a second block is multiplied by 1 at x = 0.3."""
+
+    def image(x):
+        r, c, s = 1.0 - 0.5 * (0.3 - x[0]), np.cos(1.0), np.sin(1.0)
+        turned = c * x[1] - s * x[2], s * x[1] + c * x[2]
+        derivative = [
+            [1.0 - 0.25 * (power * x[0] ** (power - 1) + bend), 0.0, 0.0],
+            [0.5 * turned[0], r * c - 0.3 * x[1] ** 2, -r * s],
+            [0.5 * turned[1], r * s, r * c - 0.3 * x[2] ** 2],
+        ]
+        x0 = x[0] - 0.25 * (x[0] ** power + bend * x[0] - p)
+        return [x0, r * turned[0] - 0.1 * x[1] ** 3, r * turned[1] - 0.1 * x[2] ** 3], derivative
+
+    return from_map(image, 3)
+
+
+@pytest.mark.parametrize(("power", "bend"), [(3, 1e-3), (3, 1e-8), (5, 1e-3), (5, 1e-4), (7, 1e-3)])
+def test_an_orbit_that_changes_steeply_is_followed(power, bend):
+    """No step of the parameter is short enough where x changes by as much as 1/bend times the parameter."""
+    first = brentq(lambda x: x**power + bend * x + 1.0, -2.0, 2.0)
+    found = locate(lambda p: steep_map(p, power, bend), (-1.0, 1.0), orbit=[first, 0.0, 0.0])
+    assert (found.complete, found.searched, found.ending) == (True, (-1.0, 1.0), "")
+    (point,) = found
+    assert point.kind is Kind.NEIMARK_SACKER
+    assert abs(point.value - 0.3**power - 0.3 * bend) <= point.error_bound < 1e-11
+
+
+def steep_cycle(p, bend):
+    """A circle with (r - 1)^3 + bend (r - 1) = p, and a pair that grows from r = 1.1."""
+
+    def rhs(t, x, p, bend):
+        r = np.sqrt(x[0] ** 2 + x[1] ** 2)
+        growth, pair = p - (r - 1.0) ** 3 - bend * (r - 1.0), 0.3 * (r - 1.1)
+        return [
+            growth * x[0] - x[1],
+            growth * x[1] + x[0],
+            pair * x[2] - 1.7 * x[3] - 0.1 * x[2] ** 3,
+            pair * x[3] + 1.7 * x[2] - 0.1 * x[3] ** 3,
+        ]
+
+    return from_rhs(rhs, 4, None, args=(p, bend), guess_period=6.0)
+
+
+def test_a_cycle_that_changes_steeply_is_followed():
+    first = 1.0 + brentq(lambda x: x**3 + 1e-3 * x + 0.1, -1.0, 0.0)
+    found = locate(lambda p: steep_cycle(p, 1e-3), (-0.1, 0.1), orbit=[first, 0.0, 0.0, 0.0])
+    assert found.complete
+    assert [point.kind for point in found] == [Kind.NEIMARK_SACKER]
+    assert abs(found[0].value - 1.1e-3) <= found[0].error_bound < 1e-11
+
+
+def forced_ring(p):
+    """Three of Duffing's oscillators, forced a third of a period apart."""
+
+    def rhs(t, x, p):
+        rates = []
+        for i in range(3):
+            y, v, beside = x[2 * i], x[2 * i + 1], x[2 * i - 2] + x[(2 * i + 2) % 6]
+            force = p * np.cos(t - 2.0 * pi * i / 3.0)
+            rates += [v, -0.25 * v - y**3 - 0.3 * y**2 + 0.2 * (beside - 2.0 * y) + force]
+        return rates
+
+    return from_rhs(rhs, 6, 2.0 * pi, args=(p,))
+
+
+def test_a_forced_ring_is_followed_through_a_steep_place():
+    """The values are those of searches that begin beyond it, and of `follow`."""
+    found = locate(forced_ring, (0.05, 0.5), orbit=np.zeros(6))
+    assert found.complete
+    assert [point.kind for point in found] == [Kind.NEIMARK_SACKER] * 2
+    assert [point.value for point in found] == pytest.approx([0.17730600802, 0.34540863254], abs=1e-10)

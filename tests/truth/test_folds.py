@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from chilopod.stability import Ending, Kind, begin, follow, from_map, from_rhs, locate
 
@@ -146,3 +147,70 @@ def test_terms_of_a_map_that_cancel(power, start):
     (doubling,) = locate(family, (start - 1.0, -0.8), orbit=[-np.sqrt(-start + 0.9375)], normal_form=False)
     assert doubling.kind is Kind.PERIOD_DOUBLING
     assert abs(doubling.value + 1.0625) <= doubling.error_bound < 1e-11
+
+
+def resonance(force):
+    """Duffing's oscillator with hardening over the frequency w, in units of time in which its period is 2 pi."""
+
+    def rhs(t, x, w):
+        return [x[1] / w, (-0.1 * x[1] - x[0] - 0.5 * x[0] ** 3 + force * np.cos(t)) / w]
+
+    return lambda w: from_rhs(rhs, 2, 2.0 * np.pi, args=(w,))
+
+
+@pytest.mark.parametrize(("force", "fold"), [(0.1, 1.14103841), (0.11, 1.16164993), (0.15, 1.24727662)])
+def test_a_resonance_far_from_where_the_search_began(force, fold):
+    """The orbit grows by a factor of nine on the way; scipy confirms the orbit there and its multiplier 1."""
+    found = locate(resonance(force), (0.3, 2.5), orbit=[force, 0.0])
+    assert found.complete
+    (point,) = found
+    is_fold(point, point.value)
+    assert point.value == pytest.approx(fold, abs=1e-8)
+
+    def rhs(t, x):
+        back = np.array([[0.0, 1.0], [-1.0 - 1.5 * x[0] ** 2, -0.1]]) / point.value
+        moved = [x[1], -0.1 * x[1] - x[0] - 0.5 * x[0] ** 3 + force * np.cos(t)]
+        return np.append(np.array(moved) / point.value, back @ x[2:].reshape(2, 2))
+
+    start = np.append(point.orbit, np.eye(2))
+    end = solve_ivp(rhs, (0.0, 2.0 * np.pi), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert end[:2] == pytest.approx(point.orbit, abs=1e-9)
+    assert np.linalg.det(end[2:].reshape(2, 2) - np.eye(2)) == pytest.approx(0.0, abs=1e-7)
+
+
+def cubic(p, bend):
+    """A map whose orbits are x^3 + bend x = p: with a negative bend folds at p = 2 (-bend/3)^1.5 and its opposite."""
+
+    def image(x):
+        return [x[0] - 0.5 * (x[0] ** 3 + bend * x[0] - p), 0.1 * x[0] + 0.4 * x[1]], [
+            [1.0 - 0.5 * (3.0 * x[0] ** 2 + bend), 0.0],
+            [0.1, 0.4],
+        ]
+
+    return from_map(image, 2)
+
+
+def cubic_orbit(p, bend):
+    """The lowest one."""
+    roots = np.roots([1.0, 0.0, bend, -p])
+    return min(roots.real[np.abs(roots.imag) < 1e-5]) * np.array([1.0, 1.0 / 6.0])
+
+
+@pytest.mark.parametrize("bend", [-1e-6, -1e-4, -1e-3, -1e-2, -0.1])
+def test_one_of_two_that_are_close_together(bend):
+    """Between both the curve goes back by as little as 1e-9 of the interval."""
+    fold = 2.0 * (-bend / 3.0) ** 1.5
+    found = locate(lambda p: cubic(p, bend), (-1.0, 1.3), orbit=cubic_orbit(-1.0, bend))
+    assert found.complete
+    (point,) = found
+    is_fold(point, fold)
+
+
+@pytest.mark.parametrize("before", [1e-4, 1e-6, 1e-8, 1e-12])
+@pytest.mark.parametrize("bend", [-0.3, -0.1])
+def test_an_orbit_that_begins_just_before_its_end(bend, before):
+    fold = 2.0 * (-bend / 3.0) ** 1.5
+    found = locate(lambda p: cubic(p, bend), (fold - before, 1.3), orbit=cubic_orbit(fold - before, bend))
+    assert found.complete
+    (point,) = found
+    is_fold(point, fold)

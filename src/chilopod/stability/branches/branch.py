@@ -402,6 +402,29 @@ def find_fold(
     return None
 
 
+def rising_part(
+    family: Family, start: Start, between: tuple[float, float], scale: float, budget: Budget, points: int
+) -> tuple[list[BranchPoint], BifurcationPoint | None]:
+    """Ordinary points of a curve, with the systems' symmetry in time, from a start at the lower end of an interval to
+    the upper end, or to where the curve turns back or is lost; and the fold in which it turns back, if any."""
+    found: list[BranchPoint] = []
+
+    def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[list[BranchPoint], Ending | None]:
+        end = step.end.last
+        rises = bool(end.tangent[-1] > 0.0)  # perhaps past two folds, which a close look finds
+        return [*inspect(curve, step, rises).points, end], ending if rises else Ending.ENOUGH_POINTS
+
+    with contextlib.suppress(ChilopodError):
+        symmetric = family(start.value).symmetry is not None
+        curve = Curve(family, scale, between=between, symmetric=symmetric, budget=budget)
+        branch, anchor = opened(curve, start, _FIRST)
+        curve.first, curve.long_steps = branch.points[0], True
+        trace(curve, anchor, (_FIRST, LONGEST), points, look, lambda looked, _: found.extend(looked))
+    rising = list(itertools.takewhile(lambda each: each.special is not Kind.FOLD and each.tangent[-1] > 0.0, found))
+    fold = next((each.bifurcation for each in found[len(rising) :] if each.special is Kind.FOLD), None)
+    return [each for each in rising if each.special is None], fold
+
+
 def _derivative(curve: Curve, last: BranchPoint, distance: float) -> Array:
     """Derivative of the return, in units, at a distance from a point along its tangent."""
     section, moved = curve.section_at(last.orbit, last.value, last.period), distance * last.tangent * last.units

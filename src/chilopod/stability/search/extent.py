@@ -104,6 +104,9 @@ def _lost(samples: Samples) -> str:
 
 def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising: bool) -> BifurcationPoint | None:
     """The fold next to a sample, from the nearest of the others that is clear of it."""
+    if rising and samples.fold is not None:
+        sure = np.isfinite(samples.fold.error_bound) and _as_a_root(samples, sample, samples.fold, rising)
+        return samples.fold if sure else None
     off = np.array([each.off_plus_one for each in [sample, *others]])
     clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
     for each in [[sample, *others][i] for i in clear[:_TRIES]]:
@@ -130,12 +133,14 @@ def _as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising:
     """True if the multiplier approaches +1 as a root, as in a fold; at a crossing branch it does so linearly."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
+    places = np.clip(fold.value + (-away if rising else away), samples.low, samples.end)
+    away = np.abs(places - fold.value)
     try:
-        beside = samples.at(fold.value + (-away if rising else away))
+        beside = samples.at(places)
     except (AnalysisError, SpentError):
         return True  # no evidence against it
     off = [each.off_plus_one for each in beside]
-    return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
+    return bool(away[1] <= away[0] or off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS)
 
 
 def _at_rest(samples: Samples, value: float, state: Array, period: float) -> bool:

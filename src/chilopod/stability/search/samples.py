@@ -3,7 +3,8 @@
 A followed orbit is first sampled along a path to the upper end (``_whole_path``), each sample corrected (``_sampled``)
 from a prediction (``_predicted``); later ones lie between two of them (``_between``). Newton's method may find another
 orbit near by: a sample that jumps, turns back at a multiplier +1, or has one on another side than predicted, or is not
-on the branch of the last one is not taken, and a shorter step is tried (``_followed``).
+on the branch of the last one is not taken, and a shorter step is tried (``_followed``). Where steps of the parameter
+are too long, the orbit is traced by arclength (``_traced``), to the next value or to a fold.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
+from chilopod.stability.branches.branch import Start, rising_part
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
 from chilopod.stability.orbits.orbit import (
@@ -31,6 +33,7 @@ from chilopod.stability.orbits.orbit import (
     searched_orbit,
 )
 from chilopod.stability.orbits.shooting import Nodes
+from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.returns import return_duration, return_maps, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
@@ -82,7 +85,9 @@ class Samples:
         self.family = CheckedFamily(family)
         self.low, self.high, self.width = low, high, high - low
         self.spent = ""  # the limit that ended the path
+        self.fold: BifurcationPoint | None = None  # the fold in which the path ends, if its curve was traced to it
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
+        self._steep: set[float] = set()  # values up to which the curve was traced from the sample before
         self.count = 0  # orbits computed
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []  # its keys by size
@@ -100,7 +105,7 @@ class Samples:
         with self.budget:
             self.path = [] if self.known else self._up_to_merging(self._whole_path())
             self.end = self.path[-1].value if self.path else high
-            lost = self.end < high and not (self.spent or self.merges)
+            lost = self.end < high and not (self.spent or self.merges or self.fold)
             self.onward = None
             if lost and (self.end > low or not isinstance(guess, Orbit)):
                 last = self.path[-1]
@@ -236,9 +241,10 @@ class Samples:
             # The direction of the orbit tells it from another one that crosses it.
             places.insert(0, self.low + _BRIEF * (places[0] - self.low))
         for value in places:
-            reached = self._followed(path, value)
-            self._keep(*reached)
-            path += reached
+            for way in (self._followed, self._traced):
+                reached = way(path, value)
+                self._keep(*reached)
+                path += reached
             if path[-1].value != value:
                 self.spent = self.budget.spent or (SPENT if self.count >= self.orbits else "")
                 break
@@ -260,8 +266,8 @@ class Samples:
                 self._keep(found)
                 path.insert(i + 1, found)
                 i = max(i - 1, 1)
-            elif gap <= _NEAR_MERGED * self.width:  # H - 1 is singular where they meet
-                self.merges = True
+            elif gap <= _NEAR_MERGED * self.width and path[i + 1].value not in self._steep:
+                self.merges, self.fold = True, None  # H - 1 is singular where they meet
                 return path[: i + 1]
             else:
                 i += 1
@@ -311,6 +317,26 @@ class Samples:
                     self.merges |= closes and attempts is None  # an orbit of two rounds meets that of one
                     break
         return path[len(behind) :]
+
+    def _traced(self, behind: list[Sample], value: float) -> list[Sample]:
+        """Samples from the last one to ``value``, or to one that is next to a fold, by arclength: the orbit may change
+        so steeply that no step of the parameter is short enough."""
+        last, left, found = behind[-1], self.orbits - self.count, list[Sample]()
+        if last.value == value or self.merges or self.budget.spent or left <= 0:
+            return found
+        start = Start(last.value, last.orbit, period=last.image.period)
+        points, self.fold = rising_part(self.family, start, (last.value, value), self.width, self.budget, left)
+        try:
+            for point in points:
+                if self.fold is not None and not self.jumped(self.fold.orbit, last.orbit):
+                    break
+                if point.value > last.value:  # one that hardly rises may fall by rounding
+                    last = self._sampled(point.value, point.orbit, last)
+                    found.append(last)
+                    self._steep.add(last.value)
+        except (AnalysisError, SpentError):  # what lies between is not sampled
+            self.fold = None
+        return found
 
     def _turns_back(self, behind: list[Sample], found: Sample) -> bool:
         """True if a multiplier heads for +1 and is on the same side after a step that should pass or come nearer. The
