@@ -109,7 +109,8 @@ def locate_hopf(
         limited = "the time (`seconds`) was" if limit.late else "the equilibria (`budget`) were"
         remarks.append(f"{limited} spent before the orbit was followed beyond {at:.9g}")
     said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(found.ending)
-    return replace(found, status=status, remarks=said, evaluations=budget - left, ending=ending)
+    points = tuple(replace(each, between=(low, high)) for each in found)
+    return replace(found, points=points, status=status, remarks=said, evaluations=budget - left, ending=ending)
 
 
 def _piece(
