@@ -369,6 +369,36 @@ class TestHopf:
         assert not touch.criticality.known
         assert any("touches" in remark for remark in touching.remarks)
 
+    @pytest.mark.parametrize("gap", [0.0, 1e-8, 1e-6])
+    def test_a_touch_that_may_be_two_crossings_leaves_the_search_incomplete(self, gap):
+        found = locate_hopf(
+            lambda m: turning(lambda x, square: m * m - gap * gap - square, 1.0), (-1.0, 1.1), [0.0, 0.0]
+        )
+        assert found.status.label == "incomplete"
+        assert all(abs(abs(point.value) - gap) <= point.error_bound for point in found)
+        assert any("touches the imaginary axis, or crosses it twice" in remark for remark in found.remarks)
+
+    def test_a_pair_that_passes_zero_leaves_the_search_incomplete(self):
+        """Eigenvalues m (1 +- i sqrt 3) / 2: two become unstable, and their frequency at 0 is 0."""
+
+        def family(m):
+            return from_rhs(
+                lambda t, x: [x[1], -m * m * x[0] + m * x[1] - x[0] ** 2 - x[0] * x[1]], 2, None, guess_period=6.0
+            )
+
+        found = locate_hopf(family, (-1.0, 1.0), [0.0, 0.0])
+        assert len(found) == 0
+        assert not found.complete
+        assert any("a pair of eigenvalues passes zero" in remark for remark in found.remarks)
+
+    def test_two_real_eigenvalues_that_pass_zero_together_are_counted(self):
+        def family(m):
+            return from_rhs(lambda t, x: [m * x[0] - x[0] ** 3, m * x[1] - x[1] ** 3], 2, None, guess_period=6.0)
+
+        found = locate_hopf(family, (-1.0, 1.0), [0.0, 0.0])
+        assert found.complete
+        assert any(remark.startswith("2 eigenvalues are zero") for remark in found.remarks)
+
     def test_a_double_pair_has_no_coefficient(self):
         def twice(mu):
             return from_rhs(
@@ -492,6 +522,19 @@ class TestCycles:
         assert cycles.ending is Ending.LEFT_INTERVAL
         folds = [each.value for each in cycles.special_points if each.special is Kind.FOLD]
         assert folds == pytest.approx([-(coefficient**2) / 4.0] * (coefficient > 0.0), abs=1e-10)
+
+    @pytest.mark.parametrize(
+        ("rhs", "n", "said"),
+        [
+            (lambda t, x, m: [x[1], -4.0 * x[0] + (m - x[0] ** 2) * x[1]], 2, "is no Hopf point of this family"),
+            (lambda t, x, m: [x[1] - 2.0, -x[0] + m * (x[1] - 2.0) - x[0] ** 3], 2, "is no Hopf point of this family"),
+            (lambda t, x, m: [x[1], -x[0] + (m - x[0] ** 2) * x[1], -x[2]], 3, r"wrong shape \(2,\); allowed: \(3,\)"),
+        ],
+    )
+    def test_the_point_of_another_family_is_refused(self, rhs, n, said):
+        (point,) = locate_hopf(oscillator, (-1.0, 1.5), [0.1, 0.0])
+        with pytest.raises(ParameterError, match=said):
+            switch(lambda m: from_rhs(rhs, n, None, args=(m,), guess_period=6.0), point)
 
     def test_cycles_beyond_the_searched_interval_are_refused(self):
         (point,) = locate_hopf(oscillator, (-1.0, 0.0), [0.1, 0.0])

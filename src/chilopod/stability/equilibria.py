@@ -41,6 +41,7 @@ _SINGULAR = 1e-13  # singular value, relative to the largest, that counts as zer
 _ANGLES = 8  # angles on a circle, which separate harmonics up to the third
 _SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # spans of samples of f for differences, relative to the sizes of the states
 _SMALL = 0.01  # amplitude of the first cycle, relative to that where higher terms matter, and distance, to the room
+_RESTS = 1e-6  # velocity at an equilibrium, relative to the terms of its linear part
 _TURNS = 0.1  # largest difference of turns within the period of a small cycle from one
 _PARTS = 64  # parts of a return at which a small cycle is sampled
 _MISSED = 0.3  # largest error of the predicted first cycle, relative to its amplitude
@@ -302,8 +303,12 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
         said = "is a Hopf point whose coefficients leave the side of its cycles undecided"
         raise ParameterError(said, field="point", value=point.value)
     here, rest = equilibrium_at(family, point.value, point.orbit)
+    velocity, matrix, _ = linear_part(here, point.orbit)
+    still = (np.abs(velocity) <= _RESTS * (np.abs(matrix) @ np.abs(point.orbit))).all()
+    if not (still and has_centre(here, point.orbit, point.period)):
+        raise ParameterError("is no Hopf point of this family", field="point", value=point.value)
     form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
-    units = numerical_balance(linear_part(here, point.orbit)[1])
+    units = numerical_balance(matrix)
     side = -form.cubic.real / rate.real
     room = point.between[1] - point.value if side > 0.0 else point.value - point.between[0]
     if not room > point.error_bound:
