@@ -526,8 +526,12 @@ class TestCycles:
     @pytest.mark.parametrize(
         ("rhs", "n", "said"),
         [
-            (lambda t, x, m: [x[1], -4.0 * x[0] + (m - x[0] ** 2) * x[1]], 2, "is no Hopf point of this family"),
-            (lambda t, x, m: [x[1] - 2.0, -x[0] + m * (x[1] - 2.0) - x[0] ** 3], 2, "is no Hopf point of this family"),
+            (lambda t, x, m: [x[1], -4.0 * x[0] + (m - x[0] ** 2) * x[1]], 2, "must be a Hopf point of this family"),
+            (
+                lambda t, x, m: [x[1] - 2.0, -x[0] + m * (x[1] - 2.0) - x[0] ** 3],
+                2,
+                "must be a Hopf point of this family",
+            ),
             (lambda t, x, m: [x[1], -x[0] + (m - x[0] ** 2) * x[1], -x[2]], 3, r"wrong shape \(2,\); allowed: \(3,\)"),
         ],
     )

@@ -306,7 +306,7 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
     velocity, matrix, _ = linear_part(here, point.orbit)
     still = (np.abs(velocity) <= _RESTS * (np.abs(matrix) @ np.abs(point.orbit))).all()
     if not (still and has_centre(here, point.orbit, point.period)):
-        raise ParameterError("is no Hopf point of this family", field="point", value=point.value)
+        raise ParameterError("must be a Hopf point of this family", field="point", value=point.value)
     form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
     units = numerical_balance(matrix)
     side = -form.cubic.real / rate.real

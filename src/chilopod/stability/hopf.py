@@ -306,11 +306,8 @@ def _rate(
     frequency = float(eigenvalues[index].imag)
     sides = [float(each.eigenvalues[np.abs(each.eigenvalues - 1j * frequency).argmin()].real) for each in found]
     if between[0] < values[0] and values[1] < between[1] and sides[0] * sides[1] > 0.0:
-        raise AnalysisError(
-            "the pair only touches the imaginary axis, or crosses it twice close together",
-            field="family",
-            value=point.value,
-        )
+        said = "the pair only touches the imaginary axis, or crosses it twice close together"
+        raise AnalysisError(said, field="family", value=point.value)
     left, right = lefts[:, index].conj(), rights[:, index]
     change = left @ ((matrices[1] - matrices[0]) * ratios) @ right / (left @ right)
     return complex(change / (values[1] - values[0])), frequency
