@@ -51,6 +51,17 @@ def oscillator(mu, cubic=-1.0, linear=0.0):
     )
 
 
+def turning(growth, turns, *others):
+    """The plane with r' = growth r, which turns evenly, and other states; functions of the state and r^2."""
+
+    def rhs(t, x):
+        square = x[0] * x[0] + x[1] * x[1]
+        rate = growth(x, square)
+        return [rate * x[0] - turns * x[1], turns * x[0] + rate * x[1], *(each(x, square) for each in others)]
+
+    return from_rhs(rhs, 2 + len(others), None, guess_period=2.0 * np.pi / turns)
+
+
 def tensor_l1(a, b, c):
     """l1 of x' = a x + b(x, x) / 2 + c(x, x, x) / 6 at a Hopf point, by Kuznetsov's formula 5.39 on full tensors."""
     values, vectors = np.linalg.eig(a)
@@ -358,6 +369,36 @@ class TestHopf:
         assert not touch.criticality.known
         assert any("touches" in remark for remark in touching.remarks)
 
+    @pytest.mark.parametrize("gap", [0.0, 1e-8, 1e-6])
+    def test_a_touch_that_may_be_two_crossings_leaves_the_search_incomplete(self, gap):
+        found = locate_hopf(
+            lambda m: turning(lambda x, square: m * m - gap * gap - square, 1.0), (-1.0, 1.1), [0.0, 0.0]
+        )
+        assert found.status.label == "incomplete"
+        assert all(abs(abs(point.value) - gap) <= point.error_bound for point in found)
+        assert any("touches the imaginary axis, or crosses it twice" in remark for remark in found.remarks)
+
+    def test_a_pair_that_passes_zero_leaves_the_search_incomplete(self):
+        """Eigenvalues m (1 +- i sqrt 3) / 2: two become unstable, and their frequency at 0 is 0."""
+
+        def family(m):
+            return from_rhs(
+                lambda t, x: [x[1], -m * m * x[0] + m * x[1] - x[0] ** 2 - x[0] * x[1]], 2, None, guess_period=6.0
+            )
+
+        found = locate_hopf(family, (-1.0, 1.0), [0.0, 0.0])
+        assert len(found) == 0
+        assert not found.complete
+        assert any("a pair of eigenvalues passes zero" in remark for remark in found.remarks)
+
+    def test_two_real_eigenvalues_that_pass_zero_together_are_counted(self):
+        def family(m):
+            return from_rhs(lambda t, x: [m * x[0] - x[0] ** 3, m * x[1] - x[1] ** 3], 2, None, guess_period=6.0)
+
+        found = locate_hopf(family, (-1.0, 1.0), [0.0, 0.0])
+        assert found.complete
+        assert any(remark.startswith("2 eigenvalues are zero") for remark in found.remarks)
+
     def test_a_double_pair_has_no_coefficient(self):
         def twice(mu):
             return from_rhs(
@@ -451,6 +492,58 @@ class TestCycles:
         branch = follow(family, start, (1.0, 3.0), points=4)
         assert branch.points[-1].value > start.value
         assert branch.points[-1].stable
+
+    @pytest.mark.parametrize(("turns", "width"), [(10.0, 0.5), (1e3, 0.5), (1e3, 10.0), (1e4, 0.5)])
+    def test_growth_that_is_slow_beside_the_turns_hides_no_bifurcation(self, turns, width):
+        """r^2 = m; the rest z = 0 of z' = (r^2 - 0.05) z - z^3 loses stability at 0.05, in a pitchfork of cycles."""
+
+        def family(m):
+            assert abs(m) <= width
+            return turning(lambda x, square: m - square, turns, lambda x, square: (square - 0.05) * x[2] - x[2] ** 3)
+
+        (point,) = locate_hopf(family, (-width, width), np.zeros(3))
+        (start,) = switch(family, point)
+        assert 0.0 < start.value <= 0.01 * width
+        cycles = follow(family, start, (-width, width))
+        assert cycles.ending is Ending.LEFT_INTERVAL
+        (fork,) = cycles.special_points
+        assert fork.special is Kind.PITCHFORK
+        assert fork.value == pytest.approx(0.05, abs=1e-10)
+        assert cycles.points[0].stable
+
+    @pytest.mark.parametrize("coefficient", [-0.01, 0.01])
+    def test_a_term_of_fifth_order_that_soon_matters(self, coefficient):
+        def family(m):
+            return turning(lambda x, square: m + coefficient * square - square * square, 1e3)
+
+        (point,) = locate_hopf(family, (-1.0, 1.0), np.zeros(2))
+        (start,) = switch(family, point)
+        cycles = follow(family, start, (-1.0, 1.0))
+        assert cycles.ending is Ending.LEFT_INTERVAL
+        folds = [each.value for each in cycles.special_points if each.special is Kind.FOLD]
+        assert folds == pytest.approx([-(coefficient**2) / 4.0] * (coefficient > 0.0), abs=1e-10)
+
+    @pytest.mark.parametrize(
+        ("rhs", "n", "said"),
+        [
+            (lambda t, x, m: [x[1], -4.0 * x[0] + (m - x[0] ** 2) * x[1]], 2, "must be a Hopf point of this family"),
+            (
+                lambda t, x, m: [x[1] - 2.0, -x[0] + m * (x[1] - 2.0) - x[0] ** 3],
+                2,
+                "must be a Hopf point of this family",
+            ),
+            (lambda t, x, m: [x[1], -x[0] + (m - x[0] ** 2) * x[1], -x[2]], 3, r"wrong shape \(2,\); allowed: \(3,\)"),
+        ],
+    )
+    def test_the_point_of_another_family_is_refused(self, rhs, n, said):
+        (point,) = locate_hopf(oscillator, (-1.0, 1.5), [0.1, 0.0])
+        with pytest.raises(ParameterError, match=said):
+            switch(lambda m: from_rhs(rhs, n, None, args=(m,), guess_period=6.0), point)
+
+    def test_cycles_beyond_the_searched_interval_are_refused(self):
+        (point,) = locate_hopf(oscillator, (-1.0, 0.0), [0.1, 0.0])
+        with pytest.raises(ParameterError, match="at an end of the searched interval, beyond which its cycles lie"):
+            switch(oscillator, point)
 
 
 class TestRefusals:

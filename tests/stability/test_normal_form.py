@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError
-from chilopod.stability import Kind, from_map, locate
+from chilopod.stability import Event, Kind, from_map, from_rhs, locate
 from chilopod.stability.normal_forms.manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalFormStatus, normal_form
 from chilopod.stability.points import Criticality, criticality, kind_at_plus_one
@@ -160,6 +160,47 @@ def test_a_linear_map_is_called_so():
     assert form.status is NormalFormStatus.LINEAR
     assert abs(form.cubic) <= form.cubic_error
     assert sum(calls) <= 32
+
+
+def undefined_beyond(x, border):
+    if (np.abs(x) > border).any():
+        raise AnalysisError("diverges")
+    return -x
+
+
+def kinked_beyond(x, border):
+    return -np.minimum(x, border)
+
+
+def jumping_beyond(x, border):
+    return np.where(np.abs(x) < border, -x, 5.0 + x)
+
+
+@pytest.mark.parametrize("border", [0.3, 1e-3, 1e-9])
+@pytest.mark.parametrize("mapped", [undefined_beyond, kinked_beyond, jumping_beyond])
+def test_a_map_that_is_linear_up_to_a_border_is_called_so(mapped, border):
+    form = normal_form(lambda x: mapped(x, border), at_origin([[-1.0]], -1.0))
+    assert form.status is NormalFormStatus.LINEAR
+    assert 0.99 * form.amplitude <= border  # samples lie below the amplitude
+    assert abs(form.cubic) <= form.cubic_error
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.1, 0.3])
+def test_a_current_mode_converter_has_an_affine_return_map(ramp):
+    """The clock closes the switch, and the current opens it at 2 - ramp t, as far as both happen in every period."""
+    on = Event(lambda t, x: np.sin(2.0 * np.pi * (t - 0.1)), lambda t, x: [x[0], 1.0], direction=1)
+    off = Event(
+        lambda t, x: x[0] - 2.0 + ramp * ((t - 0.1) % 1.0) + 100.0 * (x[1] - 1.0), lambda t, x: [x[0], 0.0], direction=1
+    )
+
+    def converter(slope):
+        return from_rhs(lambda t, x: [np.where(x[1] > 0.5, 1.0, -slope), 0.0 * x[1]], 2, 1.0, events=[on, off])
+
+    (point,) = locate(converter, (0.7, 2.0), orbit=[1.6, 0.0])
+    assert point.value == pytest.approx(1.0 + 2.0 * ramp, abs=1e-12)
+    assert point.normal_form.status is NormalFormStatus.LINEAR
+    assert point.criticality is Criticality.UNDECIDED
+    assert abs(point.coefficient) <= point.coefficient_error < 1e-6
 
 
 @pytest.mark.parametrize("other", [-1.0, 1.0])

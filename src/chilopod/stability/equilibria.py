@@ -40,7 +40,8 @@ _NOTHING = 1e-13  # state, relative to its sizes during the iteration, that may 
 _SINGULAR = 1e-13  # singular value, relative to the largest, that counts as zero, in units that balance the matrix
 _ANGLES = 8  # angles on a circle, which separate harmonics up to the third
 _SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # spans of samples of f for differences, relative to the sizes of the states
-_FIRST = 1e-4, 1e-6  # cubic terms of the first cycle, relative to the frequency: amplitudes of 1/100 and 1/1000
+_SMALL = 0.01  # amplitude of the first cycle, relative to that where higher terms matter, and distance, to the room
+_RESTS = 1e-6  # velocity at an equilibrium, relative to the terms of its linear part
 _TURNS = 0.1  # largest difference of turns within the period of a small cycle from one
 _PARTS = 64  # parts of a return at which a small cycle is sampled
 _MISSED = 0.3  # largest error of the predicted first cycle, relative to its amplitude
@@ -301,24 +302,36 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
     if rate is None or point.criticality is Criticality.UNDECIDED:
         said = "is a Hopf point whose coefficients leave the side of its cycles undecided"
         raise ParameterError(said, field="point", value=point.value)
-    here, _ = equilibrium_at(family, point.value, point.orbit)
+    here, rest = equilibrium_at(family, point.value, point.orbit)
+    velocity, matrix, _ = linear_part(here, point.orbit)
+    still = (np.abs(velocity) <= _RESTS * (np.abs(matrix) @ np.abs(point.orbit))).all()
+    if not (still and has_centre(here, point.orbit, point.period)):
+        raise ParameterError("must be a Hopf point of this family", field="point", value=point.value)
     form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
-    units = numerical_balance(linear_part(here, point.orbit)[1])
-    for share in _FIRST:
+    units = numerical_balance(matrix)
+    side = -form.cubic.real / rate.real
+    room = point.between[1] - point.value if side > 0.0 else point.value - point.between[0]
+    if not room > point.error_bound:
+        said = "is a Hopf point at an end of the searched interval, beyond which its cycles lie"
+        raise ParameterError(said, field="point", value=point.value, allowed="a point from a search beyond it")
+    mode, *bends = (float(np.linalg.norm(each / units)) for each in (form.mode, form.second, form.mean))
+    # A cubic term like another eigenvalue may change the stability of cycles; growth that is too slow is not resolved.
+    slowest = float(np.sort(np.abs(rest.eigenvalues.real))[2:].min(initial=np.inf))
+    growth = max(min(slowest, _SMALL * point.frequency), _SMALL**2 * point.frequency)
+    square = _SMALL * min(growth / abs(form.cubic), room / abs(side))
+    square = min(square, (_SMALL * mode / max(bends)) ** 2) if max(bends) > 0.0 else square
+    for factor in (1.0, _SMALL, _SMALL**2):
         try:
-            return _cycle(family, point, rate, form, units, share)
+            return _cycle(family, point, rate, form, units, factor * square)
         except AnalysisError as error:
             reason = error.problem
     raise AnalysisError(f"no cycle was found beside the Hopf point: {reason}", field="point", value=point.value)
 
 
 def _cycle(
-    family: Family, point: BifurcationPoint, rate: complex, form: HopfForm, units: Array, share: float
+    family: Family, point: BifurcationPoint, rate: complex, form: HopfForm, units: Array, square: float
 ) -> tuple[float, Orbit, Array]:
-    """The cycle whose cubic term is a given fraction of the frequency, or a smaller one where the manifold is bent."""
-    mode, *bends = (float(np.linalg.norm(each / units)) for each in (form.mode, form.second, form.mean))
-    square = point.frequency / abs(form.cubic)
-    square = share * (min(square, (mode / max(bends)) ** 2) if max(bends) > 0.0 else square)
+    """The cycle of a squared amplitude by the normal form."""
     shift = -form.cubic.real / rate.real * square
     value = point.value + shift
     duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + rate.imag * shift)
@@ -326,7 +339,7 @@ def _cycle(
     rest = at_rest.state
     with UserCode("family", value):
         moved = 2.0 * (np.sqrt(square) * form.mode + square * form.second).real + square * form.mean
-        size = np.maximum(np.abs(rest + moved), np.sqrt(square) * mode * units)
+        size = np.maximum(np.abs(rest + moved), np.sqrt(square) * float(np.linalg.norm(form.mode / units)) * units)
         section = section_at(system, rest + moved, size, duration)
         found = near_orbit(system, Nodes((rest + moved)[None], duration), False, None, section)
     missed = float(np.linalg.norm((found.state - rest - moved) / units))

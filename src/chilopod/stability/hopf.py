@@ -109,7 +109,10 @@ def locate_hopf(
         limited = "the time (`seconds`) was" if limit.late else "the equilibria (`budget`) were"
         remarks.append(f"{limited} spent before the orbit was followed beyond {at:.9g}")
     said, ending = tuple(dict.fromkeys(map(_of_equilibria, remarks))), _of_equilibria(found.ending)
-    return replace(found, status=status, remarks=said, evaluations=budget - left, ending=ending)
+    points = tuple(replace(each, between=(low, high)) for each in found)
+    if any(each.rate is None and each.multiplicity <= 2 for each in points):
+        status = status.worst(SearchStatus.INCOMPLETE)
+    return replace(found, points=points, status=status, remarks=said, evaluations=budget - left, ending=ending)
 
 
 def _piece(
@@ -133,9 +136,9 @@ def _piece(
 
     def described(crossing: Crossing, _: Block | None) -> list[Found]:
         if crossing.event is CircleEvent.PLUS:
-            if _clear_of_zero(family, between, crossing.value, samples):
-                raise AnalysisError("the search resolves no eigenvalue there, and none of f is zero", field="family")
-            return [f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one"]
+            _check_zero(family, between, crossing, samples)
+            many = "an eigenvalue is" if crossing.multiplicity == 1 else f"{crossing.multiplicity} eigenvalues are"
+            return [f"{many} zero at {crossing.value:.9g}: another equilibrium meets this one"]
         if crossing.collision:
             return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]
         point = _of_map(samples, crossing, matrices, duration)
@@ -154,16 +157,20 @@ def _piece(
     return located(samples, crossings, described, ended, _POINTS), samples.path[-1]
 
 
-def _clear_of_zero(family: Family, between: tuple[float, float], value: float, samples: Samples) -> bool:
-    """True if eigenvalues of f stay away from zero by more than their errors, at a value and beside it."""
-    (sample,) = samples.at(np.array([value]))
+def _check_zero(family: Family, between: tuple[float, float], crossing: Crossing, samples: Samples) -> None:
+    """Refuse a crossing at zero if no eigenvalue of f is zero there, or if a complex pair passes."""
+    (sample,) = samples.at(np.array([crossing.value]))
     try:
-        beside = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 0.0, 1.0]), *between)
+        beside = np.clip(crossing.value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 0.0, 1.0]), *between)
         found = [equilibrium_at(family, each, sample.orbit)[1] for each in beside.tolist()]
     except AnalysisError:  # the equilibrium ends there
-        return False
+        return
     clear = [float((np.abs(each.eigenvalues) - each.error_bounds).min()) for each in found]
-    return clear[1] > 0.5 * max(clear)  # one that passes zero there is much smaller
+    if clear[1] > 0.5 * max(clear):  # one that passes zero there is much smaller
+        raise AnalysisError("the search resolves no eigenvalue there, and none of f is zero", field="family")
+    turning = [(np.abs(each.eigenvalues.imag) > each.error_bounds)[np.abs(each.eigenvalues).argmin()] for each in found]
+    if crossing.change and turning[0] and turning[2]:
+        raise AnalysisError("a pair of eigenvalues passes zero, where no cycle has a frequency", field="family")
 
 
 def _of_map(
@@ -299,7 +306,8 @@ def _rate(
     frequency = float(eigenvalues[index].imag)
     sides = [float(each.eigenvalues[np.abs(each.eigenvalues - 1j * frequency).argmin()].real) for each in found]
     if between[0] < values[0] and values[1] < between[1] and sides[0] * sides[1] > 0.0:
-        raise AnalysisError("the pair only touches the imaginary axis", field="family", value=point.value)
+        said = "the pair only touches the imaginary axis, or crosses it twice close together"
+        raise AnalysisError(said, field="family", value=point.value)
     left, right = lefts[:, index].conj(), rights[:, index]
     change = left @ ((matrices[1] - matrices[0]) * ratios) @ right / (left @ right)
     return complex(change / (values[1] - values[0])), frequency

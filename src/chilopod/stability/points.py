@@ -120,6 +120,8 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
         Consequences of the orbit's spatial symmetries, if any.
     rate
         Rate of change of the eigenvalue at a Hopf point, in 1/s per unit of the parameter.
+    between
+        Searched interval at a Hopf point, in which its first cycle lies.
     normal_form
         Normal form, with a status that explains missing numbers; None if not computed, and at folds.
     """
@@ -142,6 +144,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     modes: ComplexArray | None = None
     symmetry: SymmetricCrossing | None = None
     rate: complex | None = None
+    between: tuple[float, float] = (-np.inf, np.inf)
 
     @property
     def sentences(self) -> str:

@@ -217,6 +217,7 @@ def switch(
     period = None
     with Deadline(seconds), UserCode("family", point.value):
         system = system_of(family, point.value)
+        finite_array(point.orbit, (system.dimension,), "point")
         own = np.nan if system.period is None else point.period / system.period
         known = known or (max(1, round(own)) if np.isfinite(own) else 1)
         periods = known if periods is None else int(periods)

@@ -27,7 +27,7 @@ class NormalFormStatus(Labelled):
     """Status of a normal form; each member's ``sentence`` describes it in words."""
 
     FOUND = "found", "the coefficients hold within their errors"
-    LINEAR = "linear", "no nonlinear term was seen along the mode, however large the amplitude"
+    LINEAR = "linear", "no nonlinear term was seen along the mode, at the amplitude with the least error"
     OUT_OF_REACH = "out of reach", "at no amplitude does the return map follow a power series"
     STRONG_RESONANCE = ("strong resonance", "the pair is at a root of unity of order 1 to 4, where more terms decide")
     SEVERAL_CRITICAL = "several critical", "another multiplier is on the unit circle as well"
@@ -145,7 +145,7 @@ _TOO_FAR = 0.3  # largest useful departure
 _UP, _FIRST_DOWN = 30.0, 0.1  # longest step of the amplitude upward; step where the map cannot be evaluated
 _FAR_DOWN, _LEAST_DOWN = 1e-3, 0.3  # longest and shortest step downward where the map is far from linear
 _LOST = 1e-6  # relative departure from linearity that is too small to start from
-_BLURRED = 1e-3  # largest error at the orbit itself, relative to the amplitude
+_BLURRED = 1e-3  # largest error at the orbit itself, or hiding terms, relative to the amplitude
 _LONG_UP, _UPS = 1e3, 5  # step of the amplitude while a map seems linear, and number of such steps
 _CLOSE = 4.0  # ratio of amplitudes that ends the search
 _RESOLVED = 0.7  # proposed factor of the amplitude above which a series has converged to the noise
@@ -166,10 +166,10 @@ def _fitted(manifold: Manifold, radius: float) -> Fit | None:
     nonlinear terms, bends the curve along the centre manifold, and continues while the error of the coefficient falls.
     """
     third = (3, 0) if manifold.at.real else (2, 1)
-    # Hill climbing in the amplitude, up or down (`direction`, 0 before an error is known); `best` has the least error
-    # of the coefficient, infinite while the map seems linear.
+    # Hill climbing in the amplitude, up or down (`direction`, 0 before an error is known). `best` tells whether terms
+    # are visible where the error of the coefficient is the `least`; `least_seen` is the least one with visible terms.
     low, high = 0.0, np.inf  # largest amplitude without visible terms, and smallest too large one
-    best, best_error = None, np.inf
+    best, least, least_seen = None, np.inf, np.inf
     bends = ups = downs = reversals = 0
     direction = 0.0
     for _ in range(_TRIALS):
@@ -179,19 +179,23 @@ def _fitted(manifold: Manifold, radius: float) -> Fit | None:
             low, factor = radius, _UP
         elif sample is None or departure > _TOO_FAR:
             high, factor = radius, _FIRST_DOWN if sample is None else _toward(departure, order)
-        elif visible and best_error == np.inf and downs < _DOWNS and sample.falling and sample.shrink < _RESOLVED:
+        elif visible and least_seen == np.inf and downs < _DOWNS and sample.falling and sample.shrink < _RESOLVED:
             high, factor, downs = radius, max(sample.shrink, _FIRST_DOWN), downs + 1  # the series has not converged
         elif bends < _BENDS and manifold.bend(sample):
             bends += 1
             continue  # once more, along the better curve
-        elif not visible:  # the map is linear to its error
-            best, low, ups = (sample, dict(manifold.curve)), radius, ups + 1
-            factor = _linear_up(manifold, radius, high) if ups <= _UPS else np.inf
+        elif not visible:  # the map is linear to its error, unless this grows, as beyond a kink
+            error = sample.term(third)[1]
+            if error >= least and best and radius > best[1].radius:
+                high, factor = radius, _LEAST_DOWN
+            else:
+                best, least = ((False, sample, dict(manifold.curve)), error) if error < least else (best, least)
+                low, ups = radius, ups + 1
+                factor = _linear_up(manifold, radius, high) if ups <= _UPS else np.inf
         else:
             value, error = sample.term(third)
-            better = error < _BETTER * best_error
-            if error < best_error:
-                best, best_error = (sample, dict(manifold.curve)), error
+            better, least_seen = error < _BETTER * least_seen, min(error, least_seen)
+            best, least = ((True, sample, dict(manifold.curve)), error) if error < least else (best, least)
             full = _highest(sample) > _FULL
             if error <= _ENOUGH * abs(value) or (full and sample.shrink > _RESOLVED):
                 break
@@ -199,21 +203,21 @@ def _fitted(manifold: Manifold, radius: float) -> Fit | None:
                 direction = -1.0 if full else 1.0
             elif not better:
                 direction, reversals = -direction, reversals + 1
-                radius = best[0].radius if best else radius
+                radius = best[1].radius if best else radius
             if reversals > 1:
                 break
             # The noise in the coefficient falls with the third power of the amplitude.
             wanted = min(float(np.cbrt(error / max(_ENOUGH * abs(value), 1e-300))), _toward(departure / _FAR, order))
             factor = max(_toward(departure, order) ** 0.5, wanted, 2.0) if direction > 0.0 else 0.5
         bends = 0
-        nearer = _within(radius * factor, low, high)
-        if nearer is None:
+        if (nearer := _within(radius * factor, low, high)) is None:
             break
         radius = nearer
-    if best is None or (best_error == np.inf and np.isfinite(high)):
+    # Terms that are hidden near a border of the map may matter.
+    if best is None or (not best[0] and np.isfinite(high) and best[1].noise[-1] > _BLURRED * best[1].radius):
         return None
-    sample, manifold.curve = best
-    status = NormalFormStatus.LINEAR if best_error == np.inf else NormalFormStatus.FOUND
+    visible, sample, manifold.curve = best
+    status = NormalFormStatus.FOUND if visible else NormalFormStatus.LINEAR
     return status, sample, manifold.coefficient(sample, third)
 
 
