@@ -350,6 +350,36 @@ def test_transcritical_curves_have_no_criticality(monkeypatch):
     assert found.as_json()["folded_share"] is None
 
 
+@pytest.mark.parametrize("part", [1e-5, 1e-7])
+def test_a_curve_of_a_tiny_map_is_one(part, monkeypatch):
+    """Its steps are parts of the map, not of the numbers."""
+    monkeypatch.setattr(map_curves, "_LONGEST", 0.2)
+    (onset,) = bifurcations(ROBOT, K1, (stiffness(11.0), stiffness(13.0)), normal_form=False)
+    k1, offset = onset.point.value, ROBOT.get(OFFSET[0])
+    axes = (K1, k1 * (1.0 - part), k1 * (1.0 + part)), (OFFSET[0], offset * (1.0 - 9.0 * part), offset * (1.0 + part))
+    found = mapped(ROBOT, *axes, points=5)
+    (curve,) = found.curves
+    assert found.remarks == ()
+    assert curve.kind is Kind.PITCHFORK
+    for values, low, high in zip(curve.values[[0, -1]].T, *np.array([axis[1:] for axis in axes]).T, strict=True):
+        assert ((low <= values) & (values <= high)).all()
+    for values, error in zip(curve.values, curve.error_bound, strict=True):
+        line = ROBOT.with_value(OFFSET[0], values[1])
+        near = bifurcations(line, K1, (0.999 * k1, 1.001 * k1), normal_form=False)[0].point
+        assert abs(near.value - values[0]) <= 10.0 * error.max() * k1 / offset + near.error_bound
+
+
+def test_messages_of_the_search_do_not_reach_the_user(monkeypatch):
+    def lost(*given, **how):
+        raise AnalysisError("the curve was not found", field="start", allowed="a point located at `second`")
+
+    monkeypatch.setattr(map_curves, "follow2", lost)
+    found = mapped(ROBOT, (K1, "11 N*mm/deg", "13 N*mm/deg"), ("body.mass", "8.5 kg", "9 kg"), points=2)
+    assert set(found.remarks) == {
+        "a curve that begins at a pitchfork is not followed to its end: the curve was not found"
+    }
+
+
 def test_pitchfork_turns_along_its_curve():
     """Where the coefficients of points located one by one pass through zero."""
     offset = "legs.forward_offset"
