@@ -44,7 +44,15 @@ def size(
         ),
     ],
     twin: Annotated[bool, typer.Option("--twin", help="Let the robot walk in three dimensions too.")] = False,
-    budget: Annotated[int, typer.Option(metavar="N", min=1, help="Most robots that are evaluated.")] = 600,
+    budget: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="Most evaluations of robots, one half in the search and one to say what stands in the way; a branch "
+            "of curved walks counts as 20.",
+        ),
+    ] = 1200,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the scattered starts.")] = 0,
 ) -> None:
     """Numbers of a robot at which it does what is wished, checked in walks.
