@@ -205,9 +205,8 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
     reasons: list[set[str]] = [set() for _ in nodes]
     robots = [grid.plane.at(float(grid.x[i]), float(grid.y[j])) for j, i in nodes]
     while (apart < _ALONE).any():
-        done = int((apart >= _ALONE).sum())
+        done, at = int((apart >= _ALONE).sum()), int(apart.argmin())
         progress(done / len(nodes), f"{done} radii")
-        at = int(apart.argmin())
         (j, i), alone = nodes[at].tolist(), seeds[near[at]] is None
         for measured in tuple(tried):
             measured.near = seeds[near[at]]

@@ -176,10 +176,9 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     def _nearest(self, anchor: Spot) -> Evaluated:
         """The equations at the point of the curve nearest to a spot beside it, or on an edge of the box before it; on
         its own edge for a spot on one, as the rounding of a point beside it would hide the way there."""
-        edges = [(int(j), float(self.box[j, k])) for j, k in np.argwhere(anchor.values[:, None] == self.box)]
-        for edge in edges:
+        for j, k in np.argwhere(anchor.values[:, None] == self.box).tolist():
             with suppress(AnalysisError):
-                return self._on_edge(anchor, edge)
+                return self._on_edge(anchor, (j, float(self.box[j, k])))
         try:
             return self.along(anchor, 0.0)
         except OutsideBoxError as error:

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from cmaes import CMA
@@ -105,9 +106,7 @@ class Wish:
     @property
     def curved(self) -> bool:
         """True if only a curved walk meets it."""
-        if self.quantity == "radius":
-            return self.sense <= 0
-        return self.quantity == "work" and self.sense >= 0 and self.value > 0.0
+        return self.value > 0.0 and self.sense in {"radius": (0, -1), "work": (0, 1)}.get(self.quantity, ())
 
     def _one_sided(self, deviation: float) -> float:
         return max(0.0, deviation * -self.sense) * -self.sense if self.sense else deviation
@@ -141,7 +140,8 @@ class Search:
         self.robot, self.wishes, self.axes, self.progress, self._seed = robot, wishes, axes, progress, seed
         # The other half of the evaluations is left to say what stands in the way.
         self._budget, self._limit, self.evaluations = budget, -(-budget // 2), 0
-        self._measured = Measured(onset, following=self._branch)
+        self._following = partial(self._take, _BRANCH)
+        self._measured = Measured(onset, following=self._following)
         self.again = Measured(onset, similar=False)  # for the best place alone
         scattered = Sobol(len(axes), rng=np.random.default_rng(seed)).random(_STARTS)
         own = [self._part(each) for each in axes]
@@ -151,20 +151,16 @@ class Search:
         self._least = np.full(len(wishes), np.inf)
         self._seen: list[Array] = []
         self.is_root = len(axes) == len(wishes) == 1 and not wishes[0].sense
-        self._changed = True  # by one number, if it alone is free
-        self._spent = False
+        self._changed, self._spent = True, False  # by one number, if it alone is free; the evaluations of the search
 
     def check(self) -> None:
         """Check that curved walks are possible if they are wished."""
-        number, robot = self._measured.number, self.at(self._starts[0])
-        changed = {number.parameter, *(each.path for each in self.axes)}
+        number, robot, kind = self._measured.number, self.at(self._starts[0]), None
         wished = [wish.quantity for wish in self.wishes if wish.curved]
-        if not wished or robot.gait.half_period_symmetric or "gait.side_phase" in changed:
-            return
-        try:
-            kind = number.first(robot).point.kind
-        except ChilopodError:
-            return
+        changed = {number.parameter, *(each.path for each in self.axes)}
+        if wished and not robot.gait.half_period_symmetric and "gait.side_phase" not in changed:
+            with suppress(ChilopodError):
+                kind = number.first(robot).point.kind
         if kind is Kind.TRANSCRITICAL:
             raise AnalysisError(NO_PAIR, field=wished[0], allowed="a gait.side_phase of 180 deg")
 
@@ -173,9 +169,6 @@ class Search:
         if self.evaluations + count > self._limit:
             raise _SpentError
         self.evaluations += count
-
-    def _branch(self) -> None:
-        self._take(_BRANCH)
 
     def numbers(self, place: Array) -> Array:
         """Free numbers at a place in the unit cube, SI, evenly by their logarithm where they are positive."""
@@ -225,7 +218,7 @@ class Search:
         outcome = self._searched()
         if outcome is Outcome.MET and not _met(self._found(self.best, self.again)):
             # Onsets of neighbours have led to another bifurcation of the robot than its first.
-            self._measured = Measured(self._measured.number, similar=False, following=self._branch)
+            self._measured = Measured(self._measured.number, similar=False, following=self._following)
             self._least = np.full(len(self.wishes), np.inf)
             outcome, self.again = self._searched(), Measured(self._measured.number, similar=False)
         self._spent = outcome is Outcome.BUDGET
@@ -371,7 +364,7 @@ class Search:
             weights[pair] = np.sqrt([1.0 - share, share]) / largest
             found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights)[0])
         self._take(len(found))
-        again = Measured(self._measured.number, similar=False, following=self._branch)
+        again = Measured(self._measured.number, similar=False, following=self._following)
         again.near = self._measured.near
         missed = [self._missed(self._found(place, again)) for place in found]
 
