@@ -248,6 +248,14 @@ def test_no_pitchfork_is_said():
         curved_walks(ROBOT, K1, (stiffness(20.0), stiffness(30.0)))
 
 
+def test_why_a_gait_without_mirror_symmetry_has_no_pitchfork_is_said():
+    uneven = ROBOT.with_value("gait.side_phase", np.deg2rad(170.0))
+    with pytest.raises(
+        AnalysisError, match=r"transcritical, and no pair .* side_phase is not 180 deg; allowed: .* at 11\.93"
+    ):
+        curved_walks(uneven, K1, (stiffness(11.0), stiffness(13.0)))
+
+
 def test_written_and_printed(right, tmp_path):
     files = write_branch(right, tmp_path)
     assert all(file.stat().st_size > 0 for file in files)

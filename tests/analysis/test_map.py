@@ -19,6 +19,7 @@ from chilopod.errors import AnalysisError, ChilopodError, OutputError, Parameter
 from chilopod.progress import silent
 from chilopod.robot import load_robot
 from chilopod.stability import CodimensionTwo, Kind
+from chilopod.trials import NONE, Trial, run, summaries
 
 from peer_model import N_MM_PER_DEG, flow, mirror, with_springs
 
@@ -169,6 +170,39 @@ def test_walks_that_bend_too_far_are_told_from_radii_that_are_not_found():
     found = mapped(ROBOT, (K1, "1 N*mm/deg", "9 N*mm/deg"), ("body.mass", "8 kg", "9 kg"), points=2, also=["radius"])
     assert np.isfinite(found.radius).tolist() == [[False, True], [False, True]]
     assert found.remarks == ("at 2 of 4 values the curved walk bends a joint by more than a right angle: no radius",)
+
+
+def test_radii_of_a_tiny_map_are_those_of_the_square_root_law():
+    """Beside the onset the inverse of their square is linear, and rounding moves the walks by more than elsewhere."""
+    (onset,) = bifurcations(ROBOT, K1, (stiffness(11.0), stiffness(13.0)), normal_form=False)
+    k1 = onset.point.value * (1.0 + 1e-6 * np.array([-1.0, 1.0]))
+    mass = ROBOT.get("body.mass")
+    found = mapped(ROBOT, (K1, *k1), ("body.mass", mass, mass * (1.0 + 1e-12)), points=9, also=["radius"])
+    bends = found.x_values < onset.point.value * (1.0 - 1e-7)
+    inverse = found.radius[0, bends] ** -2
+    assert found.remarks == ()
+    np.testing.assert_allclose(
+        inverse, np.polyval(np.polyfit(found.x_values[bends], inverse, 1), found.x_values[bends]), rtol=1e-3
+    )
+
+
+def test_why_a_gait_without_mirror_symmetry_has_no_radius_is_said():
+    robot = ROBOT.with_value("gait.side_phase", np.deg2rad(150.0))
+    found = mapped(robot, (K1, "8 N*mm/deg", "9 N*mm/deg"), ("body.mass", "8 kg", "9 kg"), points=5, also=["radius"])
+    (remark,) = found.remarks
+    assert remark.startswith("at 25 of 25 values the onset is transcritical, and no pair of mirrored walks leaves it")
+
+
+def test_radii_are_corrected_from_the_gait_with_mirror_symmetry():
+    """That of a right turn, to which a walk settles."""
+    phases = np.deg2rad([172.5, 187.5])
+    axes = (K1, "8 N*mm/deg", "10 N*mm/deg"), ("gait.side_phase", *phases)
+    found = mapped(ROBOT, *axes, points=3, also=["radius"])
+    assert np.isfinite(found.radius).all()
+    assert found.remarks == ()
+    robot = ROBOT.with_value("gait.side_phase", phases[0]).with_value(K1, found.x_values[-1])
+    (record,) = run([Trial(robot, 200.0, joint_angles=(0.1,), disturbance=NONE, rate=20.0)])
+    assert summaries(robot, record)[0].axis_radius == pytest.approx(found.radius[0, -1], rel=1e-3)
 
 
 def test_a_curve_beside_another_that_does_not_explain_its_edges_is_followed():
@@ -348,6 +382,36 @@ def test_transcritical_curves_have_no_criticality(monkeypatch):
         assert line.get_linestyle() == "-."
     assert found.remarks == ("curved walks beside transcritical points are not followed to their folds",)
     assert found.as_json()["folded_share"] is None
+
+
+@pytest.mark.parametrize("part", [1e-5, 1e-7])
+def test_a_curve_of_a_tiny_map_is_one(part, monkeypatch):
+    """Its steps are parts of the map, not of the numbers."""
+    monkeypatch.setattr(map_curves, "_LONGEST", 0.2)
+    (onset,) = bifurcations(ROBOT, K1, (stiffness(11.0), stiffness(13.0)), normal_form=False)
+    k1, offset = onset.point.value, ROBOT.get(OFFSET[0])
+    axes = (K1, k1 * (1.0 - part), k1 * (1.0 + part)), (OFFSET[0], offset * (1.0 - 9.0 * part), offset * (1.0 + part))
+    found = mapped(ROBOT, *axes, points=5)
+    (curve,) = found.curves
+    assert found.remarks == ()
+    assert curve.kind is Kind.PITCHFORK
+    for values, low, high in zip(curve.values[[0, -1]].T, *np.array([axis[1:] for axis in axes]).T, strict=True):
+        assert ((low <= values) & (values <= high)).all()
+    for values, error in zip(curve.values, curve.error_bound, strict=True):
+        line = ROBOT.with_value(OFFSET[0], values[1])
+        near = bifurcations(line, K1, (0.999 * k1, 1.001 * k1), normal_form=False)[0].point
+        assert abs(near.value - values[0]) <= 10.0 * error.max() * k1 / offset + near.error_bound
+
+
+def test_messages_of_the_search_do_not_reach_the_user(monkeypatch):
+    def lost(*given, **how):
+        raise AnalysisError("the curve was not found", field="start", allowed="a point located at `second`")
+
+    monkeypatch.setattr(map_curves, "follow2", lost)
+    found = mapped(ROBOT, (K1, "11 N*mm/deg", "13 N*mm/deg"), ("body.mass", "8.5 kg", "9 kg"), points=2)
+    assert set(found.remarks) == {
+        "a curve that begins at a pitchfork is not followed to its end: the curve was not found"
+    }
 
 
 def test_pitchfork_turns_along_its_curve():

@@ -73,6 +73,21 @@ def test_edges_of_the_box_are_met_exactly():
     assert (curve.values >= [0.3, -0.7]).all()
 
 
+@pytest.mark.parametrize("width", [1e-4, 1e-6, 1e-8])
+def test_a_box_far_narrower_than_its_values_is_crossed(width):
+    """Its steps are parts of the box, and the rounding of the systems, some 1e-15, is that of the values."""
+
+    def family2(p, q):
+        size = -(p * p + q * q) + 1e-15 * np.sin(1e20 * (p + q))
+        return of_map(lambda x: (size * x, np.array([[size]])), orbit=np.zeros(1), many=True)
+
+    box = (POINT.value - width, POINT.value + 0.7 * width), (SECOND - width, SECOND + width)
+    curve = follow2(family2, POINT, box, second=SECOND)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    assert len(curve.points) < 100
+    assert np.abs(np.hypot(*curve.values.T) - 1.0).max() < 1e-14
+
+
 @pytest.mark.parametrize("off", [0.0, 1e-9, -1e-9])
 def test_no_values_outside_the_box_are_asked_for(off):
     """Of a start on its edge, which may be off by its error, either."""

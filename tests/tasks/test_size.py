@@ -11,7 +11,7 @@ from chilopod.analysis import Onset, bifurcations, curved_walks
 from chilopod.analysis.map_axes import axis
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.quantities import Measured, leading_mode
-from chilopod.errors import ChilopodError
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.progress import silent
 from chilopod.robot import Robot, load_robot
 from chilopod.tasks import size
@@ -112,7 +112,7 @@ def test_no_place_of_a_front_is_surpassed_by_another(monkeypatch):
     monkeypatch.setattr(Search, "_found", made_up)
     monkeypatch.setattr(Search, "_left_out", left_out)
     axes = tuple(axis(ROBOT, each, "free") for each in (SPRING, ("legs.forward_offset", "10 mm", "60 mm")))
-    search = Search(ROBOT, (Wish("onset", 0.1, 1), Wish("growth", -1.0, -1)), axes, Onset(), 600, 0, silent)
+    search = Search(ROBOT, (Wish("onset", 0.1, 1), Wish("growth", -1.0, -1)), axes, Onset(), 1200, 0, silent)
     outcome = search.run()
     front = np.array(search.reasons(outcome)[1])
     assert outcome is not Outcome.MET
@@ -138,6 +138,7 @@ def test_limits_and_budgets():
     assert gentle.values[1] <= 6.0
     spent = size(ROBOT, {"growth": -0.1, "onset": stiffness(30.0)}, [SPRING], budget=3)
     assert spent.outcome is Outcome.BUDGET
+    assert spent.evaluations <= 3
     assert Wish("growth", 0.0).deviation(0.5) == 0.5
     assert [Wish("radius", 1.0, -1).deviation(value) for value in (0.5, 2.0)] == [0.0, 1.0]
 
@@ -209,9 +210,42 @@ def test_curved_walks_beside_a_stable_straight_one_are_said_not_to_be_searched()
     assert any("subcritical" in reason for reason in found.reasons)
     other = size(ROBOT, {"radius": "0.6 m"}, [("springs.stiffness[0]", "13 N*mm/deg", "14 N*mm/deg")], budget=12)
     assert not any("subcritical" in reason for reason in other.reasons)
+    assert other.title == "aoi2022-planar: no robot that was tried has every wished quantity"
+    assert "the evaluations of the search were spent" in other.reasons
+    assert not any("no free number changes" in reason for reason in other.reasons)
     uneven = ROBOT.override("gait.side_phase", "150 deg")
-    found = size(uneven, {"radius": "0.6 m"}, [("springs.stiffness[0]", "9 N*mm/deg", "10 N*mm/deg")], budget=12)
+    found = size(uneven, {"radius": "0.6 m"}, [("gait.side_phase", "150 deg", "152 deg")], budget=12)
     assert any("no pitchfork (transcritical)" in reason for reason in found.reasons)
+
+
+def test_a_radius_of_a_gait_without_mirror_symmetry_is_refused_at_once(monkeypatch):
+    uneven, said = ROBOT.override("gait.side_phase", "170 deg"), r"^radius: the onset is transcritical, and no pair"
+    monkeypatch.setattr(Search, "run", None)
+    for wished in ("0.8 m", "<0.8 m"):
+        with pytest.raises(AnalysisError, match=said):
+            size(uneven, {"radius": wished, "speed": "0.1 m/s"}, [SPRING])
+    with pytest.raises(AnalysisError, match=r"^work: the onset"):
+        size(uneven, {"work": "1 mJ"}, [SPRING])
+
+
+@pytest.mark.parametrize("budget", [1, 20, 50, 130])
+def test_a_budget_is_kept_by_the_search_and_what_follows(budget, monkeypatch):
+    """A branch of curved walks counts as 20; only the robot that is returned is computed once more."""
+    asked = []
+
+    def searched(wish, measured, robot):
+        if measured.near is None and robot.get(K1) < stiffness(12.0):
+            measured._following()
+            asked.append(20)
+            measured.near = np.zeros(13), np.eye(13)
+        asked.append(0.5)
+        return (robot.get(K1) / stiffness(10.0) - 1.0) * (1.0 if wish.quantity == "radius" else -2.0) + 0.1
+
+    monkeypatch.setattr(Wish, "searched", searched)
+    axes = (axis(ROBOT, SPRING, "free"),)
+    search = Search(ROBOT, (Wish("radius", 0.8), Wish("speed", 0.1)), axes, Onset(), budget, 0, silent)
+    search.reasons(search.run())
+    assert sum(asked) <= search.evaluations <= budget
 
 
 def test_an_onset_that_is_met_is_the_first_one():
@@ -245,7 +279,7 @@ def test_a_cliff_does_not_stop_the_search(monkeypatch):
 
     monkeypatch.setattr(Search, "_found", beyond)
     axes = [axis(ROBOT, each, "free") for each in (SPRING, ("legs.forward_offset", "10 mm", "60 mm"))]
-    search = Search(ROBOT, (Wish("onset", 0.1), Wish("growth", 1.0)), tuple(axes), Onset(), 600, 0, silent)
+    search = Search(ROBOT, (Wish("onset", 0.1), Wish("growth", 1.0)), tuple(axes), Onset(), 1200, 0, silent)
     assert search.run() is not Outcome.MET
     p = np.roots([4.0, 0.0, 3.2, -3.0])[-1].real
     np.testing.assert_allclose(search.best, [p, p**2], atol=0.02)

@@ -36,6 +36,8 @@ TOLERANCE = 1e-10
 VERSION = 3
 """Version of the file of a branch, increased whenever the meaning of its data or their continuation changes."""
 
+NO_PAIR = "the onset is transcritical, and no pair of mirrored walks leaves it, as side_phase is not 180 deg"
+
 _KEYS = {
     **{"axis_radius": "axis_radius_m", "path_radius": "path_radius_m", "heading_rate": "heading_rate_rad_s"},
     **{"speed": "speed_m_s", "cost_of_transport": "cost_of_transport", "multiplier": "multiplier"},
@@ -95,7 +97,8 @@ def curved_walks(
     found = bifurcations(robot, parameter, between)
     forks = [each for each in found if each.point.kind is Kind.PITCHFORK]
     if not forks:
-        problem = "the straight walk has no pitchfork in this interval"
+        uneven = not robot.gait.half_period_symmetric and any(each.point.kind is Kind.TRANSCRITICAL for each in found)
+        problem = NO_PAIR if uneven else "the straight walk has no pitchfork in this interval"
         searched = interval_text(robot, parameter, between)
         others = [f"{each.point.kind.label} at {units.format(each.point.value, each.unit, digits=6)}" for each in found]
         here = f"here are: {', '.join(others)}" if others else "`chilopod bifurcation` lists where the walk bends"

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from chilopod.analysis.branch import NO_PAIR
 from chilopod.analysis.growth import FATES, Fate, growth_rates
 from chilopod.analysis.map_axes import DERIVED, Given, Plane
 from chilopod.analysis.map_curves import Search
@@ -25,7 +26,7 @@ from chilopod.analysis.map_grid import FATE, GROWTH, Grid
 from chilopod.analysis.map_result import StabilityMap
 from chilopod.analysis.parameters import ALL, K1
 from chilopod.analysis.quantities import TOO_BENT, Measured, Onset
-from chilopod.errors import ChilopodError, OutputError, ParameterError, known_names
+from chilopod.errors import AnalysisError, ChilopodError, OutputError, ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
 from chilopod.output import write_atomic
@@ -40,6 +41,7 @@ _LONG = 600.0  # s: a map that takes longer is announced
 _LONGEST = 4.0  # hours: one that takes longer is refused, unless its growth rates are kept
 _CURVE_RATES = 5e3  # growth rates that take as long as a curve
 _LATTICE = 24  # radii along an axis
+_ALONE = 1e9  # distance of a value whose curved walk was not found without another one
 _BRANCHES = 12  # that are followed from the onset, a few seconds each, before other radii are left out
 
 
@@ -185,7 +187,14 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
     found = np.full(bends.shape, np.nan)
     if not wanted:
         return found, []
-    tried = [Measured(number) for number in _bending(grid.plane)]
+
+    def following() -> None:
+        if not robots[at].gait.half_period_symmetric and any(NO_PAIR in each for each in reasons):
+            raise AnalysisError(NO_PAIR, field="radius")  # found out once for all
+        if sum(each.branches for each in tried) >= _BRANCHES:
+            raise AnalysisError(f"{_BRANCHES} branches are followed", field="radius")
+
+    tried = [Measured(number, following=following) for number in _bending(grid.plane)]
     rows, columns = (np.unique(np.linspace(0, size - 1, min(size, _LATTICE)).astype(int)) for size in bends.shape)
     places = np.argwhere(bends[np.ix_(rows, columns)])
     nodes = np.column_stack([rows[places[:, 0]], columns[places[:, 1]]])
@@ -193,30 +202,31 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
     places *= np.where([grid.plane.y.whole, grid.plane.x.whole], 100, 1)
     apart, near = 1e6 + grid.values[GROWTH, *nodes.T], np.zeros(len(nodes), dtype=int)
     seeds: list[tuple[Array, Array] | None] = [None] * len(nodes)
-    bent = np.zeros(len(nodes), dtype=bool)
-    for done in range(len(nodes)):
+    reasons: list[set[str]] = [set() for _ in nodes]
+    robots = [grid.plane.at(float(grid.x[i]), float(grid.y[j])) for j, i in nodes]
+    while (apart < _ALONE).any():
+        done, at = int((apart >= _ALONE).sum()), int(apart.argmin())
         progress(done / len(nodes), f"{done} radii")
-        at = int(apart.argmin())
-        j, i = nodes[at].tolist()
+        (j, i), alone = nodes[at].tolist(), seeds[near[at]] is None
         for measured in tuple(tried):
             measured.near = seeds[near[at]]
             try:
-                if sum(each.branches for each in tried) < _BRANCHES:
-                    found[j, i] = measured.walked("radius", grid.plane.at(float(grid.x[i]), float(grid.y[j])))
+                found[j, i] = measured.walked("radius", robots[at])
             except ChilopodError as error:
-                bent[at] |= error.problem == TOO_BENT
+                reasons[at].add(error.problem)
             if measured.near is not seeds[near[at]]:
                 tried.sort(key=lambda each: each is not measured)
                 seeds[at] = measured.near
                 away = np.abs(places - places[at]).sum(axis=1)
                 near[away < apart], apart = at, np.where(apart < np.inf, np.minimum(apart, away), np.inf)
                 break
-        apart[at] = np.inf
-    missing = np.isnan(found[*nodes.T])
-    folded, lost = int((missing & bent).sum()), int((missing & ~bent).sum())
-    said = {f"at {folded} of {len(nodes)} values {TOO_BENT}: no radius": folded}
-    said |= {f"{lost} of {len(nodes)} radii are not found": lost}
-    return found, [each for each, count in said.items() if count]
+        apart[at] = _ALONE if alone and seeds[at] is None else np.inf  # it is tried again beside a known one
+    missing = np.flatnonzero(np.isnan(found[*nodes.T]))
+    why = [next((each for each in (TOO_BENT, NO_PAIR) if each in reasons[at]), "") for at in missing]
+    said = [
+        f"at {why.count(each)} of {len(nodes)} values {each}: no radius" for each in (TOO_BENT, NO_PAIR) if each in why
+    ]
+    return found, [*said, *[f"{why.count('')} of {len(nodes)} radii are not found"] * ("" in why)]
 
 
 def _key(plane: Plane) -> str:

@@ -203,7 +203,7 @@ class Search:
         try:
             return list(stability.locate(family, ends, normal_form=normal_form))
         except ChilopodError as error:
-            self.remarks.append(f"a bifurcation between two neighbours is not located: {error}")
+            self.remarks.append(f"a bifurcation between two neighbours is not located: {error.problem}")
             return []
 
     def _fold(self, edge: Edge, at: BifurcationPoint | Point2, p: float, q: float, n: int) -> list[BifurcationPoint]:
@@ -254,7 +254,9 @@ class Search:
                 for fold in self._fold(edge, middle, p, q, len(subcritical)):
                     self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
-            self.remarks.append(f"a curve that begins at a {point.kind.label} is not followed to its end: {error}")
+            self.remarks.append(
+                f"a curve that begins at a {point.kind.label} is not followed to its end: {error.problem}"
+            )
 
     def _add(self, curve: Curve2, edge: Edge, *begin: Any) -> None:
         """Keep a curve in the order of the map's axes, from where it begins, and say where it ends before it should."""
@@ -266,7 +268,8 @@ class Search:
         coefficient = np.array([np.nan] * len(begin) + coefficients)
         self.curves.append(MapCurve(curve.kind, values, errors, coefficient, special))
         for ending in dict.fromkeys(each for each in curve.endings if each in _CUT_OFF):
-            self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {ending.sentence}")
+            why = f"after {len(curve.points)} points" if ending is Ending.ENOUGH_POINTS else ending.sentence
+            self.remarks.append(f"a curve of {curve.kind.label} points ends on the map: {why}")
 
     def _coefficient(self, kind: Kind, point: BifurcationPoint | Point2, place: Array) -> float:
         """Cubic coefficient for an amplitude of joint angles, as of one robot; NaN if there is none."""

@@ -37,6 +37,7 @@ _ALIKE = 1e-9  # relative difference of the moduli of a pair
 _BESIDE = 1e-3  # relative distance of its second value
 _CORRECTIONS = 20  # of a neighbouring curved walk
 _CORRECTED = 1e-12  # last correction of its state, SI
+_ROUNDING = 1e-6  # last one relative to the bend, at most, where rounding leaves more than that beside the onset
 _BENT = 1e-6  # least sum of its joint angles, rad
 
 QUANTITIES = {
@@ -181,8 +182,9 @@ class Measured:
         State of the curved walk from which the next is corrected, and inverse of the slope of what it lacks.
     """
 
-    def __init__(self, number: Onset, similar: bool = True) -> None:
-        self.number, self.branches, self._similar = number, 0, similar
+    def __init__(self, number: Onset, similar: bool = True, following: Callable[[], None] = lambda: None) -> None:
+        """The number, whether robots are similar, and a function that is called before a branch is followed."""
+        self.number, self.branches, self._similar, self._following = number, 0, similar, following
         self._critical: float | None = None
         self.near: tuple[Array, Array] | None = None
         self._last: tuple[Robot, WalkMeans] | None = None
@@ -287,13 +289,17 @@ class Measured:
 
     def _followed(self, robot: Robot, model: PlanarModel) -> Array:
         """State of the curved walk from its branch."""
+        self._following()
         self.branches += 1
         path, (low, high) = self.number.parameter, self.number.interval(robot)
         at = robot.get(path)
         walks = curved_walks(robot, path, (low, at) if self.number.rises(robot) else (at, high))
         if float(walks.parameter_si[-1]) != at:
             raise AnalysisError(f"has no curved walk there: the branch ends, {walks.attrs['ending']}", field=path)
-        return np.asarray(find_orbit(model, walks.orbit.values[-1]).state)
+        state = np.asarray(find_orbit(model, walks.orbit.values[-1]).state)
+        if not abs(float(state[3 : model.modules + 2].sum())) > _BENT:
+            raise AnalysisError("the curved walk is too near the straight one to be told from it", field=path)
+        return state
 
 
 def _corrected(model: PlanarModel, state: Array, inverse: Array) -> tuple[Array, Array] | None:
@@ -309,14 +315,15 @@ def _corrected(model: PlanarModel, state: Array, inverse: Array) -> tuple[Array,
             for _ in range(_CORRECTIONS):
                 step = -inverse @ left
                 state, before = state + step, left
-                if float(np.abs(step).max()) <= _CORRECTED:
-                    return (state, inverse) if side * state[joints].sum() > _BENT else None
+                size, bend = float(np.abs(step).max()), float(side * state[joints].sum())
+                if size <= _CORRECTED:
+                    break
                 left = model.flow_states(state[None], 0.0, model.period)[0] - state
                 change = inverse @ (left - before)
                 inverse = inverse + np.outer(step - change, step @ inverse) / (step @ change)
         except AnalysisError:
             return None
-    return None
+    return (state, inverse) if bend > _BENT and size <= max(_CORRECTED, _ROUNDING * bend) else None
 
 
 def unit_of(quantity: str, robot: Robot, onset: Onset) -> str:

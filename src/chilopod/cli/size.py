@@ -44,7 +44,7 @@ def size(
         ),
     ],
     twin: Annotated[bool, typer.Option("--twin", help="Let the robot walk in three dimensions too.")] = False,
-    budget: Annotated[int, typer.Option(metavar="N", min=1, help="Most robots that are evaluated.")] = 600,
+    budget: Annotated[int, typer.Option(metavar="N", min=1, help="Most evaluations of robots.")] = 1200,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the scattered starts.")] = 0,
 ) -> None:
     """Numbers of a robot at which it does what is wished, checked in walks.
@@ -52,8 +52,9 @@ def size(
     A wish that begins with < or > is a limit. One wish on one free number is solved as an equation, others by least
     squares within the ranges. If no robot meets all wishes, it names the nearest one, the ends of ranges and the wishes
     that stand in the way, and the Pareto front of two wishes that conflict. The robot walks in the planar model, and
-    with --twin in three dimensions. With --out, writes sized.toml, whose provenance says what was computed and what was
-    copied.
+    with --twin in three dimensions. One half of --budget is for the search, the other to say what stands in the way; a
+    branch of curved walks counts as 20. With --out, writes sized.toml, whose provenance says what was computed and what
+    was copied.
 
     Example: chilopod size aoi2022-planar --radius "0.8 m" --free "springs.stiffness[0]=5..60 N*mm/deg" --out sized
     """

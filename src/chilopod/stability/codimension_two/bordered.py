@@ -20,6 +20,7 @@ a frame of its own and a tangent (:class:`Spot`), from which the tracer takes it
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,8 +41,10 @@ Family2 = Callable[[float, float], SystemLike]
 
 _AT_ZERO = 1e6  # change over the box, relative to the sizes of the states, of an orbit at zero
 _STEP = 1e-6  # step of differences, in units of the frame: it affects only the speed of Newton's method
+_RESOLVED, _LONGEST = 1e-8, 0.1  # least such step of a parameter, relative to its values, and the longest
 _APART = 0.3  # overlap of v and w above which v and w are the borders b and c
 _DOUBLE = 1e-13  # singular value, relative to the largest, of a bordered matrix that is singular: G errs as much
+_MEETING = 1e-4  # smallest singular value of the equations, in units, where curves of orbits meet
 _STALLED = 3  # corrections that did not halve a small residual, as Broyden's method may stall that long
 
 
@@ -138,11 +141,15 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     first: Spot  # first point of the curve
     shrinks = SHRINKS  # reason for its end where its cycles do
     _motion = 0.0  # largest motion within a period so far
-    precision = ROUND_OFF
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
         self._family2, self.target, self.known = family2, target, known
         self.box, self.widths, self.budget = box, box[:, 1] - box[:, 0], budget
+        # In units of a narrow interval the rounding of the values is coarser.
+        values = np.abs(box).max(axis=1) / self.widths
+        self._steps = np.clip(_RESOLVED * values, _STEP, _LONGEST)
+        self.narrowness = max(1.0, np.finfo(float).eps / ROUND_OFF * float(values.max()))
+        self.precision, self.settled = self.narrowness * ROUND_OFF, self.narrowness * SETTLED
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
@@ -167,14 +174,22 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return self.spot(found.place, anchor.frame, None)
 
     def _nearest(self, anchor: Spot) -> Evaluated:
-        """The equations at the point of the curve nearest to a spot beside it, or on an edge of the box before it."""
+        """The equations at the point of the curve nearest to a spot beside it, or on an edge of the box before it; on
+        its own edge for a spot on one, as the rounding of a point beside it would hide the way there."""
+        for j, k in np.argwhere(anchor.values[:, None] == self.box).tolist():
+            with suppress(AnalysisError):
+                return self._on_edge(anchor, (j, float(self.box[j, k])))
         try:
             return self.along(anchor, 0.0)
         except OutsideBoxError as error:
-            j, end = error.edge
-            row = np.eye(anchor.tangent.size)[anchor.frame.parameters.start + j]
-            plane = Plane(row, float((end - anchor.values[j]) / self.widths[j]), error.edge)
-            return self.step(anchor, Guess(plane.target * row, anchor.matrix), plane).found
+            return self._on_edge(anchor, error.edge)
+
+    def _on_edge(self, anchor: Spot, edge: tuple[int, float]) -> Evaluated:
+        """The equations at the point of the curve on an edge of the box beside a spot."""
+        j, end = edge
+        row = np.eye(anchor.tangent.size)[anchor.frame.parameters.start + j]
+        plane = Plane(row, float((end - anchor.values[j]) / self.widths[j]), edge)
+        return self.step(anchor, Guess(plane.target * row, anchor.matrix), plane).found
 
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
         """A point on the curve, in a frame adapted to it, with its tangent along the one ``before``."""
@@ -205,7 +220,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def met(self, anchor: Spot, found: Evaluated, off: float, stalled: int, singular: bool) -> bool:
         """True if the residual is round-off, or small and no longer falls."""
-        return off <= ROUND_OFF or (off <= SETTLED and stalled >= _STALLED)
+        return off <= self.precision or (off <= self.settled and stalled >= _STALLED)
 
     def step(self, anchor: Spot, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Spot, Evaluated]:
         solved = self.corrected(anchor, guess, plane)
@@ -253,6 +268,10 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         state = spot.image.across @ (frame.size * (frame.basis @ direction[:m]))
         return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
 
+    def meets(self, spot: Spot) -> bool:
+        """True if the equations are singular, as where curves of orbits meet."""
+        return bool(np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING / self.narrowness)
+
     def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
         """Displacement of the first point, its tangent, and coordinates that do not change with the time 0."""
         frame, first = anchor.frame, self.first
@@ -282,13 +301,14 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             values = place.values.copy()
             values[j] += self._inward(place, j) * self.widths[j]
             moved = self._mapped(replace(place, values=values), section, False)[1].state - image.state
-            reach = max(reach, float((np.abs(moved) / size).max()) / _STEP)
+            reach = max(reach, float((np.abs(moved) / size).max()) / self._steps[j])
         at_zero = reach > (_AT_ZERO if place.state.any() else 0.0)
         return size * reach if at_zero else size
 
     def _inward(self, place: Place, j: int) -> float:
         """A step of one parameter, in units of its interval, that stays within it."""
-        return _STEP if place.values[j] + _STEP * self.widths[j] <= self.box[j, 1] else -_STEP
+        step = float(self._steps[j])
+        return step if place.values[j] + step * self.widths[j] <= self.box[j, 1] else -step
 
     def _framed(self, system: SystemLike, place: Place, image: ReturnMap, size: Array, before: Frame | None) -> Frame:
         """The frame at a place; its borders come from the previous frame, so that they change continuously."""

@@ -41,7 +41,6 @@ _BESIDE = 1e-3  # step of the differences of a test function, relative to the cu
 _AROUND = 0.001, 0.01, 0.1  # distances, in steps, from a place without a test function
 _POLE = 0.1  # value at a sign change, relative to those at the ends of a step, above which it is a pole
 _JUMP = 0.5  # the same for values beside it, which are at most 0.2 at a simple zero
-MEETING = 1e-4  # smallest singular value of the equations, in units, where curves of orbits meet
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
@@ -270,7 +269,7 @@ class Detector:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
         if reverses(here.system, mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
-        meets = self.curve.known or np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= MEETING
+        meets = self.curve.known or self.curve.meets(spot)
         return together(self._kind, Kind.BRANCH_POINT if meets else Kind.FOLD)
 
 

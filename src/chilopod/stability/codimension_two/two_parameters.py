@@ -23,7 +23,7 @@ from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, in_one_line
 from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Family2, Place, Spot
 from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
-from chilopod.stability.codimension_two.detection import MEETING, Critical, Detector, Station, across
+from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.equilibria import SHRINKS
@@ -200,7 +200,7 @@ def _followed(
             return curve.evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
 
         about = curve.system(end.values), end.place.state, end.image.duration
-        if reason.startswith("step:") and np.linalg.svd(end.matrix[:-1], compute_uv=False)[-1] <= MEETING:
+        if reason.startswith("step:") and curve.meets(end):
             reason = _TIP
         reason = event_beside(*about, derivative) or reason
     return _Half(kept, ending, reason)

@@ -133,6 +133,7 @@ class Equations(ABC, Generic[A, S, R]):
     box: Array  # intervals of the parameters, shape (parameters, 2): all evaluations are inside
     budget: Budget
     precision: float  # residual, in units of the parameters, that counts as zero
+    settled = tolerances.SETTLED  # error that may stop falling
 
     @abstractmethod
     def parameters(self, anchor: A) -> tuple[slice, Array]:
@@ -199,7 +200,7 @@ class Equations(ABC, Generic[A, S, R]):
             residual = np.append(equations + matrix[:-1, parameters] @ strays, plane.row @ moved - plane.target)
             updated = _updated(inverse, move, inverse @ (residual - last)) if rounds else inverse
             off = self.off(found, residual, updated @ residual)
-            if not np.isfinite(off) or (off > tolerances.DIVERGING * best and off > tolerances.SETTLED):
+            if not np.isfinite(off) or (off > tolerances.DIVERGING * best and off > self.settled):
                 raise AnalysisError("corrections diverge", field="step")
             stalled = stalled + 1 if off > 0.5 * best else 0
             met = self.met(anchor, found, off, stalled, singular)

@@ -37,7 +37,7 @@ def size(
     onset: Onset = Onset(),  # noqa: B008 (frozen)
     *,
     twin: bool = False,
-    budget: int = 600,
+    budget: int = 1200,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Sizing:
@@ -55,8 +55,8 @@ def size(
     twin
         True to let the robot walk in three dimensions too.
     budget, seed
-        Most evaluations of a robot, some 20 ms each, and as many again to say what stands in the way; seed of the
-        scattered starts.
+        Most evaluations of robots, some 20 ms each, one half in the search and one to say what stands in the way; a
+        branch of curved walks counts as 20. Seed of the scattered starts.
     progress
         Function of the fraction done (0 to 1) and a few words.
 
@@ -64,6 +64,8 @@ def size(
     ------
     ParameterError
         If a wish or a range is not one, or two of the ranges change the same number.
+    AnalysisError
+        If a curved walk is wished, and none leaves the straight one with this gait.
     """
     names = known_names([*wishes], QUANTITIES, "wishes")
     given = tuple(parsed_wish(robot, onset, name, wishes[name]) for name in names)
@@ -73,6 +75,7 @@ def size(
     if budget < 1:
         raise ParameterError("must be positive", field="budget", value=budget)
     search = Search(robot, given, axes, onset, budget, seed, progress)
+    search.check()
     outcome = search.run()
     reasons, front = search.reasons(outcome)
     found, again = search.at(search.best), search.again

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Sizing(Summary, ReadOnlyArrays):
-    """A robot that does what is wished, or comes nearest to it.
+    """A robot that does what is wished, or comes nearest to it if one has every wished quantity.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Sizing(Summary, ReadOnlyArrays):
     walks
         Ends of a walk by the name of the engine, see :func:`chilopod.tasks.radius_law.end_of_walk`.
     evaluations
-        Number of robots that were evaluated; a branch of curved walks counts as 20.
+        Number of evaluations of robots; a branch of curved walks counts as 20.
     """
 
     robot: Robot

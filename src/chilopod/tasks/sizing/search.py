@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from cmaes import CMA
@@ -26,9 +27,10 @@ from scipy.optimize import brentq, least_squares
 from scipy.stats.qmc import Sobol
 
 from chilopod import units
+from chilopod.analysis.branch import NO_PAIR
 from chilopod.analysis.map_axes import Axis
 from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mode
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.planar import PlanarModel
@@ -59,7 +61,8 @@ class Outcome(Labelled):
     OTHERWISE = "walks otherwise", "the wishes are met in theory, but a walk that starts bent does something else"
     SLOW = "not settled", "the wishes are met in theory; a walk of 15 minutes that starts bent has not settled"
     UNMET = "unmet", "no robot that was tried meets every wish; this one comes nearest"
-    BUDGET = "budget", "the evaluations were spent before every wish was met; this robot came nearest"
+    BUDGET = "budget", "the evaluations of the search were spent before every wish was met; this robot came nearest"
+    LACKING = "lacking", "no robot that was tried has every wished quantity"
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,11 @@ class Wish:
             return float(getattr(measured, self.quantity)(robot))
         return np.nan
 
+    @property
+    def curved(self) -> bool:
+        """True if only a curved walk meets it."""
+        return self.value > 0.0 and self.sense in {"radius": (0, -1), "work": (0, 1)}.get(self.quantity, ())
+
     def _one_sided(self, deviation: float) -> float:
         return max(0.0, deviation * -self.sense) * -self.sense if self.sense else deviation
 
@@ -130,7 +138,10 @@ class Search:
         progress: Progress,
     ) -> None:  # fmt: skip
         self.robot, self.wishes, self.axes, self.progress, self._seed = robot, wishes, axes, progress, seed
-        self._measured, self._budget, self._limit, self._robots = Measured(onset), budget, budget, 0
+        # The other half of the evaluations is left to say what stands in the way.
+        self._budget, self._limit, self.evaluations = budget, -(-budget // 2), 0
+        self._following = partial(self._take, _BRANCH)
+        self._measured = Measured(onset, following=self._following)
         self.again = Measured(onset, similar=False)  # for the best place alone
         scattered = Sobol(len(axes), rng=np.random.default_rng(seed)).random(_STARTS)
         own = [self._part(each) for each in axes]
@@ -140,12 +151,24 @@ class Search:
         self._least = np.full(len(wishes), np.inf)
         self._seen: list[Array] = []
         self.is_root = len(axes) == len(wishes) == 1 and not wishes[0].sense
-        self._changed = True  # by one number, if it alone is free
+        self._changed, self._spent = True, False  # by one number, if it alone is free; the evaluations of the search
 
-    @property
-    def evaluations(self) -> int:
-        """Evaluations so far."""
-        return self._robots + _BRANCH * self._measured.branches
+    def check(self) -> None:
+        """Check that curved walks are possible if they are wished."""
+        number, robot, kind = self._measured.number, self.at(self._starts[0]), None
+        wished = [wish.quantity for wish in self.wishes if wish.curved]
+        changed = {number.parameter, *(each.path for each in self.axes)}
+        if wished and not robot.gait.half_period_symmetric and "gait.side_phase" not in changed:
+            with suppress(ChilopodError):
+                kind = number.first(robot).point.kind
+        if kind is Kind.TRANSCRITICAL:
+            raise AnalysisError(NO_PAIR, field=wished[0], allowed="a gait.side_phase of 180 deg")
+
+    def _take(self, count: int) -> None:
+        """Count evaluations before they are made."""
+        if self.evaluations + count > self._limit:
+            raise _SpentError
+        self.evaluations += count
 
     def numbers(self, place: Array) -> Array:
         """Free numbers at a place in the unit cube, SI, evenly by their logarithm where they are positive."""
@@ -170,10 +193,8 @@ class Search:
 
     def deviations(self, place: Array) -> Array:
         """Deviations of a robot from all wishes, see :meth:`Wish.searched`; keeps the best place."""
-        if self.evaluations >= self._limit:
-            raise _SpentError
-        self._robots += 1
-        self.progress(min(0.99, 0.5 * self.evaluations / self._budget), f"{self._robots} robots")
+        self._take(1)
+        self.progress(min(0.99, self.evaluations / self._budget), f"{self.evaluations} evaluations")
         found = self._found(place, self._measured)
         self._seen.append(found)
         # Far from all wishes, a robot that has every quantity is nearer than one that has not.
@@ -197,15 +218,16 @@ class Search:
         outcome = self._searched()
         if outcome is Outcome.MET and not _met(self._found(self.best, self.again)):
             # Onsets of neighbours have led to another bifurcation of the robot than its first.
-            branches, self._measured = self._measured.branches, Measured(self._measured.number, similar=False)
-            self._measured.branches, self._limit = branches, self.evaluations + self._budget
+            self._measured = Measured(self._measured.number, similar=False, following=self._following)
             self._least = np.full(len(self.wishes), np.inf)
             outcome, self.again = self._searched(), Measured(self._measured.number, similar=False)
-        return outcome
+        self._spent = outcome is Outcome.BUDGET
+        lacking = FAILED in self._least or not np.isfinite(self._missed(self._least)).all()
+        return Outcome.LACKING if lacking else outcome
 
     def _searched(self) -> Outcome:
         limit, unmet = self._limit, Outcome.BUDGET
-        self._limit -= int(_EVOLVED * self._budget) if len(self.axes) > 1 else 0
+        self._limit -= int(_EVOLVED * (limit - self.evaluations)) if len(self.axes) > 1 else 0
         with suppress(_SpentError):
             if self.is_root:
                 self._root()
@@ -283,8 +305,10 @@ class Search:
         """Sentences about what stands in the way, and places on the Pareto front of two wishes that conflict."""
         if outcome is Outcome.MET:
             return [] if self._changed else [_unchanged(self.wishes[0])], []
-        self._limit = self.evaluations + self._budget
+        self._limit = self._budget
         said, best, least = self._obstacles(), self.best, self._least
+        if self._spent and outcome is Outcome.LACKING:
+            said.append("the evaluations of the search were spent")
         front: list[Array] = []
         try:
             if len(self.wishes) > 1:
@@ -296,7 +320,7 @@ class Search:
         except _SpentError:
             said.append("the evaluations were spent before it was known which wishes conflict")
         self.best, self._least = best, least
-        return said or ["no end of a range and no other wish stands in the way: the search saw none nearer"], front
+        return said or ["no end of a range and no other wish stands in the way"], front
 
     def _obstacles(self) -> list[str]:
         """Sentences about ends of ranges at the best place, and about wishes that nothing changes."""
@@ -307,7 +331,7 @@ class Search:
                 said.append(f"{each.path} is at the {end} end of its range, {units.format(value, each.unit, digits=6)}")
         seen = np.array([found for found in self._seen if FAILED not in found]).reshape(-1, len(self.wishes))
         for wish, values in zip(self.wishes, seen.T, strict=True):
-            if values.size and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
+            if values.size and not self._spent and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
                 said.append(_unchanged(wish))
             if wish.quantity == "radius":
                 said += self._without_walks(self.at(self.best))
@@ -339,7 +363,10 @@ class Search:
             weights = np.full(len(self.wishes), _OTHERS)
             weights[pair] = np.sqrt([1.0 - share, share]) / largest
             found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights)[0])
-        missed = [self._missed(self._found(place, self.again)) for place in found]
+        self._take(len(found))
+        again = Measured(self._measured.number, similar=False, following=self._following)
+        again.near = self._measured.near
+        missed = [self._missed(self._found(place, again)) for place in found]
 
         def surpassed(own: Array) -> bool:
             gains = [own[pair] - other[pair] for other in missed]
