@@ -247,9 +247,8 @@ def _draw_durations(data: xr.Dataset, narrow: bool) -> Figure:
         axes["C"].plot(times, share, color=color, marker=marker, lw=3.4 - 0.8 * i, ms=10.0 - 2.0 * i, label=label)
     axes["C"].set(ylabel="walks that curve (%)", title="C  Share that curves")
     for letter, each in axes.items():
-        shapes.finish(
-            each, legend=None if letter == "A" else "best", xlabel="walks last (s)", xlim=(0.0, 1.05 * times.max())
-        )
-        each.set_ylim(0.0, 1.1 * max(each.dataLim.y1, np.nextafter(0.0, 1.0)))
-    axes["C"].set_ylim(-4.0, 104.0)
+        top = 1.1 * max(each.dataLim.y1, np.nextafter(0.0, 1.0))
+        each.set(ylim=(-4.0, 104.0) if letter == "C" else (0.0, top), xlim=(0.0, 1.05 * times.max()))
+        shapes.finish(each, legend="upper right" if letter == "B" else None, xlabel="walks last (s)")
+    axes["C"].legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.05), columnspacing=1.0, handlelength=1.5)
     return figure
