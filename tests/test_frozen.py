@@ -19,7 +19,7 @@ from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.flow import _advance
 from chilopod.planar.stretch import walk_abreast
 from chilopod.robot import load_robot
-from chilopod.stability.branches.branch import find_fold
+from chilopod.stability.branches.parts import find_fold
 from chilopod.stability.orbits.orbit import find_orbit
 from chilopod.stability.spectrum import spectrum
 from chilopod.steering.criteria import Criteria, Outcome

@@ -24,7 +24,7 @@ from chilopod.stability import (
     multipliers,
     sweep,
 )
-from chilopod.stability.branches.branch import find_fold
+from chilopod.stability.branches.parts import find_fold
 from chilopod.stability.unit_circle.crossings import SearchStatus
 from helpers.systems import duffing, linear, lorenz
 

@@ -13,7 +13,7 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
-from chilopod.stability.branches.branch import find_fold
+from chilopod.stability.branches.parts import find_fold
 from chilopod.stability.crossing_place import Sample
 from chilopod.stability.equilibria import SHRINKS, has_centre
 from chilopod.stability.interface import checked_flow, returns_per_period

@@ -20,7 +20,8 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import UserCode
 from chilopod.flows.deadline import Budget, SpentError
 from chilopod.frozen import Array
-from chilopod.stability.branches.branch import Start, rising_part
+from chilopod.stability.branches.branch_starts import Start
+from chilopod.stability.branches.parts import rising_part
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
 from chilopod.stability.orbits.orbit import (
