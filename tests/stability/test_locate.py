@@ -142,7 +142,7 @@ def test_a_pair_that_meets_on_the_real_axis_is_no_bifurcation():
 
 
 @pytest.mark.parametrize(
-    "between", [(1.0, 0.0), (0.0, 0.0), (0.0, np.inf), (np.nan, 1.0), (0.0,), (0, 1, 2), "ab", None]
+    "between", [(1.0, 0.0), (0.0, 0.0), (0.0, np.inf), (np.nan, 1.0), (0.0,), (0, 1, 2), "ab", None, (1e6, 1e6 + 2e-9)]
 )
 def test_a_bad_interval_is_one_line(between):
     with pytest.raises(ParameterError) as error:
@@ -467,3 +467,18 @@ def test_a_forced_ring_is_followed_through_a_steep_place():
     assert found.complete
     assert [point.kind for point in found] == [Kind.NEIMARK_SACKER] * 2
     assert [point.value for point in found] == pytest.approx([0.17730600802, 0.34540863254], abs=1e-10)
+
+
+@pytest.mark.parametrize("width", [5e-5, 2e-7])
+def test_an_interval_that_is_narrow_beside_its_values(width):
+    """Period doubling of the logistic map at r = 3, with r = 3 + 1e4 (p - 1e6)."""
+
+    def family(p):
+        r = 3.0 + 1e4 * (p - 1e6)
+        return from_map(lambda x: ([r * x[0] * (1 - x[0])], [[r * (1 - 2 * x[0])]]), 1)
+
+    found = locate(family, (1e6 - 0.4 * width, 1e6 + 0.6 * width), [0.64])
+    assert found.complete
+    (point,) = found.points
+    assert point.kind is Kind.PERIOD_DOUBLING
+    assert abs(point.value - 1e6) <= point.error_bound < 1e-8

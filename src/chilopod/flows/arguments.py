@@ -245,11 +245,16 @@ def check_arguments(**given: object) -> None:
             raise ParameterError("must be a truth value", field=field, value=value, allowed="True or False")
 
 
-def checked_interval(between: object) -> tuple[float, float]:
-    """An interval as two finite numbers, the second of which is larger."""
+_NARROWEST = 1e-13  # width of an interval, relative to its values: some 500 floating-point numbers
+
+
+def checked_interval(between: object, narrowest: float = _NARROWEST) -> tuple[float, float]:
+    """An interval as two finite numbers, the second of which is larger, wider than ``narrowest`` relative to them."""
     low, high = finite_array(between, (2,), "between").tolist()
     if not (low < high and np.isfinite(high - low)):
         raise ParameterError("must rise", field="between", value=between, allowed="(lower, higher), both finite")
+    if not high - low > narrowest * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
+        raise ParameterError("is too narrow for double precision", field="between", value=between)
     return low, high
 
 

@@ -181,7 +181,7 @@ def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
 
 def _touch_error(course: Course, crossing: Crossing, uncertain: float) -> float:
     """Error of the place where a multiplier touches the circle and turns back: its distance is a parabola."""
-    step = _TOUCH_STEP * course.width
+    step = max(_TOUCH_STEP * course.width, course.beside)
     around = np.clip(crossing.value + step * np.array([-1.0, 0.0, 1.0]), course.low, course.high)
     spectra = [np.linalg.eigvals(each.image.jacobian) for each in course.at(around)]
     away = [float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])) for values in spectra]

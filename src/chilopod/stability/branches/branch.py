@@ -233,9 +233,7 @@ def follow(
     progress
         Called with the number of points and the newest one.
     """
-    low, high = checked_interval(between)
-    if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
-        raise ParameterError("is too narrow for double precision", field="between", value=between)
+    low, high = checked_interval(between, _NARROWEST)
     check_arguments(family=family, points=points, step=step, longest=longest, closely=closely, precision=precision)
     check_arguments(symmetric=symmetric, budget=budget, progress=progress)
     if isinstance(start, BifurcationPoint):

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.deadline import Deadline, SpentError
 from chilopod.frozen import Array
@@ -47,6 +47,7 @@ _DESCRIBING = 400  # budget of return maps for the orbits beside a point
 _GRACE = 0.7  # s, for the description of found points after the time limit
 _SAME = 1e-9  # distance of values of one point on the border of two pieces, relative to the interval
 _BESIDE = 1e-6  # distance from a crossing at which rates of change are computed, relative to the interval
+_RESOLVED = 256.0  # least such distance, relative to that of two floating-point numbers at the ends of the interval
 
 
 Found = BifurcationPoint | str
@@ -190,7 +191,7 @@ def locate(
     at, left = samples.high, max(budget - found.evaluations, 1)
     try:
         rest = locate(family, (at, high), samples.onward, normal_form, left, limit.remaining)
-    except (SpentError, AnalysisError) as error:
+    except (SpentError, AnalysisError, ParameterError) as error:
         ending = f"{error.problem} before the orbit was followed beyond {at:.9g}"
         status = SearchStatus.BUDGET if isinstance(error, SpentError) else SearchStatus.INCOMPLETE
         rest = replace(found, points=(), status=status, evaluations=0, ending=ending, remarks=(ending,))
@@ -335,7 +336,8 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     def bounded_at(value: float, state: Array, error: Array, duration: float) -> Orbit:
         return with_bounds(samples.family(value), state, duration, error)
 
-    course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
+    resolved = _RESOLVED * float(np.spacing(max(abs(samples.low), abs(samples.high))))
+    course = Course(samples.at, samples.low, samples.end, samples.width, max(_BESIDE * samples.width, resolved))
     # A symmetry-breaking mode is not part of the orbit, which is regular among symmetric states.
     trivial = block is None or block.trivial
     regular = past_singular(course, crossing, bounded_at) if trivial and not samples.known else None
