@@ -320,6 +320,7 @@ def test_an_action_that_is_none_is_one_line(action, words):
         ({"engine": ["planar"]}, "must be a name"),
         ({"robot": 5}, "robot = 5"),
         ({"disturbance": 5}, "disturbance = 5: must be a Disturbance"),
+        ({"disturbance": Disturbance(slick=(7, 1))}, r"slick = \(7, 1\): must be a foot of the robot"),
         ({"rewards": 5}, "rewards = 5: must be a Rewards"),
         ({"task": "Tern"}, "must be one of the tasks; did you mean 'Turn'. allowed: Turn, Course, TaskA, TaskB"),
         ({"task": 5}, "task = 5: must be one of the tasks"),

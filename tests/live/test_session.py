@@ -202,6 +202,9 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
         (wishes.Steering("varible"), "did you mean 'variable'"),
         (wishes.Pull(0, float("nan")), "pull = nan"),
         (wishes.Pull(17, 0.1), "joint = 18"),
+        (wishes.Pull("1", 0.1), "joint = '1'"),
+        (wishes.Pull(0, 0.1, "long"), "time = 'long'"),
+        (wishes.Target((1.0, 2.0, 3.0)), "(x, y), m"),
         (wishes.Step(1e9), "0 to 10 gait cycles"),
     ],
 )

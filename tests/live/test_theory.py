@@ -106,4 +106,7 @@ def test_only_the_last_question_is_answered_and_a_short_one_in_between():
     finally:
         beside.close()
     beside.ask(PLANAR, SPRINGS)  # to nobody
+    (said,) = beside.answers()
+    assert "has ended" in said.remark
+    assert not said.computing
     assert beside.answers() == []

@@ -108,3 +108,19 @@ def test_radii_that_are_none(radius):
         shortest_path(place, radius)
     with pytest.raises(ParameterError, match="arrival radius"):
         shortest_path(place, RADIUS, radius)
+
+
+def test_a_disc_just_ahead_beside_the_tightest_circle():
+    """The straight line ahead, and an arc with a straight line to the disc's centre, can be driven."""
+    rng = np.random.default_rng(2)
+    for radius in (0.0066, 0.0183, 0.24, 0.45):
+        x, y = rng.uniform(0.15, 0.2, 200), rng.uniform(-0.03, 0.03, 200)
+        kept = np.hypot(x, y) > 0.15
+        x, y = x[kept], y[kept]
+        away = np.hypot(x, np.abs(y) - radius)
+        line = np.sqrt(np.maximum(away**2 - radius**2, 0.0))
+        turned = np.arctan2(np.abs(y) - radius, x) + np.arctan2(radius, line)
+        driven = np.where(line >= 0.15, radius * (turned % (2.0 * math.pi)) + line - 0.15, math.inf)
+        ahead = x - np.sqrt(0.15**2 - y**2)
+        found = shortest_path(np.stack([x, y], -1), radius)
+        assert (found <= np.fmin(driven, ahead) + 1e-9).all()

@@ -147,6 +147,12 @@ def test_a_disturbance_cannot_be_negative():
         Disturbance(friction=-0.1)
 
 
+@pytest.mark.parametrize("foot", [(6, 1), (-1, 0), (0, 2), (0, -1), (1.0, 0), (1,), "ab", (True, False)])
+def test_a_foot_without_grip_is_one_of_the_robot(foot):
+    with pytest.raises(ParameterError, match="slick"):
+        Trial(ROBOT, 1.0, disturbance=Disturbance(slick=foot))
+
+
 def test_a_trial_of_the_twin_is_not_one_of_the_planar_model():
     one = Trial(WHOLE, 1.0)
     other = Trial(WHOLE, 1.0, engine="twin")

@@ -110,6 +110,7 @@ class Episodes:
         self.count = checked_count("num_envs", count, _MOST)
         if not isinstance(disturbance, Disturbance):
             raise ParameterError("must be a Disturbance", field="disturbance", value=disturbance)
+        disturbance.check_foot(robot.body.modules)
         self._name, self._engine = engine, engine_named(engine)
         self._engine.common(robot)
         self.actions = Actions.of(robot, springs)

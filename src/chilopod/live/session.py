@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -329,6 +330,8 @@ class Session:
             if self._target is not None:
                 self._let_go()
             return
+        if np.shape(place) != (2,):
+            raise ParameterError("must be a place on the floor", field="target", value=place, allowed="(x, y), m")
         x, y = (as_finite("target", each) for each in place)
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
         controller, steering = (None, "") if by_hand else self._steered()
@@ -349,9 +352,12 @@ class Session:
     def _pull_at(self, joint: int, torque: float, time: float) -> None:
         own = self.file.springs.stiffness
         if joint not in range(len(own)):
-            raise ParameterError("must be a joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
+            given: Any = joint
+            given = given + 1 if isinstance(given, int) else given
+            raise ParameterError("must be a joint", field="joint", value=given, allowed=f"1 to {len(own)}")
         strongest = _STRONGEST * own[joint]
-        self._pull[joint] = np.clip(as_finite("pull", torque), -strongest, strongest)
+        torque, time = as_finite("pull", torque), time if time == math.inf else as_finite("time", time)
+        self._pull[joint] = np.clip(torque, -strongest, strongest)
         self._pulled_until[joint] = self._before + self._walk.time + time
         self._push()
         if isinstance(self._controller, ActuatedAxis):

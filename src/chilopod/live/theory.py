@@ -173,6 +173,7 @@ class Beside:
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
         self._process = context.Process(target=_answer, args=(there, engine), daemon=True, name="chilopod theory")
+        self._waits = False  # True if a theory was asked for and has not been told since
         with deaf():
             self._process.start()
         there.close()
@@ -180,15 +181,21 @@ class Beside:
     def ask(self, robot: Robot, springs: tuple[float, float] | None = None) -> None:
         """Ask for the theory of a robot, see :func:`theory_of`, or without springs for the growth of small bends of its
         straight walk."""
+        self._waits = self._waits or springs is not None
         with suppress(OSError):  # the process may have ended, and answers nothing any more
             self._here.send((robot, springs))
 
     def answers(self) -> list[Theory | Growth]:
-        """Answers since the last call; never waits."""
+        """Answers since the last call, of which one says if the process has ended; never waits."""
         found: list[Theory | Growth] = []
+        alive = self._process.is_alive()
         with suppress(EOFError, OSError):
             while self._here.poll():
                 found.append(self._here.recv())
+        self._waits = self._waits and all(each.computing for each in found if isinstance(each, Theory))
+        if self._waits and not alive:
+            self._waits = False
+            found.append(Theory(remark="the process that computes it has ended"))
         return found
 
     def close(self) -> None:

@@ -59,10 +59,8 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
 
 
 def _to_disc(x: Array, y: Array, radius: float, arrival: float) -> Array:
-    """Length to a disc that is not outside of the circle on its side: arcs that run into it, and the best point of its
-    rim.
-
-    It is more than 1 um too long, by 0.4 mm at most, at 20 of 28 000 random places.
+    """Length to a disc that is not outside of the circle on its side: arcs that run into it, the straight line to its
+    centre where it is outside, and the best point of its rim.
     """
 
     def to_rim(directions: Array) -> Array:
@@ -71,6 +69,9 @@ def _to_disc(x: Array, y: Array, radius: float, arrival: float) -> Array:
     step = _FULL / _DIRECTIONS
     directions = np.broadcast_to(step * np.arange(_DIRECTIONS), (len(x), _DIRECTIONS))
     length = np.fmin(_arc_into(x, y, radius, arrival), _arc_into(x, -y, radius, arrival))
+    for side in (y, -y):
+        whole, straight = _straight(x, side, radius)
+        length = np.fmin(length, np.where(straight >= arrival, whole - arrival, np.nan))
     for _ in range(_ROUNDS):
         found = to_rim(directions)
         best = found.argmin(1)[:, None]
@@ -93,14 +94,19 @@ def _to_point(x: Array, y: Array, radius: float) -> Array:
     return np.fmin(_about_left(x, y, radius), _about_left(x, -y, radius))
 
 
-def _about_left(x: Array, y: Array, radius: float) -> Array:
-    """Length of the shortest path to points that turns left and goes straight, or turns right and then left."""
+def _straight(x: Array, y: Array, radius: float) -> tuple[Array, Array]:
+    """Length of the path to points that turns left and goes straight, and of its straight line."""
     # Squared length of the tangent to the circle. Rounding on the circle may make it slightly negative.
     squared = x * x + y * (y - 2.0 * radius)
     straight = np.sqrt(np.where(squared > -_HAIR * radius**2, np.maximum(squared, 0.0), np.nan))
     # Half of the angle before it: one quotient in two forms, each without cancellation.
     half = np.where(x >= 0.0, np.arctan2(y, x + straight), np.arctan2(straight - x, y - 2.0 * radius))
-    length = straight + radius * np.mod(2.0 * half, _FULL)
+    return straight + radius * np.mod(2.0 * half, _FULL), straight
+
+
+def _about_left(x: Array, y: Array, radius: float) -> Array:
+    """Length of the shortest path to points that turns left and goes straight, or turns right and then left."""
+    length = _straight(x, y, radius)[0]
     if radius == 0.0:
         return length
     # The circle of the second arc touches the one to the right, and the point lies on it: a triangle of three centres.

@@ -77,6 +77,17 @@ class Disturbance:
             value = getattr(self, name)
             if not 0.0 <= value < 10.0:
                 raise ParameterError("is out of range", field=name, value=value, allowed="0 or more, less than 10")
+        self.check_foot(10**9)
+
+    def check_foot(self, modules: int) -> None:
+        """Refuse a foot without grip that a robot of this many modules does not have."""
+        foot: Any = self.slick
+        if foot is None:
+            return
+        counts = isinstance(foot, tuple) and [type(each) for each in foot] == [int, int]
+        if not (counts and 0 <= foot[0] < modules and 0 <= foot[1] <= 1):
+            allowed = f"(module, side): module 0 to {modules - 1}, side 0 or 1" if counts else "(module, side), or None"
+            raise ParameterError("must be a foot of the robot", field="slick", value=foot, allowed=allowed)
 
 
 NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
@@ -160,6 +171,7 @@ class Trial:
             allowed = f"{course.duration:g} s"
             raise ParameterError("must be that of the course", field="duration", value=self.duration, allowed=allowed)
         engine.common(self.robot)
+        self.disturbance.check_foot(self.robot.body.modules)
         if self.recording.poses and not engine.traits.poses:
             raise ParameterError("must be False: this engine has no poses in space", field="poses", value=True)
         if self.controller is not None:
