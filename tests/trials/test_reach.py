@@ -254,6 +254,25 @@ class Table(np.ndarray):
     """Pickle forgets what it adds to an array."""
 
 
+def by_name(how):
+    """A controller's class that reaches code by name, in its own way."""
+    space = {}
+    exec(f"import pkgutil, pydoc, runpy, sys\nfrom sys import modules\nfind = pkgutil.resolve_name\n{how}", space)
+    return type("Found", (), {"act": space["act"]})
+
+
+@pytest.mark.parametrize(
+    "how",
+    ["pkgutil.resolve_name('a:b')", "runpy.run_module('a')", "runpy.run_path('a')", "pydoc.locate('a.b')",
+     "find('a:b')", "modules['a']", "list(map(find, 'ab'))"],
+)  # fmt: skip
+def test_the_standard_library_leads_to_code_by_name_too(how):
+    for text in (f"def act(): return {how}", f"from functools import partial\nact = partial(lambda: {how})"):
+        with pytest.raises(UnknownKindError, match="imports modules by name"):
+            Reach().see(by_name(text), "Found")
+    Reach().see(by_name("def act(frame): return frame.eval('a'), frame.locate"), "Found")
+
+
 def test_what_a_subclass_adds_to_an_array_is_part_of_it():
     found = []
     for value in (0.01, 0.05):

@@ -16,7 +16,22 @@ from types import CodeType, ModuleType
 from typing import Any
 
 _WHOLE = ("time", "random", "secrets", "uuid", "numpy.random")
-_SOME = {"builtins": ("hash", "id"), "os": ("getpid", "getppid", "getrandom", "times", "urandom")}
+_SOME = {
+    "builtins": ("hash", "id"),
+    "os": ("getpid", "getppid", "getrandom", "times", "urandom"),
+    "threading": ("get_ident", "get_native_id"),
+}
+_LOADING = {
+    "builtins": ("__import__", "eval", "exec"),
+    "importlib": ("import_module", "reload"),
+    "importlib.util": ("module_from_spec",),
+    "pkgutil": ("resolve_name",),
+    "pydoc": ("importfile", "locate", "resolve", "safeimport"),
+    "runpy": ("run_module", "run_path"),
+    "sys": ("modules",),
+}
+BY_NAME = "code that imports modules by name, or may"
+"""What :func:`by_chance` and :func:`chance_in` call everything that leads to code which no search can find."""
 _NOW = ("now", "today", "utcnow")  # of classes in datetime
 _FINE = ("sleep", "uuid3", "uuid5")
 _SEEDED = frozenset(
@@ -33,7 +48,7 @@ def by_chance(value: object) -> str:
     of, name = getattr(value, "__self__", None), getattr(value, "__name__", "")
     if isinstance(of, type) and of.__module__ == "datetime" and name in _NOW:
         return f"{of.__name__}.{name}"
-    return _sources(tuple(each for each in (*_WHOLE, *_SOME) if each in sys.modules)).get(id(value), "")
+    return _sources(tuple(each for each in {*_WHOLE, *_SOME, *_LOADING} if each in sys.modules)).get(id(value), "")
 
 
 @lru_cache
@@ -42,12 +57,10 @@ def _sources(modules: tuple[str, ...]) -> dict[int, str]:
     found = {id(sys.modules[module]): module for module in modules if module in _WHOLE}
     for module in modules:
         for name, value in vars(sys.modules[module]).items():
-            drawn = callable(value) and (name == "SystemRandom" or not isinstance(value, type))
-            if (
-                name in _SOME[module]
-                if module in _SOME
-                else drawn and name not in (*_FINE, *_SEEDED) and name[0] != "_"
-            ):
+            drawn = module in _WHOLE and callable(value) and (name == "SystemRandom" or not isinstance(value, type))
+            if name in _LOADING.get(module, ()):
+                found[id(value)] = BY_NAME
+            elif name in _SOME.get(module, ()) or (drawn and name not in (*_FINE, *_SEEDED) and name[0] != "_"):
                 found.setdefault(id(value), f"{module}.{name}")
     return found
 
