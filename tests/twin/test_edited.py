@@ -106,10 +106,3 @@ def test_an_edit_is_anything_that_is_called_and_told_apart_by_what_it_holds(how,
 def test_what_has_no_code_is_no_edit(edit):
     with pytest.raises(ParameterError, match=r"edit = .*must be a function in Python"):
         twin.Edited("none", edit)
-
-
-def test_a_saved_walk_does_not_go_on_with_another_number(monkeypatch):
-    saved = GLOBAL.start(PRESET).save()
-    monkeypatch.setattr(f"{__name__}.SOFT", 5.0)
-    with pytest.raises(ParameterError, match="was saved with another"):
-        GLOBAL.resume(saved)

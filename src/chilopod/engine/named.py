@@ -21,9 +21,7 @@ _MODULES: Final[Mapping[str, str]] = {"planar": "chilopod.planar", "twin": "chil
 ENGINES: Final = tuple(_MODULES)
 """Engines by name: the planar model, and the robot in three dimensions."""
 
-PARTS: Final = ("traits", "common", "initial_states", "start", "resume")
-"""Attributes of every engine."""
-
+PARTS: Final = ("traits", "common", "initial_states", "start", "resume")  # of every engine
 _SAME_TIME: Final = 1e-9  # s
 _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 

@@ -21,9 +21,7 @@ from chilopod.robot import Robot
 from chilopod.trials.reach import Reach
 
 _LARGEST = 2**63
-DIGITS = 16
-"""Length of a digest of code."""
-
+DIGITS = 16  # of a digest of code
 _described: ContextVar[dict[object, tuple[str, str]] | None] = ContextVar("described", default=None)
 
 

@@ -8,7 +8,6 @@ from functools import partial
 from types import CodeType
 from typing import Any
 
-from chilopod.engine import Traits
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
@@ -37,25 +36,18 @@ class Edited:
     edit
         A function, called with the description (``mujoco.MjSpec``, names as in :class:`TwinModel`) and the robot,
         before the corrections for the step (:mod:`chilopod.twin.step`). Everything that its code can reach is part of
-        a trial, as for a controller. A saved walk goes on only with the same code, and equal plain values of the module
-        that it uses.
-
-    Raises
-    ------
-    ParameterError
-        If ``edit`` is no function in Python, and no object with such a function.
+        a trial, as for a controller.
     """
 
     def __init__(self, name: str, edit: Edit) -> None:
-        self._name, self._edit = name, edit
-        self.traits  # noqa: B018  (refuses what has no code)
-
-    @property
-    def traits(self) -> Traits:
-        """Traits of the engine, with the edit as it is now in the version."""
-        content = hashlib.sha256(repr(_content(*_function_of(self._edit))).encode()).hexdigest()[:12]
-        version, sentence = f"{traits.version}, edit {content}", f"{traits.sentence}, {self._name}"
-        return replace(traits, name=self._name, sentence=sentence, version=version)
+        function: Any = getattr(edit, "func", edit)  # of a partial
+        function = function if hasattr(function, "__code__") else type(function).__call__
+        if not hasattr(function, "__code__"):
+            raise ParameterError("must be a function in Python", field="edit", value=edit, allowed="def or lambda")
+        content = hashlib.sha256(repr(_content(function.__code__, function)).encode()).hexdigest()[:12]
+        version, sentence = f"{traits.version}, edit {content}", f"{traits.sentence}, {name}"
+        self.traits = replace(traits, name=name, sentence=sentence, version=version)
+        self._edit = edit
 
     def common(self, robot: Robot) -> Robot:
         """See :func:`chilopod.twin.common`."""
@@ -63,40 +55,25 @@ class Edited:
 
     def initial_states(self, *arguments: Any, **named: Any) -> Array:
         """See :func:`chilopod.twin.initial_states`."""
-        return initial_states(*arguments, **named, edit=self._anew())
+        # Models are shared by their edit, here a new object: what the edit does may have changed since the last.
+        return initial_states(*arguments, **named, edit=partial(self._edit))
 
     def start(self, *arguments: Any, **named: Any) -> TwinWalk:
         """See :func:`chilopod.twin.start`."""
-        return start(*arguments, **named, edit=self._anew(), traits=self.traits)
+        return start(*arguments, **named, edit=partial(self._edit), traits=self.traits)
 
     def walk_cycle(self, robot: Robot) -> tuple[CycleMap, Array]:
         """See :func:`chilopod.twin.walk_cycle`."""
-        return walk_cycle(robot, self._anew())
+        return walk_cycle(robot, partial(self._edit))
 
     def resume(self, saved: bytes, threads: int = 0) -> TwinWalk:
         """See :func:`chilopod.twin.resume`."""
-        return resume(saved, threads, edit=self._anew(), traits=self.traits)
-
-    def _anew(self) -> Edit:
-        """The edit as an object of its own: models are shared by their edit, and what this one does may have changed
-        since the last."""
-        return partial(self._edit)
+        return resume(saved, threads, edit=partial(self._edit), traits=self.traits)
 
 
-def _function_of(edit: Any) -> tuple[CodeType, dict[str, Any]]:
-    """Code and globals of a function, a method, a partial of these, or an object that is called."""
-    while isinstance(edit, partial):
-        edit = edit.func
-    function: Any = edit if hasattr(edit, "__code__") else type(edit).__call__
-    if not hasattr(function, "__code__"):
-        allowed = "a function of the description and the robot"
-        raise ParameterError("must be a function in Python", field="edit", value=edit, allowed=allowed)
-    return function.__code__, function.__globals__
-
-
-def _content(code: CodeType, space: dict[str, Any]) -> tuple[Any, ...]:
+def _content(code: CodeType, edit: Any) -> tuple[Any, ...]:
     """Code of a function, and the plain values of its module that it uses, as part of a trial's name."""
-    used = {name: space.get(name) for name in code.co_names}
+    used = {name: edit.__globals__.get(name) for name in code.co_names}
     plain = {name: value for name, value in used.items() if isinstance(value, int | float | str | tuple)}
-    inner = [_content(each, space) if isinstance(each, CodeType) else repr(each) for each in code.co_consts]
+    inner = [_content(each, edit) if isinstance(each, CodeType) else repr(each) for each in code.co_consts]
     return code.co_code, code.co_names, inner, plain
