@@ -5,14 +5,16 @@ import os
 import re
 import subprocess
 import sys
+import threading
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from chilopod import load_robot
+from chilopod import load_robot, planar
 from chilopod.cli import main
-from chilopod.engine import engine_named
+from chilopod.engine import Command, Event, engine_named
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.steering import LegYawController, Target
 from chilopod.trials import Trial, run
@@ -157,3 +159,93 @@ def test_on_the_command_line_each_is_one_line(folder, capsys, arguments):
     assert len(told) == 1
     if arguments[1] in ("own_engines:Steers", "own_engines:Ours", "own_engines:Worse"):
         assert f"{arguments[1].partition(':')[2]}.act: raised" in told[0]
+
+
+GRIP = """
+from chilopod import planar
+GRIP = 1.0
+class Grip:
+    traits, common, initial_states, resume = planar.traits, planar.common, planar.initial_states, planar.resume
+    common, initial_states, resume = map(staticmethod, (common, initial_states, resume))
+    def start(self, robots, friction=None, **named):
+        from own_grip_helper import MORE
+        return planar.start(robots, friction=GRIP * MORE * friction, **named)
+grip = Grip()
+"""
+
+
+@dataclass(frozen=True)
+class Left:
+    def events(self, gait):
+        return [Event("now", 0.0, 0.1)]
+
+    def act(self, event, seen):
+        return Command(leg_yaw=[[0.1, 0.1]])
+
+
+def filling(cache):
+    def start(self, robots, **named):
+        cache.append(robots)
+        return planar.start(robots, **named)
+
+    return start
+
+
+@pytest.fixture
+def named(tmp_path, monkeypatch):
+    """Name of a trial with an engine in files as given, imported anew or as it was."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # it would not see a change within a second
+    modules = ("own_grip", "own_grip_helper")
+
+    def name(grip="GRIP = 1.0", helper="MORE = 1.0", anew=True):
+        (tmp_path / "own_grip.py").write_text(GRIP.replace("GRIP = 1.0", grip))
+        (tmp_path / "own_grip_helper.py").write_text(helper)
+        for each in modules if anew else ():
+            sys.modules.pop(each, None)
+        sys.path_importer_cache.clear()
+        return Trial(ROBOT, 1.0, engine="own_grip:grip").file_name
+
+    yield name
+    for each in modules:
+        sys.modules.pop(each, None)
+
+
+def test_what_an_engine_imports_within_a_function_is_part_of_a_trial(named):
+    first = named()
+    assert named(helper="MORE = 2.0") != first == named()
+
+
+def test_an_engine_whose_file_was_edited_while_it_is_loaded_is_not_the_edited_one(named):
+    names = named(), named("GRIP = 0.1", anew=False), named("GRIP = 0.1")
+    assert len({*names}) == 3
+
+
+def test_an_engine_is_its_numbers_as_they_are_now_and_a_module_may_be_one(named, monkeypatch):
+    first = named()
+    monkeypatch.setattr(sys.modules["own_grip"], "GRIP", 0.1)
+    assert Trial(ROBOT, 1.0, engine="own_grip:grip").file_name != first
+    for name in ("traits", "common", "initial_states", "start", "resume"):
+        monkeypatch.setattr(sys.modules["own_grip_helper"], name, getattr(sys.modules["own_grip"].grip, name), False)
+    monkeypatch.setattr(sys.modules["own_grip"], "other", sys.modules["own_grip_helper"], False)
+    first = Trial(ROBOT, 1.0, engine="own_grip:other").file_name
+    monkeypatch.setattr(sys.modules["own_grip"], "GRIP", 0.2)
+    assert Trial(ROBOT, 1.0, engine="own_grip:other").file_name != first
+
+
+def test_a_cache_of_an_engine_that_fills_is_no_change_of_a_controller(named, tmp_path, monkeypatch):
+    named("CACHE = []", "MORE = 1.0")
+    grip = sys.modules["own_grip"]
+    monkeypatch.setattr(grip, "GRIP", 1.0, False)
+    monkeypatch.setattr(type(grip.grip), "start", filling(grip.CACHE))
+    run([Trial(ROBOT, 0.1, controller=Left(), engine="own_grip:grip")], tmp_path / "kept")
+    assert len(list((tmp_path / "kept").iterdir())) == 1
+
+
+def test_an_engine_with_an_object_that_cannot_be_described_walks_and_is_not_kept(named, tmp_path, caplog, monkeypatch):
+    named()
+    monkeypatch.setattr(sys.modules["own_grip"].grip, "lock", threading.Lock(), False)
+    (record,) = run([Trial(ROBOT, 0.1, engine="own_grip:grip")], tmp_path / "kept")
+    assert record.status.item() == "walked"
+    assert not list((tmp_path / "kept").iterdir())
+    assert "engine own_grip:grip: its trials run but are not kept: grip['lock']: an object of type lock" in caplog.text

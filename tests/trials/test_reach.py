@@ -157,13 +157,15 @@ def test_a_controller_whose_state_changes_after_the_first_cycle_is_not_kept(tmp_
 
 
 CHANCE = """
-import datetime, os, random, secrets, sys, time, uuid
+import datetime, os, random, secrets, sys, tempfile, threading, time, uuid
 import numpy as np
+from scipy import sparse, stats
 from dataclasses import dataclass
 from datetime import datetime as day
 from random import random as drawn
 from time import perf_counter as clock
 from chilopod.engine import Command, Event
+KINDS = {"a", "bc", "def"}
 now, TABLE = day.now, {"clock": time.monotonic}
 def helper(): return time.time()
 @dataclass(frozen=True)
@@ -178,15 +180,31 @@ class Own:
             yaw = 0.1 * (float(yaw) % 1.0)
         return Command(leg_yaw=[[yaw, 0.0]])
 """
+ORDER = "the order of a set"
+VARIES = "equal observations give different commands (a clock, random numbers without a seed, a counter?)"
+MAY_VARY = "which may vary from call to call or process to process; use seeds, and sort sets"
 BY_CHANCE = {
+    "yaw = stats.norm.rvs()": VARIES,
+    "yaw = stats.uniform(0, 1).rvs()": VARIES,
+    "yaw = sparse.random(1, 1, 1.0).toarray()[0, 0]": VARIES,
+    "yaw = getattr(np, 'random').rand()": VARIES,
+    "yaw = sum(map(ord, tempfile.mktemp())) / 1000": VARIES,
+    "yaw = np.datetime64('now', 'us').astype(int) / 1000": "datetime64 now",
+    "yaw = np.datetime64('today').astype(int) / 1000": "datetime64 today",
+    "yaw = threading.get_ident() % 97 / 97": "threading.get_ident",
+    "yaw = [len(each) for each in {'a', 'bc', 'def'}][0] / 10": ORDER,
+    "yaw = len(next(iter({'a', 'bc'}))) / 10": ORDER,
+    "yaw = len(list(KINDS)[0]) / 10": ORDER,
+    "kinds = {'a', 'bc', 'def'}; yaw = len(kinds.pop()) / 10": ORDER,
+    "yaw = (lambda: len(next(iter(KINDS))) / 10)()": ORDER,
     "yaw = np.random.uniform()": "numpy.random.uniform",
     "np.random.seed(1); yaw = np.random.rand()": "numpy.random.seed",
-    "rng = np.random.default_rng(); yaw = rng.random()": "default_rng without a seed",
-    "yaw = np.random.default_rng(None).random()": "default_rng without a seed",
-    "make = np.random.default_rng; yaw = make().random()": "default_rng without a seed",
+    "rng = np.random.default_rng(); yaw = rng.random()": VARIES,
+    "yaw = np.random.default_rng(None).random()": VARIES,
+    "make = np.random.default_rng; yaw = make().random()": VARIES,
     "yaw = random.random()": "random.random",
     "yaw = drawn()": "random.random",
-    "yaw = random.Random().random()": "Random without a seed",
+    "yaw = random.Random().random()": VARIES,
     "yaw = random.SystemRandom().random()": "random.SystemRandom",
     "yaw = [random.gauss(0, 1) for _ in range(2)][0]": "random.gauss",
     "yaw = (lambda: random.gauss(0, 1))()": "random.gauss",
@@ -213,6 +231,12 @@ BY_CHANCE = {
     "yaw = max(map(id, [self]))": "builtins.id",
 }
 DETERMINED = (
+    "yaw = 0.1 * ('a' in KINDS) + 0.1 * ('b' not in {'a', 'bc', 'def'}) + 0.01 * len(KINDS)",
+    "yaw = 0.1 * len(sorted(KINDS)[0])",
+    "kinds = {'a', 'bc', 'def'}; yaw = 0.1 * ('a' in kinds)",
+    "yaw = 0.1 * [each for each in {2, 3, 5}][0]",
+    "yaw = stats.norm.rvs(random_state=3)",
+    "seen.joint_angles[:] = 0.0; yaw = 0.1",
     "yaw = self.id + self.time + seen.time",
     "yaw = np.random.default_rng(7).random()",
     "yaw = np.random.default_rng(seed=self.id).random()",
@@ -236,7 +260,9 @@ def test_what_answers_otherwise_in_every_process_walks_and_is_not_kept(body, tmp
     assert record.status.item() == "walked"
     assert len(list((tmp_path / "kept").iterdir())) == (body in DETERMINED)
     (said,) = [each.message for each in caplog.records if each.name == "chilopod.trials.store"] or [""]
-    assert (f": {BY_CHANCE[body]}, whose result varies from call to call" in said) if body in BY_CHANCE else said == ""
+    why = BY_CHANCE.get(body, "")
+    assert said.endswith(why if why in ("", VARIES) else f": {why}, {MAY_VARY}")
+    assert (said == "") == (body in DETERMINED)
 
 
 @dataclass(frozen=True)
@@ -252,6 +278,25 @@ def test_modules_that_are_looked_up_by_name_cannot_be_described():
 
 class Table(np.ndarray):
     """Pickle forgets what it adds to an array."""
+
+
+def by_name(how):
+    """A controller's class that reaches code by name, in its own way."""
+    space = {}
+    exec(f"import pkgutil, pydoc, runpy, sys\nfrom sys import modules\nfind = pkgutil.resolve_name\n{how}", space)
+    return type("Found", (), {"act": space["act"]})
+
+
+@pytest.mark.parametrize(
+    "how",
+    ["pkgutil.resolve_name('a:b')", "runpy.run_module('a')", "runpy.run_path('a')", "pydoc.locate('a.b')",
+     "find('a:b')", "modules['a']", "list(map(find, 'ab'))"],
+)  # fmt: skip
+def test_the_standard_library_leads_to_code_by_name_too(how):
+    for text in (f"def act(): return {how}", f"from functools import partial\nact = partial(lambda: {how})"):
+        with pytest.raises(UnknownKindError, match="imports modules by name"):
+            Reach().see(by_name(text), "Found")
+    Reach().see(by_name("def act(frame): return frame.eval('a'), frame.locate"), "Found")
 
 
 def test_what_a_subclass_adds_to_an_array_is_part_of_it():

@@ -6,6 +6,7 @@ import math
 import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from heapq import merge
 from itertools import chain, count, islice, pairwise, takewhile
@@ -21,6 +22,7 @@ from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
 
 _T = TypeVar("_T")
+Heard = Callable[[Event, Observation, Command], None]
 
 _MOMENT = 0.3
 """Approximate time between two reports of progress, s; Ctrl-C may wait as long."""
@@ -119,6 +121,7 @@ def steer(
     bearing_noise: ArrayLike | None = None,
     referee: Referee | None = None,
     progress: Progress = silent,
+    heard: Heard | None = None,
 ) -> None:
     """Advance a walk to a time, commanded by a controller at its events, or until its referee ends it.
 
@@ -133,6 +136,8 @@ def steer(
         events); the last axis is the order of events from the start of the walk.
     progress
         Function of the fraction done (0 to 1) and a few words.
+    heard
+        Function of each event, of a copy of what the controller was shown, and of its command.
 
     Raises
     ------
@@ -176,6 +181,7 @@ def steer(
         if referee is not None:
             seen = referee.through(index, seen)
         assert controller is not None
+        shown = deepcopy(seen) if heard else seen  # the controller may write into it
         called_at = clock.perf_counter()
         command = _answer(controller, event, seen)
         thought += clock.perf_counter() - called_at
@@ -184,6 +190,8 @@ def steer(
         except ParameterError as error:
             error.field = _of(controller, error.field or "command")
             raise
+        if heard:
+            heard(event, shown, command)
         tell()
         pace.foresee(following)
     pace.advance(until, tell)

@@ -21,7 +21,7 @@ _MODULES: Final[Mapping[str, str]] = {"planar": "chilopod.planar", "twin": "chil
 ENGINES: Final = tuple(_MODULES)
 """Engines by name: the planar model, and the robot in three dimensions."""
 
-_PARTS: Final = ("traits", "common", "initial_states", "start", "resume")
+PARTS: Final = ("traits", "common", "initial_states", "start", "resume")  # of every engine
 _SAME_TIME: Final = 1e-9  # s
 _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
@@ -53,7 +53,7 @@ class _Own:
             raise ParameterError(
                 "must be an object, not a class", field="engine", value=name, allowed="an instance of that class"
             )
-        missing = [each for each in _PARTS if not hasattr(engine, each)]
+        missing = [each for each in PARTS if not hasattr(engine, each)]
         if missing:
             raise ParameterError(f"must be an engine: attribute {missing[0]} is missing", field="engine", value=name)
         if not isinstance(engine.traits, Traits):

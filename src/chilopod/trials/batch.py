@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import replace
 from itertools import chain
-from threading import Event
 from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
 
 from chilopod.cores import cores
-from chilopod.engine import Walk, engine_named, event_times, steer
+from chilopod.engine import Command, Event, Observation, Walk, engine_named, event_times, steer
 from chilopod.engine.batch import with_end
+from chilopod.engine.loop import Heard
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.progress import Progress, silent
 from chilopod.record import load_xarray
 from chilopod.steering import CourseReferee, Target, add_measures
 from chilopod.steering.measures import lengths
-from chilopod.trials.description import classes_in, file_text, is_ours, plain
+from chilopod.trials.description import DIGITS, classes_in, file_text, is_ours, plain
 from chilopod.trials.record_check import check_record
 from chilopod.trials.trial import Drawn, Trial, conditions, draw
 
@@ -33,6 +34,8 @@ NOT_KEPT = "not kept"
 
 _OTHERWISE = 0.05  # joint angles of robots beside one that starts straight, rad
 _CHANGES = "an object that its code can reach changes while it steers"
+_VARIES = "equal observations give different commands (a clock, random numbers without a seed, a counter?)"
+_MOST_AGAIN = 100_000  # observations of single robots that a controller is shown twice: some 20 MB
 _KNOWN: dict[str, str] = {}  # findings about controllers, by everything that defines them
 _MOST_BYTES = 256e6
 """Approximate largest size of the records of a batch, bytes."""
@@ -77,7 +80,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     if threads < 2:
         return _walked(trials)
     load_xarray()
-    stopped = Event()
+    stopped = threading.Event()
 
     def go_on(done: float, words: str) -> None:
         if stopped.is_set():
@@ -102,12 +105,19 @@ def _walked(trials: Sequence[Trial], progress: Progress = silent) -> list[xr.Dat
     first = trials[0]
     # A controller that is not reproducible is found before.
     doubts = first.code[1] or first.code[2] or _doubts(first)
-    walk, drawn, referee = _steered(trials, first.duration, progress)
+    asked: list[tuple[Event, Observation, list[bytes | None]]] = []
+
+    def heard(event: Event, seen: Observation, command: Command) -> None:
+        if len(asked) * len(trials) < _MOST_AGAIN:
+            asked.append((event, seen, _bits(command)))
+
+    doubtful = not doubts and _is_own(first)
+    walk, drawn, referee = _steered(trials, first.duration, progress, heard if doubtful else None)
     name = type(first.controller).__name__
     if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
         raise AnalysisError("must not change its own fields while it steers: they name the trial", field=name)
-    if not doubts and _is_own(first) and first.as_now().code != first.code:
-        doubts = _KNOWN[_who(first)] = _CHANGES
+    if doubtful:
+        doubts = _KNOWN[_who(first)] = _CHANGES if _changed(first) else _varies(first.controller, asked)
     data = check_record(walk.to_dataset(), walk, trials, drawn)
     if referee is None:
         with_end(data, walk, first.recording)
@@ -118,7 +128,7 @@ def _walked(trials: Sequence[Trial], progress: Progress = silent) -> list[xr.Dat
 
 
 def _steered(
-    trials: Sequence[Trial], until: float, progress: Progress = silent
+    trials: Sequence[Trial], until: float, progress: Progress = silent, heard: Heard | None = None
 ) -> tuple[Walk, list[Drawn], CourseReferee | None]:
     """Walk trials of one batch up to a time, s; return their walk, the drawn disturbances and the referee."""
     first = trials[0]
@@ -140,7 +150,7 @@ def _steered(
     noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
     referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
-    steer(walk, until, first.controller, bearing_noise=noise, referee=referee, progress=progress)
+    steer(walk, until, first.controller, bearing_noise=noise, referee=referee, progress=progress, heard=heard)
     return walk, drawn, referee
 
 
@@ -150,6 +160,23 @@ def _is_own(trial: Trial) -> bool:
 
 def _who(trial: Trial) -> str:
     return json.dumps([trial.steering, trial.code, trial.engine])
+
+
+def _varies(controller: Any, asked: Sequence[tuple[Event, Observation, list[bytes | None]]]) -> str:
+    """Finding if a controller commands anything else, or fails, when it is shown the same once more; else empty."""
+    with suppress(Exception):
+        return _VARIES * any(_bits(controller.act(event, shown)) != bits for event, shown, bits in asked)
+    return _VARIES
+
+
+def _bits(command: Command) -> list[bytes | None]:
+    return [None if each is None else np.asarray(each, float).tobytes() for each in vars(command).values()]
+
+
+def _changed(trial: Trial) -> bool:
+    """True if the code of a controller reaches other objects than before."""
+    # Behind it is the engine's code, which may fill a cache: equal arguments give equal walks, as engines promise.
+    return trial.as_now().code[0][:DIGITS] != trial.code[0][:DIGITS]
 
 
 def _doubts(trial: Trial) -> str:
@@ -171,11 +198,11 @@ def _doubts(trial: Trial) -> str:
             return _KNOWN[who]
         # An engine may return anything.
         if not getattr(one, "identical", lambda _: True)(other):
-            _KNOWN[who] = "equal observations give different commands (a clock, np.random, a counter?)"
+            _KNOWN[who] = _VARIES
         elif not _same_bits(one, among):
             _KNOWN[who] = "commands depend on other robots of the batch"
         else:
-            _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
+            _KNOWN[who] = _CHANGES if _changed(trial) else ""
     return _KNOWN[who]
 
 

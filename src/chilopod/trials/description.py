@@ -10,17 +10,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cached_property, lru_cache
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from chilopod.engine.named import path_of
+from chilopod.engine.named import PARTS, path_of
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
 from chilopod.trials.reach import Reach
 
-_DIGITS = 16
 _LARGEST = 2**63
+DIGITS = 16  # of a digest of code
 _described: ContextVar[dict[object, tuple[str, str]] | None] = ContextVar("described", default=None)
 
 
@@ -57,34 +58,39 @@ def code_of(value: object) -> tuple[str, str]:
     chances: list[str] = []
     for each in _parts(value):
         kind, beside = type(each), Reach()
-        found, chance = _once(kind, kind.__module__, kind.__qualname__)
+        found, chance = _once(kind, kind.__module__, kind.__qualname__, (kind,))
         parts.append(found)
         chances.append(chance)
         for name in sorted(getattr(each, "__dict__", {}).keys() - _declared(each)):
             beside.see(vars(each)[name], f"{kind.__qualname__}.{name}")
             parts += [name, beside.digest]
         chances.append(beside.chance)
-    digest = hashlib.sha256(repr(parts).encode()).hexdigest()[:_DIGITS] if any(parts) else ""
+    digest = hashlib.sha256(repr(parts).encode()).hexdigest()[:DIGITS] if any(parts) else ""
     return digest, next(filter(None, chances), "")
 
 
-def sources_of(engine: str) -> str:
-    """Digest of the module of a user's engine and of all user modules that it imports; empty for engines of chilopod.
-    Raises UnknownKindError if a file cannot be read."""
-    module = engine.partition(":")[0] if ":" in engine else "chilopod"
-    return _once(sys.modules[module], module, module)[0]
+def engine_code_of(engine: str) -> str:
+    """Digest of everything that the code of a user's engine, by its name, can reach now; empty for engines of chilopod.
+    Raises UnknownKindError for an object that cannot be described."""
+    module, _, name = engine.partition(":")
+    if not name:
+        return ""
+    found: Any = attrgetter(name)(sys.modules[module])
+    # A module may be an engine: no class leads to its functions.
+    return _once(engine, module, name, (sys.modules[module], found, *(getattr(found, each) for each in PARTS)))[0]
 
 
-def _once(value: object, module: str, path: str) -> tuple[str, str]:
+def _once(key: object, module: str, path: str, values: tuple[object, ...]) -> tuple[str, str]:
     top, known = module.partition(".")[0], _described.get()
     if top == "chilopod":
         return "", ""
     known = {} if known is None else known
-    if value not in known:
+    if key not in known:
         reach = Reach(top)
-        reach.see(value, path)
-        known[value] = reach.digest, reach.chance
-    return known[value]
+        for each in values:
+            reach.see(each, path)
+        known[key] = reach.digest, reach.chance
+    return known[key]
 
 
 @contextmanager

@@ -39,7 +39,7 @@ import numpy as np
 
 from chilopod.engine.named import path_of
 from chilopod.errors import in_words
-from chilopod.trials.chance import by_chance, chance_in
+from chilopod.trials.chance import BY_NAME, by_chance, chance_in
 
 Parts = Iterator[tuple[str, object]]
 
@@ -121,6 +121,8 @@ class Reach:
         return other.digest
 
     def _found_chance(self, path: str, chance: str) -> None:
+        if chance == BY_NAME:
+            raise UnknownKindError(f"{path}: {chance}")
         self.chance = self.chance or (chance and f"{path}: {chance}")
 
     def _put(self, *words: object) -> None:
@@ -165,7 +167,7 @@ class Reach:
         yield from _attributes("__code__", "__defaults__", "__kwdefaults__", "__closure__", "__dict__")(function)
         space = function.__globals__
         if self._is_own(space.get("__name__", "")):
-            imported = self._imported(function.__code__, space, path)
+            imported = self._imported(function.__code__, space)
             known = {**vars(builtins), **space, **imported}
             cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
             inner = {name: _content(cell) for name, cell in cells}
@@ -198,7 +200,7 @@ class Reach:
         yield ".__getattr__", vars(module).get("__getattr__")
         yield ".__class__", type(module)
         outer = module.__name__.rpartition(".")[0]
-        found = self._imported(code, vars(module), path, nested=False) if code else {}
+        found = self._imported(code, vars(module), nested=False) if code else {}
         for name, each in sorted({**found, outer: sys.modules.get(outer)}.items()):
             if each is not None and self._is_own(each.__name__):
                 yield f" -> {name}", each
@@ -220,17 +222,11 @@ class Reach:
             if name not in skipped and not (fields and written):
                 yield f".{name}", part
 
-    def _imported(
-        self, code: CodeType, space: Mapping[str, Any], path: str, nested: bool = True
-    ) -> dict[str, ModuleType | None]:
+    def _imported(self, code: CodeType, space: Mapping[str, Any], nested: bool = True) -> dict[str, ModuleType | None]:
         """Modules that code imports when it runs, imported now; None for a missing module."""
         found: dict[str, ModuleType | None] = {}
-        if nested:
-            names = {*code.co_names}
-            if {"import_module", "__import__", "eval", "exec"} & names or {"sys", "modules"} <= names:
-                raise UnknownKindError(f"{path}: code that imports modules by name, or may")
-            for each in code.co_consts:
-                found |= self._imported(each, space, path) if isinstance(each, CodeType) else {}
+        for each in code.co_consts if nested else ():
+            found |= self._imported(each, space) if isinstance(each, CodeType) else {}
         if _IMPORT not in code.co_code[::2]:
             return found
         constants: list[Any] = []

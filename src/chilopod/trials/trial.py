@@ -22,7 +22,7 @@ from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
 from chilopod.sources import digest
 from chilopod.steering import Course, Target
-from chilopod.trials.description import classes_in, code_of, is_findable, is_ours, plain, robot_text, sources_of
+from chilopod.trials.description import classes_in, code_of, engine_code_of, is_findable, is_ours, plain, robot_text
 from chilopod.trials.reach import UnknownKindError
 
 _DIGITS = 16
@@ -222,8 +222,8 @@ class Trial:
         why = "it must be defined at the top of a module that can be imported"
         try:
             digest, chance = code_of(self.controller)
-            again = f"{chance}, whose result varies from call to call; use random numbers with a seed" if chance else ""
-            return digest + sources_of(self.engine), why if known_here else "", again
+            again = f"{chance}, which may vary from call to call or process to process; use seeds, and sort sets"
+            return digest + engine_code_of(self.engine), why if known_here else "", again if chance else ""
         except UnknownKindError as error:
             can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
             return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}", ""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
+from functools import partial
 from types import CodeType
 from typing import Any
 
+from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.twin.cycle_map import CycleMap, walk_cycle
@@ -33,15 +35,18 @@ class Edited:
         Name of the engine in records.
     edit
         A function, called with the description (``mujoco.MjSpec``, names as in :class:`TwinModel`) and the robot,
-        before the corrections for the step (:mod:`chilopod.twin.step`). Its code and the numbers of its module that it
-        uses are part of a trial; functions that it calls are not.
+        before the corrections for the step (:mod:`chilopod.twin.step`). Everything that its code can reach is part of
+        a trial, as for a controller.
     """
 
     def __init__(self, name: str, edit: Edit) -> None:
-        version = (
-            f"{traits.version}, edit {hashlib.sha256(repr(_content(edit.__code__, edit)).encode()).hexdigest()[:12]}"
-        )
-        self.traits = replace(traits, name=name, sentence=f"{traits.sentence}, {name}", version=version)
+        function: Any = getattr(edit, "func", edit)  # of a partial
+        function = function if hasattr(function, "__code__") else type(function).__call__
+        if not hasattr(function, "__code__"):
+            raise ParameterError("must be a function in Python", field="edit", value=edit, allowed="def or lambda")
+        content = hashlib.sha256(repr(_content(function.__code__, function)).encode()).hexdigest()[:12]
+        version, sentence = f"{traits.version}, edit {content}", f"{traits.sentence}, {name}"
+        self.traits = replace(traits, name=name, sentence=sentence, version=version)
         self._edit = edit
 
     def common(self, robot: Robot) -> Robot:
@@ -50,19 +55,20 @@ class Edited:
 
     def initial_states(self, *arguments: Any, **named: Any) -> Array:
         """See :func:`chilopod.twin.initial_states`."""
-        return initial_states(*arguments, **named, edit=self._edit)
+        # Models are shared by their edit, here a new object: what the edit does may have changed since the last.
+        return initial_states(*arguments, **named, edit=partial(self._edit))
 
     def start(self, *arguments: Any, **named: Any) -> TwinWalk:
         """See :func:`chilopod.twin.start`."""
-        return start(*arguments, **named, edit=self._edit, traits=self.traits)
+        return start(*arguments, **named, edit=partial(self._edit), traits=self.traits)
 
     def walk_cycle(self, robot: Robot) -> tuple[CycleMap, Array]:
         """See :func:`chilopod.twin.walk_cycle`."""
-        return walk_cycle(robot, self._edit)
+        return walk_cycle(robot, partial(self._edit))
 
     def resume(self, saved: bytes, threads: int = 0) -> TwinWalk:
         """See :func:`chilopod.twin.resume`."""
-        return resume(saved, threads, edit=self._edit, traits=self.traits)
+        return resume(saved, threads, edit=partial(self._edit), traits=self.traits)
 
 
 def _content(code: CodeType, edit: Any) -> tuple[Any, ...]:
