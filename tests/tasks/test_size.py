@@ -14,7 +14,7 @@ from chilopod.analysis.quantities import Measured, leading_mode
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.progress import silent
 from chilopod.robot import Robot, load_robot
-from chilopod.tasks import size
+from chilopod.tasks import size, sizing
 from chilopod.tasks.sizing.search import FAILED, Outcome, Search, Wish, parsed_wish
 from chilopod.trials import NONE, Trial, run, summaries
 
@@ -125,6 +125,33 @@ def test_a_walk_that_settles_for_hours_is_said_to_be_settling():
     found = size(ROBOT, {"radius": "5 m"}, [SPRING])
     assert found.outcome is Outcome.SLOW
     assert found.values == pytest.approx([5.0])
+
+
+def test_a_walk_lasts_as_many_gait_cycles_in_any_unit_of_time():
+    class Measure:
+        def settling(self, robot):
+            return 20.0 * robot.gait.period
+
+    for factor in (1e-3, 1.0, 1e3):
+        texts = [f"gait.stance={0.31 * factor} s", f"gait.swing={0.29 * factor} s"]
+        assert sizing._cycles(ROBOT.set_from_text(texts), Measure()) == pytest.approx(300.0)
+
+
+def test_a_walk_that_has_not_settled_is_said_so(monkeypatch):
+    """Its bend grows by less than 5 % in 10 s, and goes on growing."""
+
+    def growing(trials):
+        record = run([replace(trials[0], duration=6.0)])[0]
+        times = np.arange(901) / 10.0
+        record = record.isel(time=np.zeros(times.size, dtype=int)).assign_coords(time=times)
+        record["joint_angle"] = record.joint_angle * 0.0 + 0.2 * np.exp(0.004 * record.time)
+        record["position"] = record.position + 0.1 * record.time
+        return [record]
+
+    monkeypatch.setattr(sizing, "run", growing)
+    found = size(ROBOT, {"speed": "<0.2 m/s"}, [SPRING])
+    assert found.lines()[-1] == "  the planar walk turns right, not settled yet"
+    assert found.as_json()["walks"]["planar"]["settled"] is False
 
 
 def test_limits_and_budgets():

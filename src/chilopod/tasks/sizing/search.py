@@ -59,7 +59,7 @@ class Outcome(Labelled):
 
     MET = "met", "every wish is met"
     OTHERWISE = "walks otherwise", "the wishes are met in theory, but a walk that starts bent does something else"
-    SLOW = "not settled", "the wishes are met in theory; a walk of 15 minutes that starts bent has not settled"
+    SLOW = "not settled", "the wishes are met in theory; a walk of 1500 gait cycles that starts bent has not settled"
     UNMET = "unmet", "no robot that was tried meets every wish; this one comes nearest"
     BUDGET = "budget", "the evaluations of the search were spent before every wish was met; this robot came nearest"
     LACKING = "lacking", "no robot that was tried has every wished quantity"
