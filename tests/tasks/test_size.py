@@ -154,6 +154,36 @@ def test_a_walk_that_has_not_settled_is_said_so(monkeypatch):
     assert found.as_json()["walks"]["planar"]["settled"] is False
 
 
+def test_a_robot_that_bends_too_far_has_no_curved_walk(monkeypatch):
+    """The same verdict as that of `sensitivity`, also for limits."""
+    robot, bent = ROBOT.with_value(K1, stiffness(8.0)), [1.5]
+    monkeypatch.setattr(Measured, "radius", lambda self, robot: 0.5)
+    monkeypatch.setattr(Measured, "speed", lambda self, robot: 0.1)
+    monkeypatch.setattr(Measured, "most_bent", lambda self, robot: bent[0])
+    measured, wishes = Measured(Onset()), [Wish("radius", 0.5), Wish("radius", 0.6, -1), Wish("speed", 0.1)]
+    assert [wish.searched(measured, robot) for wish in wishes] == [0.0, 0.0, 0.0]
+    bent[0] = 1.6
+    assert [wish.searched(measured, robot) for wish in wishes] == [-FAILED] * 3
+    assert [wish.of(measured, robot) for wish in wishes] == pytest.approx([np.nan] * 3, nan_ok=True)
+    assert wishes[0].missed(-FAILED) == np.inf
+    with pytest.raises(AnalysisError, match="more than a right angle"):
+        measured.walked("radius", robot)
+
+
+def test_the_tightest_walk_in_range_is_nearest_to_a_tighter_one(monkeypatch):
+    def searched(wish, measured, robot):
+        spring = robot.get(K1) / stiffness(10.0)
+        return 0.1 * spring if spring > 1.7 else -FAILED
+
+    monkeypatch.setattr(Wish, "searched", searched)
+    search = Search(ROBOT, (Wish("radius", 0.1),), (axis(ROBOT, SPRING, "free"),), Onset(), 1200, 0, silent)
+    outcome = search.run()
+    assert outcome is Outcome.UNMET
+    assert search.numbers(search.best) == pytest.approx([stiffness(17.0)], rel=1e-9)
+    said = "some robots are left out: the curved walk bends a joint by more than a right angle"
+    assert search.reasons(outcome) == ([said], [])
+
+
 def test_limits_and_budgets():
     gentle = size(ROBOT, {"margin": ">50%", "settling": "<6 s"}, [SPRING])
     assert gentle.outcome is Outcome.MET

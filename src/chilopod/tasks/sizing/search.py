@@ -29,7 +29,7 @@ from scipy.stats.qmc import Sobol
 from chilopod import units
 from chilopod.analysis.branch import NO_PAIR
 from chilopod.analysis.map_axes import Axis
-from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mode
+from chilopod.analysis.quantities import QUANTITIES, TOO_BENT, Measured, Onset, leading_mode
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
@@ -39,7 +39,7 @@ from chilopod.robot import Robot
 from chilopod.stability import Criticality, Kind, find_orbit
 
 FAILED = 10.0
-"""Deviation of a robot without the quantity."""
+"""Deviation of a robot without the quantity; negative where its curved walk bends too far, as one too tight."""
 
 _MET = 1e-6  # largest relative deviation from a wish that is met
 _SCANNED = 12  # intervals of a range in which a root is looked for
@@ -84,23 +84,23 @@ class Wish:
         """Smooth measure of that deviation of a robot, zero and signed alike; :data:`FAILED` without the quantity."""
         try:
             if self.quantity != "radius":
-                return self.deviation(getattr(measured, self.quantity)(robot))
+                return self.deviation(measured.walked(self.quantity, robot))
             growth = leading_mode(robot).growth
-            curvature = self.value / measured.radius(robot) if growth > 0.0 else 0.0
+            curvature = self.value / measured.walked("radius", robot) if growth > 0.0 else 0.0
             return self._one_sided(1.0 - curvature**2 - min(growth, 0.0))
-        except ChilopodError:
-            return FAILED
+        except ChilopodError as error:
+            return -FAILED if TOO_BENT in str(error) else FAILED
 
     def missed(self, searched: float) -> float:
-        """Size of the deviation that :meth:`searched` measures; infinite for a radius if the robot walks straight."""
+        """Size of the deviation that :meth:`searched` measures; infinite for a radius without a curved walk."""
         if self.quantity != "radius":
             return abs(searched)
-        return abs(1.0 / np.sqrt(1.0 - searched) - 1.0) if searched < 1.0 else np.inf
+        return abs(1.0 / np.sqrt(1.0 - searched) - 1.0) if 1.0 > searched != -FAILED else np.inf
 
     def of(self, measured: Measured, robot: Robot) -> float:
         """The quantity of a robot, SI; NaN without it."""
         with suppress(ChilopodError):
-            return float(getattr(measured, self.quantity)(robot))
+            return measured.walked(self.quantity, robot)
         return np.nan
 
     @property
@@ -222,7 +222,7 @@ class Search:
             self._least = np.full(len(self.wishes), np.inf)
             outcome, self.again = self._searched(), Measured(self._measured.number, similar=False)
         self._spent = outcome is Outcome.BUDGET
-        lacking = FAILED in self._least or not np.isfinite(self._missed(self._least)).all()
+        lacking = _failed(self._least) or not np.isfinite(self._missed(self._least)).all()
         return Outcome.LACKING if lacking else outcome
 
     def _searched(self) -> Outcome:
@@ -236,7 +236,7 @@ class Search:
                     self._fit(start)
             unmet = Outcome.UNMET
         self._limit = limit
-        cliff = any(FAILED in found or not np.isfinite(self._missed(found)).all() for found in self._seen)
+        cliff = any(_failed(found) or not np.isfinite(self._missed(found)).all() for found in self._seen)
         if len(self.axes) > 1 and not _met(self._least) and cliff:
             with suppress(_SpentError):
                 self._evolve()
@@ -256,7 +256,7 @@ class Search:
         grid = np.linspace(0.0, 1.0, _SCANNED + 1)
         here = self.deviations(self._starts[0])[0]
         values = np.array([self.deviations(np.array([each]))[0] for each in grid.tolist()])
-        self._changed = bool(here == FAILED or np.abs(values - here).max() > _UNCHANGED)
+        self._changed = bool(abs(here) == FAILED or np.abs(values - here).max() > _UNCHANGED)
         if not self._changed:
             self.best, self._starts = self._starts[0], []
             return
@@ -320,6 +320,8 @@ class Search:
         except _SpentError:
             said.append("the evaluations were spent before it was known which wishes conflict")
         self.best, self._least = best, least
+        if (outcome is Outcome.LACKING or not said) and any(-FAILED in each for each in self._seen):
+            said.append(f"some robots are left out: {TOO_BENT}")
         return said or ["no end of a range and no other wish stands in the way"], front
 
     def _obstacles(self) -> list[str]:
@@ -329,7 +331,7 @@ class Search:
             if min(part, 1.0 - part) < _AT_END:
                 end = "lower" if part < 0.5 else "upper"
                 said.append(f"{each.path} is at the {end} end of its range, {units.format(value, each.unit, digits=6)}")
-        seen = np.array([found for found in self._seen if FAILED not in found]).reshape(-1, len(self.wishes))
+        seen = np.array([found for found in self._seen if not _failed(found)]).reshape(-1, len(self.wishes))
         for wish, values in zip(self.wishes, seen.T, strict=True):
             if values.size and not self._spent and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
                 said.append(_unchanged(wish))
@@ -366,7 +368,8 @@ class Search:
         self._take(len(found))
         again = Measured(self._measured.number, similar=False, following=self._following)
         again.near = self._measured.near
-        missed = [self._missed(self._found(place, again)) for place in found]
+        there = [self._found(place, again) for place in found]
+        missed = [np.where(_failed(each), np.inf, self._missed(each)) for each in there]
 
         def surpassed(own: Array) -> bool:
             gains = [own[pair] - other[pair] for other in missed]
@@ -378,6 +381,10 @@ class Search:
             if not apart or np.abs(place - apart[-1]).max() > _AT_END:
                 apart.append(place)
         return apart
+
+
+def _failed(deviations: Array) -> bool:
+    return bool((np.abs(deviations) == FAILED).any())
 
 
 def _met(deviations: Array) -> bool:
