@@ -184,6 +184,37 @@ def test_the_tightest_walk_in_range_is_nearest_to_a_tighter_one(monkeypatch):
     assert search.reasons(outcome) == ([said], [])
 
 
+def conflicting(monkeypatch, made_up):
+    monkeypatch.setattr(Search, "_found", lambda search, place, measured: made_up(*place))
+    axes = tuple(axis(ROBOT, each, "free") for each in (SPRING, ("legs.forward_offset", "0 mm", "60 mm")))
+    search = Search(ROBOT, (Wish("onset", 0.1), Wish("growth", -1.0)), axes, Onset(), 1200, 0, silent)
+    return search, *search.reasons(search.run())
+
+
+def test_an_end_of_a_range_is_named_where_the_robot_stands_at_it(monkeypatch):
+    """Least squares end beside it; the other number stays beside its end, as it does best there."""
+    search, said, _ = conflicting(monkeypatch, lambda p, q: np.array([0.3 + (p - 5e-4) ** 2, 0.2 + q]))
+    assert search.best == pytest.approx([5e-4, 0.0], abs=1e-4)
+    assert search.best[1] == 0.0
+    assert [each for each in said if "end of its range" in each] == [
+        "legs.forward_offset is at the lower end of its range, 0 mm"
+    ]
+
+
+def test_no_place_of_a_front_is_nearer_than_the_nearest(monkeypatch):
+    """Of two valleys searches from the starts find one; the other is found where a wish is left out."""
+
+    def left_out(search, wish, start):
+        place = np.array([0.9, 0.1])
+        return place, search.deviations(place)
+
+    monkeypatch.setattr(Search, "_left_out", left_out)
+    narrow = lambda p, q: 0.1 if abs(p - 0.9) + abs(q - 0.1) < 1e-3 else 0.0  # noqa: E731
+    search, _, front = conflicting(monkeypatch, lambda p, q: np.array([0.3 - narrow(p, q), 0.2 + (p - 0.5) ** 2 * q]))
+    sizes = [np.linalg.norm(search._found(place, None)) for place in front]
+    assert np.linalg.norm(search._found(search.best, None)) == pytest.approx(min(sizes), rel=1e-12)
+
+
 def test_limits_and_budgets():
     gentle = size(ROBOT, {"margin": ">50%", "settling": "<6 s"}, [SPRING])
     assert gentle.outcome is Outcome.MET

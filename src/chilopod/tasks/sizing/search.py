@@ -240,6 +240,10 @@ class Search:
         if len(self.axes) > 1 and not _met(self._least) and cliff:
             with suppress(_SpentError):
                 self._evolve()
+        beside = np.abs(self.best - 0.5) > 0.5 - _AT_END  # ends of ranges, which least squares do not reach
+        with suppress(_SpentError):
+            for i in np.flatnonzero(beside & (not _met(self._least))).tolist():
+                self.deviations(np.where(np.arange(self.best.size) == i, np.round(self.best), self.best))
         return Outcome.MET if _met(self._least) else unmet
 
     def _evolve(self) -> None:
@@ -306,9 +310,7 @@ class Search:
         if outcome is Outcome.MET:
             return [] if self._changed else [_unchanged(self.wishes[0])], []
         self._limit = self._budget
-        said, best, least = self._obstacles(), self.best, self._least
-        if self._spent and outcome is Outcome.LACKING:
-            said.append("the evaluations of the search were spent")
+        said, best, least = [], self.best, self._least
         front: list[Array] = []
         try:
             if len(self.wishes) > 1:
@@ -319,7 +321,11 @@ class Search:
                 front = self._front([*dict.fromkeys([*alone, *ranked])][:2], left_out, best)
         except _SpentError:
             said.append("the evaluations were spent before it was known which wishes conflict")
-        self.best, self._least = best, least
+        if outcome is Outcome.LACKING or _met(self._least):
+            self.best, self._least = best, least
+        said = self._obstacles() + said
+        if self._spent and outcome is Outcome.LACKING:
+            said.append("the evaluations of the search were spent")
         if (outcome is Outcome.LACKING or not said) and any(-FAILED in each for each in self._seen):
             said.append(f"some robots are left out: {TOO_BENT}")
         return said or ["no end of a range and no other wish stands in the way"], front
@@ -328,7 +334,7 @@ class Search:
         """Sentences about ends of ranges at the best place, and about wishes that nothing changes."""
         said = []
         for each, part, value in zip(self.axes, self.best.tolist(), self.numbers(self.best).tolist(), strict=True):
-            if min(part, 1.0 - part) < _AT_END:
+            if part in (0.0, 1.0):
                 end = "lower" if part < 0.5 else "upper"
                 said.append(f"{each.path} is at the {end} end of its range, {units.format(value, each.unit, digits=6)}")
         seen = np.array([found for found in self._seen if not _failed(found)]).reshape(-1, len(self.wishes))
@@ -365,6 +371,7 @@ class Search:
             weights = np.full(len(self.wishes), _OTHERS)
             weights[pair] = np.sqrt([1.0 - share, share]) / largest
             found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights)[0])
+        found.append(self.best)
         self._take(len(found))
         again = Measured(self._measured.number, similar=False, following=self._following)
         again.near = self._measured.near
