@@ -9,7 +9,7 @@ import xarray as xr
 from chilopod import load_robot, planar
 from chilopod.analysis.radius_law import radius_laws
 from chilopod.tasks import radius_law
-from chilopod.tasks.radius_law import end_of_walk
+from chilopod.tasks.radius_law import bent, end_of_walk
 from chilopod.trials import Trial, mean_joint_angles, run, summaries
 from chilopod.twin import simulate
 
@@ -49,6 +49,62 @@ def test_the_last_five_seconds_are_the_same_everywhere():
     assert ended.axis_radius == pytest.approx(5.0 * robot.module_length / np.abs(last.mean(0)).sum(), rel=1e-13)
     early = mean_joint_angles(record, 2.0, before=5.0).isel(robot=0).values
     np.testing.assert_allclose(early, record.joint_angle.isel(robot=0).values[-70:-50].mean(0), rtol=1e-13)
+
+
+def in_time(factor):
+    """The planar preset with another unit of time."""
+    robot = load_robot("aoi2022-planar")
+    for path, power in (("gait.stance", 1), ("gait.swing", 1), ("ground.friction", -1)):
+        robot = robot.with_value(path, robot.get(path) * factor**power)
+    return robot.with_value("springs.stiffness", robot.get("springs.stiffness") / factor**2)
+
+
+def made_up(trial):
+    """Record of a walk round a circle, whose bend sways, and grows by a part of 1 in 400 in each gait cycle."""
+    robot, times = trial.robot, np.arange(round(trial.duration * trial.rate) + 1) / trial.rate
+    cycles = times / robot.gait.period
+    angles = 0.1 * np.exp(cycles / 400.0) + 0.03 * np.sin(2.0 * np.pi * cycles)
+    way = 0.3 * np.stack([np.sin(0.1 * cycles), np.cos(0.1 * cycles)], -1)
+    return xr.Dataset(
+        {
+            "joint_angle": (("time", "robot", "joint"), np.repeat(angles, 5).reshape(-1, 1, 5)),
+            "position": (("time", "robot", "axis"), way[:, None]),
+            "status": ("robot", np.array(["walked"], dtype=object)),
+        },
+        coords={"time": times, "robot": [0], "joint": [1, 2, 3, 4, 5], "axis": ["x", "y"]},
+    )
+
+
+@pytest.mark.parametrize("factor", [1e-3, 0.1, 10.0, 1e3])
+def test_the_end_of_a_walk_does_not_depend_on_the_unit_of_time(factor):
+    own, other = in_time(1.0), in_time(factor)
+    ends = [end_of_walk(made_up(bent(robot)), robot) for robot in (own, other)]
+    for name in ("axis_radius", "bend", "moved", "mean_angle"):
+        np.testing.assert_allclose(ends[1][name], ends[0][name], rtol=1e-9)
+    assert float(ends[1].speed) * factor == pytest.approx(float(ends[0].speed), rel=1e-9)
+    assert [end.direction.item() for end in ends] == ["right", "right"]
+
+
+def test_a_walk_whose_samples_do_not_show_its_angles_has_no_direction():
+    robot = in_time(1.0)
+    record = made_up(replace(bent(robot), rate=1.0 / robot.gait.period))
+    assert end_of_walk(record, robot).direction.item() == ""
+
+
+def test_means_of_a_slow_gait_are_those_of_a_whole_cycle():
+    robot = in_time(20.0)
+    record = made_up(replace(bent(robot), duration=3.0 * robot.gait.period))
+    record["joint_angle"] = record.joint_angle - 0.1 * np.exp(record.time / robot.gait.period / 400.0) + 0.1
+    (end,) = summaries(robot, record)
+    np.testing.assert_allclose(end.joint_angles, 0.1, rtol=1e-12)
+
+
+def test_a_bend_that_grows_slowly_has_not_settled():
+    """By 4 % in ten seconds, as beside an onset; by a fifth in half of the walk."""
+    robot = in_time(1.0)
+    record = made_up(bent(robot))
+    assert end_of_walk(record, robot).settled
+    assert not end_of_walk(record, robot, 45.0).settled
 
 
 def test_a_straight_walk_has_an_infinite_radius_everywhere():

@@ -14,7 +14,7 @@ from chilopod.analysis.quantities import Measured, leading_mode
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.progress import silent
 from chilopod.robot import Robot, load_robot
-from chilopod.tasks import size
+from chilopod.tasks import size, sizing
 from chilopod.tasks.sizing.search import FAILED, Outcome, Search, Wish, parsed_wish
 from chilopod.trials import NONE, Trial, run, summaries
 
@@ -125,6 +125,94 @@ def test_a_walk_that_settles_for_hours_is_said_to_be_settling():
     found = size(ROBOT, {"radius": "5 m"}, [SPRING])
     assert found.outcome is Outcome.SLOW
     assert found.values == pytest.approx([5.0])
+
+
+def test_a_walk_lasts_as_many_gait_cycles_in_any_unit_of_time():
+    class Measure:
+        def settling(self, robot):
+            return 20.0 * robot.gait.period
+
+    for factor in (1e-3, 1.0, 1e3):
+        texts = [f"gait.stance={0.31 * factor} s", f"gait.swing={0.29 * factor} s"]
+        assert sizing._cycles(ROBOT.set_from_text(texts), Measure()) == pytest.approx(300.0)
+
+
+def test_a_walk_that_has_not_settled_is_said_so(monkeypatch):
+    """Its bend grows by less than 5 % in 10 s, and goes on growing."""
+
+    def growing(trials):
+        record = run([replace(trials[0], duration=6.0)])[0]
+        times = np.arange(901) / 10.0
+        record = record.isel(time=np.zeros(times.size, dtype=int)).assign_coords(time=times)
+        record["joint_angle"] = record.joint_angle * 0.0 + 0.2 * np.exp(0.004 * record.time)
+        record["position"] = record.position + 0.1 * record.time
+        return [record]
+
+    monkeypatch.setattr(sizing, "run", growing)
+    found = size(ROBOT, {"speed": "<0.2 m/s"}, [SPRING])
+    assert found.lines()[-1] == "  the planar walk turns right, not settled yet"
+    assert found.as_json()["walks"]["planar"]["settled"] is False
+
+
+def test_a_robot_that_bends_too_far_has_no_curved_walk(monkeypatch):
+    """The same verdict as that of `sensitivity`, also for limits."""
+    robot, bent = ROBOT.with_value(K1, stiffness(8.0)), [1.5]
+    monkeypatch.setattr(Measured, "radius", lambda self, robot: 0.5)
+    monkeypatch.setattr(Measured, "speed", lambda self, robot: 0.1)
+    monkeypatch.setattr(Measured, "most_bent", lambda self, robot: bent[0])
+    measured, wishes = Measured(Onset()), [Wish("radius", 0.5), Wish("radius", 0.6, -1), Wish("speed", 0.1)]
+    assert [wish.searched(measured, robot) for wish in wishes] == [0.0, 0.0, 0.0]
+    bent[0] = 1.6
+    assert [wish.searched(measured, robot) for wish in wishes] == [-FAILED] * 3
+    assert [wish.of(measured, robot) for wish in wishes] == pytest.approx([np.nan] * 3, nan_ok=True)
+    assert wishes[0].missed(-FAILED) == np.inf
+    with pytest.raises(AnalysisError, match="more than a right angle"):
+        measured.walked("radius", robot)
+
+
+def test_the_tightest_walk_in_range_is_nearest_to_a_tighter_one(monkeypatch):
+    def searched(wish, measured, robot):
+        spring = robot.get(K1) / stiffness(10.0)
+        return 0.1 * spring if spring > 1.7 else -FAILED
+
+    monkeypatch.setattr(Wish, "searched", searched)
+    search = Search(ROBOT, (Wish("radius", 0.1),), (axis(ROBOT, SPRING, "free"),), Onset(), 1200, 0, silent)
+    outcome = search.run()
+    assert outcome is Outcome.UNMET
+    assert search.numbers(search.best) == pytest.approx([stiffness(17.0)], rel=1e-9)
+    said = "some robots are left out: the curved walk bends a joint by more than a right angle"
+    assert search.reasons(outcome) == ([said], [])
+
+
+def conflicting(monkeypatch, made_up):
+    monkeypatch.setattr(Search, "_found", lambda search, place, measured: made_up(*place))
+    axes = tuple(axis(ROBOT, each, "free") for each in (SPRING, ("legs.forward_offset", "0 mm", "60 mm")))
+    search = Search(ROBOT, (Wish("onset", 0.1), Wish("growth", -1.0)), axes, Onset(), 1200, 0, silent)
+    return search, *search.reasons(search.run())
+
+
+def test_an_end_of_a_range_is_named_where_the_robot_stands_at_it(monkeypatch):
+    """Least squares end beside it; the other number stays beside its end, as it does best there."""
+    search, said, _ = conflicting(monkeypatch, lambda p, q: np.array([0.3 + (p - 5e-4) ** 2, 0.2 + q]))
+    assert search.best == pytest.approx([5e-4, 0.0], abs=1e-4)
+    assert search.best[1] == 0.0
+    assert [each for each in said if "end of its range" in each] == [
+        "legs.forward_offset is at the lower end of its range, 0 mm"
+    ]
+
+
+def test_no_place_of_a_front_is_nearer_than_the_nearest(monkeypatch):
+    """Of two valleys searches from the starts find one; the other is found where a wish is left out."""
+
+    def left_out(search, wish, start):
+        place = np.array([0.9, 0.1])
+        return place, search.deviations(place)
+
+    monkeypatch.setattr(Search, "_left_out", left_out)
+    narrow = lambda p, q: 0.1 if abs(p - 0.9) + abs(q - 0.1) < 1e-3 else 0.0  # noqa: E731
+    search, _, front = conflicting(monkeypatch, lambda p, q: np.array([0.3 - narrow(p, q), 0.2 + (p - 0.5) ** 2 * q]))
+    sizes = [np.linalg.norm(search._found(place, None)) for place in front]
+    assert np.linalg.norm(search._found(search.best, None)) == pytest.approx(min(sizes), rel=1e-12)
 
 
 def test_limits_and_budgets():

@@ -39,9 +39,9 @@ def walk(
 ) -> None:
     """Let a robot walk, once or many times, and say where it gets to.
 
-    It starts at the origin and heads along x; y is to its left. Joint angles are means over the last 5 s, or a
-    shorter walk, positive where the body bends to the right; the radius is that of the arc they make of the body, as in
-    the paper.
+    It starts at the origin and heads along x; y is to its left. Joint angles are means over the last 5 s, a longer gait
+    cycle, or a shorter walk, positive where the body bends to the right; the radius is that of the arc they make of the
+    body, as in the paper.
 
     Example: chilopod walk aoi2022-planar --set "springs.stiffness[0]=8 N*mm/deg" --seed 1 --repeats 4 --out walks.nc
     """

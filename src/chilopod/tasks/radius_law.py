@@ -19,14 +19,23 @@ from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
 from chilopod.trials import AVERAGED, NONE, Trial, mean_joint_angles, run, summaries
 
+PERIOD = 0.6
+"""Gait cycle of the paper's robot, s; whatever takes some time in it takes as many cycles in other robots."""
+
 DURATION = 90.0
-"""Duration of every trial, s: beside the onset a bend takes a minute to grow."""
+"""Duration of its trials, s: beside the onset a bend takes a minute to grow."""
+
+CYCLES = 150.0
+"""The same in gait cycles, of every robot."""
 
 CURVED = 0.25
 """Least bend of all joints together of a curved walk, rad: a radius of 4.5 m or less."""
 
 SETTLED = 0.05
 """Largest relative change of the bend of a settled curve in the 10 s before its end."""
+
+SAMPLES = 6
+"""Samples in a gait cycle: 10 in a second of the paper's robot."""
 
 HELD = 16
 """Number of walks that must stay in range at a spring; then of 20 walks usually all do."""
@@ -73,11 +82,10 @@ def radius_law(
     return RadiusLaw.of_branch([stiffness(each) for each in values], radii, [True] * len(values), PAPER_UNIT)
 
 
-def bent(robot: Robot, engine: str = "planar", duration: float = DURATION) -> Trial:
-    """An undisturbed walk of a robot that starts bent, recorded about ten times a second, at the same phases of each
-    gait cycle."""
+def bent(robot: Robot, engine: str = "planar", cycles: float = CYCLES) -> Trial:
+    """An undisturbed walk of a robot that starts bent, recorded at the same phases of each gait cycle."""
     angles, period = (_LAW_BEND / (robot.body.modules - 1),), robot.gait.period
-    return Trial(robot, duration, 0, angles, None, None, NONE, max(1, round(10.0 * period)) / period, engine=engine)
+    return Trial(robot, cycles * period, 0, angles, None, None, NONE, SAMPLES / period, engine=engine)
 
 
 def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:
@@ -89,30 +97,33 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
     """
     for first, value in enumerate(law.values[:-2].tolist()):
         walker = robot.with_value(K1, value)
-        ends = run([Trial(walker, DURATION, seed, rate=1.0, engine=engine) for seed in range(HELD)])
+        ends = run([Trial(walker, CYCLES * robot.gait.period, seed, rate=1.0, engine=engine) for seed in range(HELD)])
         if all(end.status.values[0] == Status.WALKED.label for end in ends):
             return RadiusLaw(law.values[first:], law.radii[first:], law.unit)
     raise AnalysisError("a joint leaves its range at every spring that bends the robot", field="springs")
 
 
-def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
-    """Measures at the end of one trial's record.
+def end_of_walk(record: xr.Dataset, robot: Robot, earlier: float = 10.0) -> xr.Dataset:
+    """Measures at the end of one trial's record. Times are those of the paper's robot; in others they are as many gait
+    cycles.
 
     Returns
     -------
     Dataset over joint: ``mean_angle``, ``axis_radius`` (m) and ``status`` of :class:`chilopod.trials.WalkSummary`;
     ``bend``, the sum of the sizes of the mean angles (rad); ``direction`` (left, right, straight; empty where the walk
-    failed); ``moved``, the difference of the bend from that of the 10 s before (rad), ``settled``, whether that is less
-    than :data:`SETTLED` of the bend; and ``speed``, that of module 1 over the last 12 s (m/s).
+    failed, or has no mean angles); ``moved``, the difference of the bend from that of the ``earlier`` s before (rad),
+    ``settled``, whether that is less than :data:`SETTLED` of the bend; and ``speed``, that of module 1 over the last
+    12 s (m/s).
     """
-    (end,) = summaries(robot, record)
+    second = robot.gait.period / PERIOD
+    (end,) = summaries(robot, record, AVERAGED * second)
     walk = record.isel(robot=0)
     times, last = walk.time.values, end.joint_angles
     bend = float(np.abs(last).sum())
-    moved = abs(bend - float(np.abs(mean_joint_angles(walk, 10.0, before=AVERAGED)).sum()))
+    moved = abs(bend - float(np.abs(mean_joint_angles(walk, earlier * second, AVERAGED * second)).sum()))
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
-    back = int(np.searchsorted(times, times[-1] - 12.0))
+    back = int(np.searchsorted(times, times[-1] - 12.0 * second))
     # Path length by arcs, gait cycle by gait cycle, from phase 0: on a curve chords are shorter, and module 1 sways.
     stride = max(1, round(robot.gait.period / (times[1] - times[0])))
     chords = np.diff(place[back - back % stride :: stride] @ np.array([1.0, 1.0j]))
@@ -123,7 +134,7 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
             "mean_angle": ("joint", last, {"units": "rad"}),
             "bend": ((), bend, {"units": "rad"}),
             "axis_radius": ((), end.axis_radius, {"units": "m"}),
-            "direction": ((), np.array("" if end.failed else side, dtype=object)),
+            "direction": ((), np.array("" if end.failed or np.isnan(bend) else side, dtype=object)),
             "moved": ((), moved, {"units": "rad"}),
             "settled": ((), moved <= SETTLED * bend),
             "speed": ((), float(steps.mean()), {"units": "m/s"}),

@@ -179,7 +179,8 @@ class Ends(Runs):
         }
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
-        last = f"joint angles, mean of the last {min(AVERAGED, self.first.duration):g} s (deg)"
+        averaged = min(max(AVERAGED, self.robot.gait.period), self.first.duration)
+        last = f"joint angles, mean of the last {averaged:g} s (deg)"
         rows: list[Sequence[str]] = [("seed", "x (m)", "y (m)", "radius (m)", last)]
         below = []
         for label, end in zip(self.labels, self.summaries, strict=True):

@@ -27,8 +27,8 @@ class WalkSummary:
     status
         Label of :class:`chilopod.engine.Status`.
     joint_angles, axis_radius
-        Means over the last :data:`AVERAGED` s, or a shorter walk, rad, shape (N-1,), NaN if the walk failed, or if its
-        samples there leave more than half of the gait cycle out; and radius from these angles, see
+        Means over the last :data:`AVERAGED` s, a longer gait cycle, or a shorter walk, rad, shape (N-1,), NaN if the
+        walk failed, or if its samples there leave more than half of the cycle out; and radius from these angles, see
         :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
     x, y
         Position of the centre of module 1 at the end, m.
@@ -82,13 +82,14 @@ def straight(record: xr.Dataset) -> bool:
     return not (record.joint_angle.values.any() or ends.any())
 
 
-def summaries(robot: Robot, record: xr.Dataset) -> Sequence[WalkSummary]:
-    """Summary of every walk of a record."""
+def summaries(robot: Robot, record: xr.Dataset, seconds: float = AVERAGED) -> Sequence[WalkSummary]:
+    """Summary of every walk of a record, with means over its last seconds, or over its last gait cycle if longer."""
+    seconds = max(seconds, robot.gait.period)
     times, end, place = record.time.values, float(record.time[-1]), record.position.isel(time=-1)
     if "end_position" in record:  # the walk goes on behind the last sample
         end, place = record.attrs["duration"], record.end_position
-    if _shows_cycle(times[times > end - AVERAGED + 1e-9], min(AVERAGED, end), robot.gait.period):
-        angles = mean_joint_angles(record, before=times[-1] - end).transpose("robot", "joint").values
+    if _shows_cycle(times[times > end - seconds + 1e-9], min(seconds, end), robot.gait.period):
+        angles = mean_joint_angles(record, seconds, before=times[-1] - end).transpose("robot", "joint").values
     else:
         angles = np.full((record.sizes["robot"], record.sizes["joint"]), np.nan)
     radii = robot.axis_radius(angles)

@@ -60,6 +60,17 @@ def test_a_radius_at_which_the_robot_folds_up_is_left_out(found, monkeypatch):
     assert "more than a right angle" in ranked.left_out[chosen[0].name]
 
 
+def test_a_radius_is_that_of_a_branch_that_first_rises_beyond_its_onset(found, monkeypatch):
+    """As that of a subcritical onset does; it is followed in the interval of the data, not just beyond the onset."""
+    asked = []
+    monkeypatch.setattr("chilopod.analysis.quantities.Measured._followed", lambda self, *_: asked.append(self) or 1 / 0)
+    for each in usual(found):
+        if each.name.startswith("radius"):
+            with pytest.raises(ZeroDivisionError):
+                each.of(found.best)
+    assert [each.number.between[1] for each in asked] == [DATA.between[1]] * 3
+
+
 def test_measurements_of_known_effect(found):
     def no_effect(robot):
         return np.array([1.0])

@@ -166,7 +166,7 @@ def usual(found: Identification) -> Iterator[Measurement]:
     for words, spring in (("decay", 4.0 * critical), ("decay", 2.0 * critical), ("growth", 0.8 * critical)):
         yield Measurement(f"{words} after a push, {said(K1, spring)}", partial(_rate, spring), rough)
     for spring in critical * np.array([0.95, 0.8, 0.6]):
-        yield Measurement(f"radius, {said(K1, spring)}", _radius(spring, 1.1 * critical), rough)
+        yield Measurement(f"radius, {said(K1, spring)}", _radius(spring, data.between[1]), rough)
     for path in FREE:
         yield Measurement(f"{path} itself", partial(_own, path), rough)
 

@@ -37,8 +37,7 @@ from chilopod.tasks.identify.constants import CONFIDENCE, Estimates, FreeConstan
 from chilopod.tasks.identify.data import FITTED, BaseSeries
 from chilopod.tasks.identify.twin_series import DURATION, LOST, Series, base_series, residuals
 from chilopod.tasks.identify.valley import LEAST, Samples, Surrogate
-from chilopod.tasks.radius_law import DURATION as LONG
-from chilopod.tasks.radius_law import end_of_walk
+from chilopod.tasks.radius_law import CYCLES, SAMPLES, end_of_walk
 from chilopod.trials import Trial, run
 
 if TYPE_CHECKING:
@@ -217,7 +216,13 @@ def confirmed(robot: Robot, data: BaseSeries) -> bool:
     """True if walks from a straight start agree with the data: at the stiffest curved spring most of them curve, to
     both sides, and at the softest straight spring most of them stay straight."""
     trials = [
-        Trial(robot.with_value(K1, spring), LONG, seed, rate=10.0, engine="twin")
+        Trial(
+            robot.with_value(K1, spring),
+            CYCLES * robot.gait.period,
+            seed,
+            rate=SAMPLES / robot.gait.period,
+            engine="twin",
+        )
         for spring in (max(data.curved), min(data.straight))
         for seed in range(_TRIALS)
     ]

@@ -19,14 +19,14 @@ from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mo
 from chilopod.errors import ChilopodError, ParameterError, known_names
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.tasks.radius_law import DURATION, bent, end_of_walk, is_curved
+from chilopod.tasks.radius_law import CYCLES, PERIOD, bent, end_of_walk, is_curved
 from chilopod.tasks.sizing.result import Sizing
 from chilopod.tasks.sizing.search import Outcome, Search, Wish, parsed_wish
 from chilopod.trials import run
 
 _AS_COMPUTED = 0.02  # largest relative deviation of radius and speed of a planar walk from those computed
 _SETTLED = 15.0  # settling times of a walk
-_LONGEST = 900.0  # s, of a walk
+_MOST = 1500.0  # gait cycles of a walk, 15 minutes of the paper's robot
 _OF_ONSET = {"onset", "margin", "friction", "work", "coefficient"}
 
 
@@ -87,10 +87,12 @@ def size(
     bound = search.bound() if outcome is Outcome.MET and search.is_root else np.nan
     progress(1.0, "walks")
     engines = ("planar", "twin")[: 1 + twin]
-    records = {name: run([bent(found, name, _duration(found, again))])[0] for name in engines}
-    walks = {name: end_of_walk(record, found) for name, record in records.items()}
+    cycles = _cycles(found, again)
+    records = {name: run([bent(found, name, cycles)])[0] for name in engines}
+    # A walk that has settled bends alike in its whole second half.
+    walks = {name: end_of_walk(record, found, 0.5 * cycles * PERIOD) for name, record in records.items()}
     if outcome is Outcome.MET and not _as_computed(walks["planar"], found, again):
-        outcome = Outcome.SLOW if _duration(found, again) == _LONGEST else Outcome.OTHERWISE
+        outcome = Outcome.SLOW if cycles == _MOST else Outcome.OTHERWISE
     rows = np.array([[*search.numbers(u), *(wish.of(again, search.at(u)) for wish in given)] for u in front])
     return Sizing(
         _documented(robot, found, given, axes, onset, outcome), robot.name, given, onset, values, axes,
@@ -121,12 +123,12 @@ def _axes(robot: Robot, free: Sequence[Given]) -> tuple[Axis, ...]:
     return axes
 
 
-def _duration(robot: Robot, measured: Measured) -> float:
-    """Duration of a walk that starts bent, until it has settled, s."""
+def _cycles(robot: Robot, measured: Measured) -> float:
+    """Gait cycles of a walk that starts bent, until it has settled."""
     try:
-        return float(np.clip(_SETTLED * measured.settling(robot), DURATION, _LONGEST))
+        return float(np.clip(_SETTLED * measured.settling(robot) / robot.gait.period, CYCLES, _MOST))
     except ChilopodError:
-        return DURATION
+        return CYCLES
 
 
 def _as_computed(end: xr.Dataset, robot: Robot, measured: Measured) -> bool:

@@ -79,7 +79,9 @@ class Sizing(Summary, ReadOnlyArrays):
                 for wish, value in zip(self.wishes, self.values.tolist(), strict=True)
             ],
             "walks": {
-                name: {key: str(end[key].item()) for key in ("status", "direction")} for name, end in self.walks.items()
+                name: {key: str(end[key].item()) for key in ("status", "direction")}
+                | {"settled": bool(end.settled) if is_curved(end) else None}
+                for name, end in self.walks.items()
             },
             "reasons": list(self.reasons),
             "front_si": [

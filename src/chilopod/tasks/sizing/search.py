@@ -29,7 +29,7 @@ from scipy.stats.qmc import Sobol
 from chilopod import units
 from chilopod.analysis.branch import NO_PAIR
 from chilopod.analysis.map_axes import Axis
-from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mode
+from chilopod.analysis.quantities import QUANTITIES, TOO_BENT, Measured, Onset, leading_mode
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
@@ -39,7 +39,7 @@ from chilopod.robot import Robot
 from chilopod.stability import Criticality, Kind, find_orbit
 
 FAILED = 10.0
-"""Deviation of a robot without the quantity."""
+"""Deviation of a robot without the quantity; negative where its curved walk bends too far, as one too tight."""
 
 _MET = 1e-6  # largest relative deviation from a wish that is met
 _SCANNED = 12  # intervals of a range in which a root is looked for
@@ -59,7 +59,7 @@ class Outcome(Labelled):
 
     MET = "met", "every wish is met"
     OTHERWISE = "walks otherwise", "the wishes are met in theory, but a walk that starts bent does something else"
-    SLOW = "not settled", "the wishes are met in theory; a walk of 15 minutes that starts bent has not settled"
+    SLOW = "not settled", "the wishes are met in theory; a walk of 1500 gait cycles that starts bent has not settled"
     UNMET = "unmet", "no robot that was tried meets every wish; this one comes nearest"
     BUDGET = "budget", "the evaluations of the search were spent before every wish was met; this robot came nearest"
     LACKING = "lacking", "no robot that was tried has every wished quantity"
@@ -84,23 +84,23 @@ class Wish:
         """Smooth measure of that deviation of a robot, zero and signed alike; :data:`FAILED` without the quantity."""
         try:
             if self.quantity != "radius":
-                return self.deviation(getattr(measured, self.quantity)(robot))
+                return self.deviation(measured.walked(self.quantity, robot))
             growth = leading_mode(robot).growth
-            curvature = self.value / measured.radius(robot) if growth > 0.0 else 0.0
+            curvature = self.value / measured.walked("radius", robot) if growth > 0.0 else 0.0
             return self._one_sided(1.0 - curvature**2 - min(growth, 0.0))
-        except ChilopodError:
-            return FAILED
+        except ChilopodError as error:
+            return -FAILED if TOO_BENT in str(error) else FAILED
 
     def missed(self, searched: float) -> float:
-        """Size of the deviation that :meth:`searched` measures; infinite for a radius if the robot walks straight."""
+        """Size of the deviation that :meth:`searched` measures; infinite for a radius without a curved walk."""
         if self.quantity != "radius":
             return abs(searched)
-        return abs(1.0 / np.sqrt(1.0 - searched) - 1.0) if searched < 1.0 else np.inf
+        return abs(1.0 / np.sqrt(1.0 - searched) - 1.0) if 1.0 > searched != -FAILED else np.inf
 
     def of(self, measured: Measured, robot: Robot) -> float:
         """The quantity of a robot, SI; NaN without it."""
         with suppress(ChilopodError):
-            return float(getattr(measured, self.quantity)(robot))
+            return measured.walked(self.quantity, robot)
         return np.nan
 
     @property
@@ -222,7 +222,7 @@ class Search:
             self._least = np.full(len(self.wishes), np.inf)
             outcome, self.again = self._searched(), Measured(self._measured.number, similar=False)
         self._spent = outcome is Outcome.BUDGET
-        lacking = FAILED in self._least or not np.isfinite(self._missed(self._least)).all()
+        lacking = _failed(self._least) or not np.isfinite(self._missed(self._least)).all()
         return Outcome.LACKING if lacking else outcome
 
     def _searched(self) -> Outcome:
@@ -236,10 +236,14 @@ class Search:
                     self._fit(start)
             unmet = Outcome.UNMET
         self._limit = limit
-        cliff = any(FAILED in found or not np.isfinite(self._missed(found)).all() for found in self._seen)
+        cliff = any(_failed(found) or not np.isfinite(self._missed(found)).all() for found in self._seen)
         if len(self.axes) > 1 and not _met(self._least) and cliff:
             with suppress(_SpentError):
                 self._evolve()
+        beside = np.abs(self.best - 0.5) > 0.5 - _AT_END  # ends of ranges, which least squares do not reach
+        with suppress(_SpentError):
+            for i in np.flatnonzero(beside & (not _met(self._least))).tolist():
+                self.deviations(np.where(np.arange(self.best.size) == i, np.round(self.best), self.best))
         return Outcome.MET if _met(self._least) else unmet
 
     def _evolve(self) -> None:
@@ -256,7 +260,7 @@ class Search:
         grid = np.linspace(0.0, 1.0, _SCANNED + 1)
         here = self.deviations(self._starts[0])[0]
         values = np.array([self.deviations(np.array([each]))[0] for each in grid.tolist()])
-        self._changed = bool(here == FAILED or np.abs(values - here).max() > _UNCHANGED)
+        self._changed = bool(abs(here) == FAILED or np.abs(values - here).max() > _UNCHANGED)
         if not self._changed:
             self.best, self._starts = self._starts[0], []
             return
@@ -306,9 +310,7 @@ class Search:
         if outcome is Outcome.MET:
             return [] if self._changed else [_unchanged(self.wishes[0])], []
         self._limit = self._budget
-        said, best, least = self._obstacles(), self.best, self._least
-        if self._spent and outcome is Outcome.LACKING:
-            said.append("the evaluations of the search were spent")
+        said, best, least = [], self.best, self._least
         front: list[Array] = []
         try:
             if len(self.wishes) > 1:
@@ -319,17 +321,23 @@ class Search:
                 front = self._front([*dict.fromkeys([*alone, *ranked])][:2], left_out, best)
         except _SpentError:
             said.append("the evaluations were spent before it was known which wishes conflict")
-        self.best, self._least = best, least
+        if outcome is Outcome.LACKING or _met(self._least):
+            self.best, self._least = best, least
+        said = self._obstacles() + said
+        if self._spent and outcome is Outcome.LACKING:
+            said.append("the evaluations of the search were spent")
+        if (outcome is Outcome.LACKING or not said) and any(-FAILED in each for each in self._seen):
+            said.append(f"some robots are left out: {TOO_BENT}")
         return said or ["no end of a range and no other wish stands in the way"], front
 
     def _obstacles(self) -> list[str]:
         """Sentences about ends of ranges at the best place, and about wishes that nothing changes."""
         said = []
         for each, part, value in zip(self.axes, self.best.tolist(), self.numbers(self.best).tolist(), strict=True):
-            if min(part, 1.0 - part) < _AT_END:
+            if part in (0.0, 1.0):
                 end = "lower" if part < 0.5 else "upper"
                 said.append(f"{each.path} is at the {end} end of its range, {units.format(value, each.unit, digits=6)}")
-        seen = np.array([found for found in self._seen if FAILED not in found]).reshape(-1, len(self.wishes))
+        seen = np.array([found for found in self._seen if not _failed(found)]).reshape(-1, len(self.wishes))
         for wish, values in zip(self.wishes, seen.T, strict=True):
             if values.size and not self._spent and np.ptp(values) <= _UNCHANGED and abs(values[0]) > _MET:
                 said.append(_unchanged(wish))
@@ -363,10 +371,12 @@ class Search:
             weights = np.full(len(self.wishes), _OTHERS)
             weights[pair] = np.sqrt([1.0 - share, share]) / largest
             found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights)[0])
+        found.append(self.best)
         self._take(len(found))
         again = Measured(self._measured.number, similar=False, following=self._following)
         again.near = self._measured.near
-        missed = [self._missed(self._found(place, again)) for place in found]
+        there = [self._found(place, again) for place in found]
+        missed = [np.where(_failed(each), np.inf, self._missed(each)) for each in there]
 
         def surpassed(own: Array) -> bool:
             gains = [own[pair] - other[pair] for other in missed]
@@ -378,6 +388,10 @@ class Search:
             if not apart or np.abs(place - apart[-1]).max() > _AT_END:
                 apart.append(place)
         return apart
+
+
+def _failed(deviations: Array) -> bool:
+    return bool((np.abs(deviations) == FAILED).any())
 
 
 def _met(deviations: Array) -> bool:
