@@ -20,6 +20,7 @@ from chilopod.stability import (
     follow2,
     from_map,
     locate,
+    switch,
     switch2,
 )
 from chilopod.stability.codimension_two import detection
@@ -406,3 +407,20 @@ def test_a_pole_of_a_coefficient_is_no_zero():
     first, second = curve.special
     assert (first.kind, second.kind) == (CodimensionTwo.FOLD_FLIP, CodimensionTwo.RESONANCE_1_2)
     assert (np.abs(first.values - [0.0, -1.0]) <= first.error_bound).all()
+
+
+def test_points_of_a_doubled_branch_are_followed_over_two_periods():
+    """x -> r x (1 - x) + q is y -> y^2 + c with c = r / 2 - r^2 / 4 - r q, whose 2-cycle doubles at c = -5/4."""
+
+    def family2(r, q):
+        return from_map(lambda x: ([r * x[0] * (1.0 - x[0]) + q], [[r * (1.0 - 2.0 * x[0])]]), 1)
+
+    def family(r):
+        return family2(r, 0.0)
+
+    (start,) = switch(family, follow(family, [0.6], (2.6, 3.6)).special_points[0])
+    point = follow(family, start, (2.6, 3.6)).special_points[-1].bifurcation
+    found = follow2(family2, point, ((2.6, 3.6), (-0.05, 0.05)), second=0.0, points=3, coefficients=False)
+    r, q = found.values.T
+    assert found.periods == 2
+    np.testing.assert_allclose(r / 2.0 - r**2 / 4.0 - r * q, -1.25, atol=1e-12)

@@ -251,3 +251,22 @@ def test_a_motion_that_ends_says_so(rhs):
     system = from_rhs(rhs, 1, 4.0, method="implicit")
     with pytest.raises(AnalysisError, match=r"beyond t = 1|not finite, at t = |beyond t = 0"):
         system.flow(np.array([1.0]), 0.0, 4.0)
+
+
+@pytest.mark.parametrize("coupling", [np.cos, lambda t: np.sin(t) ** 2, lambda t: 1.0 - np.sin(t)])
+def test_a_coupling_that_passes_zero_at_a_cut_of_the_period(coupling):
+    """Its round-off is all of it there, so shorter steps are not more exact. The mode is that of the slow motion."""
+
+    def rhs(t, x):
+        return [-1e6 * (x[0] - coupling(t) * x[1]), -x[1] + 2.0 + 0.3 * np.sin(t)]
+
+    found = exponents(from_rhs(rhs, 2, 2.0 * np.pi, method="implicit"), [0.5, 0.5])
+    assert (np.abs(found.values - [-1.0, -1e6]) <= found.error_bound).all()
+    assert (found.error_bound <= [1e-12, 1e-7]).all()
+    np.testing.assert_allclose(found.modes[0, 0] / found.modes[1, 0], coupling(0.0), atol=2e-6)
+
+
+def test_a_state_that_passes_zero_at_a_cut_of_the_period():
+    system = from_rhs(lambda t, x: -1e6 * (x - np.cos(t)), 1, 2.0 * np.pi, method="implicit")
+    found = exponents(system, [0.5])
+    assert abs(found.values[0] + 1e6) <= found.error_bound[0] <= 1e-7

@@ -200,13 +200,15 @@ class _Part(NamedTuple):
 def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int = 0) -> Cut:
     """A return from a state on the orbit in parts of moderate condition, apart from the ``unresolved`` fastest
     directions; AnalysisError if there are none. The return of a map, which has no parts, stays whole."""
-    # The derivative on a section may be only round-off; an orbit that moves gives the sizes.
-    autonomous, duration = is_autonomous(system), image.duration
-    units = sizes(system, x, duration) if autonomous else numerical_balance(image.jacobian)
+    # The derivative on a section may be only round-off; an orbit that moves gives the sizes. A decayed entry of the
+    # diagonal says nothing of its state's size.
+    autonomous, duration, one = is_autonomous(system), image.duration, np.eye(x.size)
+    balanced = np.where(one > 0.0, np.abs(image.jacobian.diagonal()).max(), image.jacobian)
+    units = sizes(system, x, duration) if autonomous else numerical_balance(balanced)
     parts: list[_Part] = []
     for start, end in itertools.pairwise(np.linspace(0.0, duration, _FEWEST + 1).tolist()):
         parts.append(_part(system, parts[-1].state if parts else x, start, end, units))
-    ratios, one = units / units[:, None], np.eye(x.size)
+    ratios = units / units[:, None]
     symmetry = one if system.symmetry is None else system.symmetry * units / units[:, None]
     if not (autonomous or unresolved):
         whole = image.jacobian * ratios

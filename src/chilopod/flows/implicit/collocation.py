@@ -32,6 +32,8 @@ _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 _MOST_ROUNDS = 10
 _CLOSE = 1e-7  # Newton correction after which the next one is round-off
 _NOISE = 2.0**-51  # round-off relative to the terms whose difference is the error estimate
+_SHAKE = 2.0**-30  # relative change of values that is far above round-off and has a linear effect
+_EXACT = 0.0, 0.0  # values without such changes
 
 
 class Control(NamedTuple):
@@ -142,7 +144,7 @@ def _newton_matrix(weights: Any, h: float, jacobians: Any, matrix: Any) -> None:
 @fused_njit(error_model="numpy")
 def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
     """Solve for the stages, from ``moved``, with ``columns``, ``slopes``, ``jacobians``; False if that fails."""
-    nodes, weights, largest = method.nodes, method.weights, problem.largest
+    tape, nodes, weights, largest = problem.tape, method.nodes, method.weights, problem.largest
     moved, slopes = step.moved, step.slopes
     s, n = moved.shape
     y = np.empty(n)
@@ -152,9 +154,8 @@ def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) ->
         for j in range(s):
             for i in range(n):
                 y[i] = x[i] + moved[j, i]
-            if not slope_at(
-                problem.tape, problem.series, problem.units, t + nodes[j] * h, y, slopes[j], step.jacobians[j]
-            ):
+            at = t + nodes[j] * h
+            if not slope_at(tape, problem.series, problem.units, at, y, _EXACT, slopes[j], step.jacobians[j]):
                 return False
         # The residual and, in the last round, the derivative of the equations with respect to the state at the start.
         right = np.zeros((s * n, 1 + n if close else 1))
@@ -192,9 +193,9 @@ def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) ->
 
 
 @fused_njit(error_model="numpy")
-def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple[Any, Any]:
+def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple[Any, Any, Any]:
     """Defect of f at the start from the polynomial through its values in the stages, filtered by the inverse of
-    1 - h gamma J, of the state and the columns of the derivative, shape (n, 1 + columns); and the round-off in it."""
+    1 - h gamma J, of the state and the columns of the derivative, shape (n, 1 + columns); its round-off; and filter."""
     start, gamma = method.start, method.gamma
     s, n = step.moved.shape
     size = derivative.shape[0]
@@ -219,18 +220,47 @@ def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple
                 terms[k, 1 + m] = abs(derivative[k, m])
     if not _solve(filtering, inverse):
         off.fill(math.inf)
-        return off, np.zeros(off.shape)
+        return off, np.zeros(off.shape), inverse
     # No shorter step removes its round-off.
-    noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(step.jacobian) @ terms))
-    return inverse @ off, noise
+    rounding = (_NOISE * h * gamma) * np.abs(inverse)
+    return inverse @ off, rounding @ (np.abs(step.jacobian) @ terms), rounding
 
 
 @fused_njit(error_model="numpy")
-def _estimate(problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any) -> float:
+def _swings(problem: Any, t: float, x: Any, step: Any, derivative: Any) -> Any:
+    """Changes of f and its jacobian at the end of a step per relative change of all that they are computed from, as
+    terms of round-off, if finite. What passes zero at the start, as cos t and 1 - sin t do, shrinks with the step, its
+    round-off does not."""
+    n, size = x.size, derivative.shape[0]
+    y, scale, found = x + step.moved[-1], np.abs(derivative) / _SHAKE, np.zeros((n, 1 + size))
+    slopes, jacobians = np.empty((3, n)), np.empty((3, n, n))
+    for k, shake in enumerate((_EXACT, (_SHAKE, 0.0), (0.0, _SHAKE))):
+        if not slope_at(problem.tape, problem.series, problem.units, t, y, shake, slopes[k], jacobians[k]):
+            return 0.0 * found
+        for i in range(n):
+            found[i, 0] += abs(slopes[k, i] - slopes[0, i]) / _SHAKE
+            for j in range(n):
+                for m in range(size):
+                    found[i, 1 + m] += abs(jacobians[k, i, j] - jacobians[0, i, j]) * scale[j, m]
+    return found
+
+
+@fused_njit(error_model="numpy")
+def _estimate(problem: Any, method: Any, x: Any, t: float, h: float, step: Any, control: Any, result: Any) -> float:
     """The error of a step relative to the largest values of states and entries of the derivative so far."""
-    largest, reached = problem.largest, step.reached
+    off, noise, rounding = _defects(x, h, method, step, result.derivative)
+    worst = _worst(x, step, off, noise, control.near, result)
+    if control.tolerance < worst < math.inf:
+        noise += rounding @ _swings(problem, t + h, x, step, result.derivative)
+        worst = _worst(x, step, off, noise, control.near, result)
+    return worst
+
+
+@fused_njit(error_model="numpy")
+def _worst(x: Any, step: Any, off: Any, noise: Any, near: Any, result: Any) -> float:
+    """The largest relative error that is not noise."""
+    largest, reached, derivative, extent = result.largest, step.reached, result.derivative, result.extent
     s, n = step.moved.shape
-    off, noise = _defects(x, h, method, step, derivative)
     end = step.columns[(s - 1) * n :]
     worst = 0.0
     for k in range(n):
@@ -326,7 +356,7 @@ def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: A
     fresh = True
     while t < t1:
         if fresh:
-            if not slope_at(tape, problem.series, problem.units, t, x, step.slope, step.jacobian):
+            if not slope_at(tape, problem.series, problem.units, t, x, _EXACT, step.slope, step.jacobian):
                 status = NOT_FINITE
                 break
             rate = 0.0
@@ -354,7 +384,7 @@ def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: A
             h *= 0.3
             h_last = 0.0
             continue
-        off = _estimate(problem, method, x, h, step, control.near, result.derivative, result.extent)
+        off = _estimate(problem, method, x, t, h, step, control, result)
         factor = _FASTEST_GROWTH
         if off > 0.0:
             factor = min(factor, max(_FASTEST_FALL, _SAFETY * (control.tolerance / off) ** (1.0 / (s + 1))))

@@ -26,6 +26,7 @@ from chilopod.lanes import HALF, as_lanes
 _INFINITE = 1e300  # value that counts as infinite: it leaves room for derivatives
 _NEGLIGIBLE = 1e154  # numerator below which a quotient by such a value is negligible
 _STEEP = 0.1  # power from which on a number is negligible, or infinite, where its inverse is so
+_TURN = 2.4  # the golden angle: the phases of near operations differ, so that their changes do not cancel
 
 
 class Series(NamedTuple):
@@ -253,13 +254,21 @@ def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: A
 
 
 @fused_njit(error_model="numpy")
-def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, jacobian: Any) -> bool:
-    """f and its jacobian at a state, in units of the states, with the current branches; False if not finite."""
+def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, shake: Any, slope: Any, jacobian: Any) -> bool:
+    """f and its jacobian at a state, in units of the states, with the current branches; False if not finite. Two waves
+    over time, states and operations, of amplitudes ``shake``, change them relatively."""
     values, tangents, slopes, span = series.values, series.tangents, tape.slopes, tape.layout[3:5]
     for i in range(x.size):
         values[i, 0] = x[i] * units[i]
     values[x.size, 0] = t
-    values_between(tape, series, span[0], span[1])
+    if shake == (0.0, 0.0):
+        values_between(tape, series, span[0], span[1])
+    else:
+        for i in range(span[1]):
+            if i >= span[0]:
+                values_between(tape, series, i, i + 1)
+            if i >= span[0] or i <= x.size:
+                values[i, 0] *= 1.0 + shake[0] * math.cos(_TURN * i) + shake[1] * math.sin(_TURN * i)
     tangents_at(tape.program, tape.terms, slopes, span, 0, 1.0, values, tangents)
     s = 0.0
     for i in range(x.size):

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,15 +28,15 @@ from chilopod.stability.codimension_two.detection import Critical, Detector, Sta
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.equilibria import SHRINKS
-from chilopod.stability.interface import offers, sizes, system_of, with_shared_symmetries
+from chilopod.stability.interface import offers, returns_per_period, sizes, system_of, with_shared_symmetries
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import event_beside, return_duration, whole_period
+from chilopod.stability.returns import event_beside, return_duration, returned_states, section_at, whole_period
 from chilopod.stability.symmetry.groups import reverses
 
 BUDGET = 20_000
 """Default budget of a curve, in return maps with derivatives."""
 
-_MOVED = 1e-4  # largest correction of the start, relative to the box
+_MOVED = 1e-4  # largest correction of the start, relative to the box, and of its orbit, relative to the states
 _MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
 
 Progress2 = Callable[[int, Point2], None]
@@ -101,6 +102,8 @@ def follow2(
     values = np.array([start.value, finite_array(second, (), "second")], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
         raise ParameterError("must hold the start", field="between", value=between, allowed=f"around {values}")
+    if outward is None:
+        family2, periods = _over_its_periods(family2, values, start.orbit, start.period)
     target, known = _target(family2, start, second)
     curve = CriticalCurve(family2, target, known, box, Budget(budget, seconds))
     if start.kind is Kind.FOLD:
@@ -131,6 +134,19 @@ def follow2(
 def _over_periods(family2: Family2, periods: int) -> Family2:
     """Systems for orbits over several periods, or without their symmetry in time."""
     return lambda p, q: whole_period(family2(p, q), periods)
+
+
+def _over_its_periods(family2: Family2, values: Array, orbit: Array, period: float) -> tuple[Family2, int]:
+    """Systems for the orbits of a point, and the number of their periods in one period of these."""
+    system = system_of(family2, *values.tolist())
+    if not np.isfinite(period) or orbit.shape != (system.dimension,):
+        return family2, 1
+    periods, duration = max(1, round(period / (system.period or period))), period / returns_per_period(system)
+    whole = periods > 1
+    if system.symmetry is not None and not whole:
+        back = returned_states(system, orbit[None], section_at(system, orbit, duration=duration))[0]
+        whole = bool((np.abs(back - orbit) > _MOVED * sizes(system, orbit, duration)).any())
+    return (_over_periods(family2, periods) if whole else family2), periods
 
 
 def _target(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
@@ -253,11 +269,13 @@ def switch2(
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     check_arguments(family2=family2, budget=budget)
     allowed = Budget(budget, seconds)
-    periods, signs = (2, (1.0,)) if flips else (1, (1.0, -1.0))
-    folds = CriticalCurve(_over_periods(family2, periods), 1, False, box, allowed)
+    family2, periods = _over_its_periods(family2, point.values, point.orbit, point.period)
+    times, signs = (2, (1.0,)) if flips else (1, (1.0, -1.0))
+    folds = CriticalCurve(_over_periods(family2, times), 1, False, box, allowed)
     with allowed:
         there = _Unfolding(family2, point, box, allowed)
-        return tuple(_start(there, folds, sign, periods) for sign in signs)
+        found = [_start(there, folds, sign, times) for sign in signs]
+    return tuple(replace(each, periods=periods * times) for each in found)
 
 
 class _Unfolding:
