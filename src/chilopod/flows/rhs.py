@@ -225,6 +225,8 @@ class RightHandSide:
                 "flow_states": lambda states, t0, t1: taylor.states(states, t0, t1, params),
                 "flow_tangents": lambda x, along, t0, t1: taylor.tangents(x, along, t0, t1, params),
             }
+            if tape.switches.size:
+                members["flow_events"] = lambda x, t0, t1: taylor.events(x, t0, t1, params)
             if taylor.patience:
                 members = members | _either(members, implicit)
         if self.autonomous:

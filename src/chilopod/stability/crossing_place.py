@@ -83,6 +83,7 @@ class Sample(ReadOnlyArrays):
     value: float
     orbit: Array
     image: ReturnMap
+    events: tuple[float, ...] = ()  # numbers of passages of the events in a period
 
     @functools.cached_property
     def _off(self) -> ComplexArray:

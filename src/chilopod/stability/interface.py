@@ -115,6 +115,9 @@ class Capabilities(Autonomous, Protocol):
         """Taylor coefficients in s of f(x(s)), shape (curves, orders, n), along curves x(s) = c0 + c1 s + ... with
         these coefficients, of the same shape; else differences are used."""
 
+    def flow_events(self, x: Array, t0: float, t1: float, /) -> Array:
+        """Numbers of passages of all events and switches from state x at t0 to t1; else no grazing is noticed."""
+
 
 def offers(system: object, member: str) -> TypeGuard[Capabilities]:
     """True if a system has an optional member."""

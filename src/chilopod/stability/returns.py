@@ -50,7 +50,8 @@ _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin in
 BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _NEIGHBOURS = 1e-10 * np.cos(np.arange(9.0))  # uneven distances of neighbours, relative to the sizes of the states
 _PAST = 1.5e-5  # distance along a curve, in its units, at which an orbit is past a grazing
-_JUMPS, _HALVINGS = 0.3, 20  # least jump of the derivative in a grazing, relative to it, and halvings to its place
+JUMPS = 0.01  # least jump of a derivative in units, relative to it, at a grazing that changes the events of a return
+_JUMPS, _HALVINGS = 0.3, 20  # the same where events are not known, and halvings to the place: half if they are
 _FALLING = 0.5  # least fall of the residual that is progress
 
 MOVED = "at {:.9g} time 0 was moved along the orbit, away from an event"
@@ -59,7 +60,7 @@ MOVED = "at {:.9g} time 0 was moved along the orbit, away from an event"
 EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
 """Sentence on the end of a curve at an event that reaches time 0."""
 
-_GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
+GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
 
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
@@ -141,7 +142,7 @@ _KEPT = "dimension", "spatial_symmetry", "scale", "velocity", "flow", "flow_with
 
 def whole_period(system: SystemLike, periods: int = 1) -> SystemLike:
     """System for orbits over several periods, or without its symmetry in time and its known orbit."""
-    whole: Any = SimpleNamespace(**{name: getattr(system, name, None) for name in _KEPT})
+    whole: Any = SimpleNamespace(**{name: getattr(system, name, None) for name in (*_KEPT, "flow_events")})
     whole.symmetry, whole.period = None, None if system.period is None else periods * system.period
     if is_autonomous(system):
         whole.guess_period = periods * system.guess_period
@@ -335,27 +336,41 @@ def starts(system: SystemLike, x: Array, duration: float) -> Iterator[Array]:
                 yield there
 
 
-def event_beside(system: SystemLike, x: Array, duration: float, derivative: Callable[[float], Array]) -> str:
-    """Sentence on the event at which a curve of orbits ends; empty without one. The derivative of the return is given
-    as a function of the distance along the curve from its last orbit."""
+def events_in(system: SystemLike, x: Array, period: float) -> tuple[float, ...]:
+    """Numbers of passages of the events in a period from a state; none if the system does not count them."""
+    with UserCode("flow_events"):
+        return tuple(system.flow_events(x.copy(), 0.0, period)) if offers(system, "flow_events") else ()
+
+
+def event_beside(system: SystemLike, x: Array, time: float, ahead: Callable[[float], tuple[SystemLike, Array]]) -> str:
+    """Sentence on the event at which a curve of orbits ends; empty without one. The system and a state are given as
+    functions of the distance along the curve from its last orbit."""
+
+    def seen(distance: float) -> tuple[tuple[float, ...], Array]:
+        there, state = ahead(distance)  # without the event the motion may never return
+        return events_in(there, state, time), checked_flow(there, state, 0.0, time)[1] * size / size[:, None]
+
     with contextlib.suppress(ChilopodError):
-        if jumps_at_ends(system, x, duration):
+        size = sizes(system, x, time)
+        if jumps_at_ends(system, x, time):
             return EVENT_AT_ZERO
         # A very unstable orbit meets other events on both sides.
-        if _jumps_within(derivative, _PAST) and not _jumps_within(derivative, -_PAST):
-            return _GRAZES
+        if jumps_within(seen, 0.0, _PAST) and not jumps_within(seen, 0.0, -_PAST):
+            return GRAZES
     return ""
 
 
-def _jumps_within(derivative: Callable[[float], Array], reach: float) -> bool:
-    """True if a derivative jumps between zero and some distance: its change there remains however short the way is."""
-    low, high, before, after = 0.0, reach, derivative(0.0), derivative(reach)
-    least = max(_JUMPS * max(1.0, float(np.linalg.norm(before))), 0.5 * float(np.linalg.norm(after - before)))
-    for _ in range(_HALVINGS):
+def jumps_within(seen: Callable[[float], tuple[tuple[float, ...], Array]], low: float, high: float) -> bool:
+    """True if a derivative jumps between two places, where events change or else it changes most: the change remains
+    however short the way is. Both are given at a place."""
+    (events, before), (others, after) = seen(low), seen(high)
+    known, size = events != others, max(1.0, float(np.linalg.norm(before)))
+    least = JUMPS * size if known else max(_JUMPS * size, 0.5 * float(np.linalg.norm(after - before)))
+    for _ in range(_HALVINGS // (1 + known)):
         if not float(np.linalg.norm(after - before)) > least:
             return False
-        between = derivative(middle := 0.5 * (low + high))
-        if np.linalg.norm(between - before) > np.linalg.norm(after - between):
+        here, between = seen(middle := 0.5 * (low + high))
+        if here != events if known else np.linalg.norm(between - before) > np.linalg.norm(after - between):
             high, after = middle, between
         else:
             low, before = middle, between

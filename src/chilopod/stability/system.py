@@ -57,7 +57,7 @@ class PeriodicSystem(ReadOnlyArrays):
     guess_period
         Approximate period of such a system's orbits, or a multiple of it below 100; one from a state gets its
         shortest period, one from a whole orbit that of the guess.
-    flow_with_error, flow_states, flow_tangents, flow_volume, is_stiff, velocity_series
+    flow_with_error, flow_states, flow_tangents, flow_volume, is_stiff, velocity_series, flow_events
         See :mod:`chilopod.stability.interface`.
     concurrent
         True if flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -80,12 +80,13 @@ class PeriodicSystem(ReadOnlyArrays):
     flow_volume: Callable[[Array, float, float], tuple[float, float]] | None = field(default=None, repr=False)
     is_stiff: Callable[[Array, float, float], bool] | None = field(default=None, repr=False)
     velocity_series: Callable[[Array], Array] | None = field(default=None, repr=False)
+    flow_events: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)
 
     def __post_init__(self) -> None:
         self._set("dimension", checked_count("dimension", self.dimension, LARGEST))
-        for name in ("flow", *_MORE):
+        for name in ("flow", "flow_events", *_MORE):
             function = getattr(self, name)
             if not (callable(function) or (function is None and name != "flow")):
                 raise ParameterError("must be a function", field=name, value=function)

@@ -94,7 +94,7 @@ class TaylorFlow:
         # Copies, because numba would compile again for read-only arrays.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         derivative, bound, start = np.eye(n), np.zeros((n, n)) if bounded else _NOTHING, x.copy()
-        steps = self._run(x, (t0, t1), params, derivative, bound)
+        steps, _ = self._run(x, (t0, t1), params, derivative, bound)
         if not bounded:
             return Passage(x, derivative, bound, steps)
         other = np.eye(n)
@@ -121,6 +121,12 @@ class TaylorFlow:
         self._run(states, (t0, t1), params, np.empty((self.tape.dimension, 0)))
         return states
 
+    def events(self, x: Array, t0: float, t1: float, params: Array) -> Array:
+        """Numbers of passages of the switches and events that depend on states, on the way of a state."""
+        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
+        met = self._run(x, (t0, t1), params, np.empty((self.tape.dimension, 0)))[1]
+        return np.asarray(met[self.tape.program[4, self.tape.switches[1]] != 0])
+
     def _run(
         self,
         x: Array,
@@ -131,8 +137,8 @@ class TaylorFlow:
         *,
         other: bool = False,
         stepwise: bool = True,
-    ) -> int:
-        """Carry one state, or several without derivatives, in place, by the second way if ``other``; the steps."""
+    ) -> tuple[int, Array]:
+        """Carry states in place, several without derivatives, by the second way if ``other``; steps and passages."""
         from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
 
         n, stop = self.tape.dimension, deadline.stop()
@@ -146,10 +152,10 @@ class TaylorFlow:
         shortest = _SHORTEST if self.patience and not self.tape.clocks.size else 0.0
         most_steps, patience, clock = self.most_steps, self.patience, self._clock(params.tobytes())
         control = kernels.Control(self._epsilon, order, most_steps, patience, shortest, shake, stepwise, stop)
-        outcome, steps = kernels.Outcome(derivative, bound), 0
+        outcome, steps = kernels.Outcome(derivative, bound, np.zeros(self.tape.switches.shape[1])), 0
         carry = kernels.advance_each if several else kernels.advance
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
-            begin = [(each, each.copy()) for each in (x, derivative, bound)]
+            begin = [(each, each.copy()) for each in (x, *outcome)]
             while True:
                 status, taken, t = carry(self.tape, self._directions, clock, params, x, span, control, outcome)
                 if not status:
@@ -162,7 +168,7 @@ class TaylorFlow:
                 for each, first in begin:
                     each[...] = first
             steps += taken
-        return steps
+        return steps, outcome.met
 
     def _cause(self, t: float, states: Array, params: Array, span: tuple[float, float]) -> str:
         """The function without a finite series in one of some states; empty if none stands out."""

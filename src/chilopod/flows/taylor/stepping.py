@@ -32,6 +32,7 @@ from chilopod.flows.taylor.switching import Motion, await_events, cross, enlarge
 from chilopod.flows.tracing.series import expand, loaded
 
 _FIRST = 0.37  # longest first step of the second computation, relative to the interval
+_BORDER = 1e-9  # part of an interval at its ends in which passages do not count: rounding may put them beyond
 _AT_ONCE = 1e-13
 """Smallest difference of two instants, relative to the time: an event nearer to an interval's border is on it."""
 
@@ -58,6 +59,7 @@ class Outcome(NamedTuple):
 
     derivative: Any  # shape (n, columns), multiplied by the derivative; shape (n, 0) for none
     bound: Any  # bound of its error where steps compute their own derivatives, shape (n, n); shape (0, 0) for none
+    met: Any  # numbers of passages of the switches, shape (switches,)
 
 
 @fused_njit(error_model="numpy")
@@ -110,6 +112,7 @@ def advance(
         t = reached
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
         if directions is not None and crossing >= 0:
+            outcome.met[crossing] += min(t - t0, t1 - t) > _BORDER * (t1 - t0)
             status = cross(tape, directions, motion, crossing, direction, unit, t, factor)
             if status == GRAZES and t - last <= 1e-6 * (t - t0):
                 status = CHATTERS

@@ -334,8 +334,8 @@ def followed(
             continue
         beside = None
         if ending is Ending.LOST:
-            system, derivative = curve.system(last.value), partial(_derivative, curve, last)
-            reason = event_beside(system, last.orbit, _duration(system, last), derivative) or reason
+            system = curve.system(last.value)
+            reason = event_beside(system, last.orbit, _duration(system, last), partial(_ahead, curve, last)) or reason
             beside = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
         if beside is None:
             break
@@ -380,11 +380,10 @@ def _unpaired_folds(points: list[BranchPoint]) -> list[str]:
     return remarks
 
 
-def _derivative(curve: Curve, last: BranchPoint, distance: float) -> Array:
-    """Derivative of the return, in units, at a distance from a point along its tangent."""
-    section, moved = curve.section_at(last.orbit, last.value, last.period), distance * last.tangent * last.units
-    image = curve.image(last.orbit + moved[:-1], last.value + float(moved[-1]), section)
-    return np.asarray(image.jacobian * last.units[:-1] / last.units[:-1, None])
+def _ahead(curve: Curve, last: BranchPoint, distance: float) -> tuple[SystemLike, Array]:
+    """System and state at a distance from a point along its tangent."""
+    x, value = curve.reached(last, distance * last.tangent)
+    return curve.system(value), x
 
 
 def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:

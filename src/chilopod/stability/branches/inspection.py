@@ -29,7 +29,7 @@ from chilopod.stability.continuation.equations import Step, predicted
 from chilopod.stability.crossing_place import crossings_in
 from chilopod.stability.interface import offers
 from chilopod.stability.points import ContinuumError
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.returns import GRAZES, ReturnMap, events_in, jumps_within
 from chilopod.stability.spectrum import spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
@@ -69,6 +69,7 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
     if not foreseen and not flipped and step.size > _TELLING:
         raise AnalysisError("the step may have landed on another curve", field="step")
     _check_period(within)
+    _check_events(within)
     crossed = _crossed_within(within) if closely else _crossed_between_ends(within, turned)
     if not (crossed or turned or flipped):
         return Inspected()
@@ -259,6 +260,18 @@ def _check_period(within: Within) -> None:
         if float(interpolated(times, parts)[1][0]) <= _ROUGH * float(np.ptp(times)):
             return
     raise AnalysisError("the period jumps within the step", field="step")
+
+
+def _check_events(within: Within) -> None:
+    """AnalysisError if an event begins or ceases to happen within a step, unless returns are smooth there."""
+    low, high, units = within.low, within.step.size, within.curve.state_units
+
+    def seen(place: float) -> tuple[tuple[float, ...], Array]:
+        x, value, image, _ = within.at(place).found
+        return events_in(within.curve.system(value), x, image.period), image.jacobian * units / units[:, None]
+
+    if (events := seen(high)[0]) and events != seen(low)[0] and jumps_within(seen, low, high):
+        raise AnalysisError(GRAZES)
 
 
 def _at(within: Within, parts: Array) -> list[float]:

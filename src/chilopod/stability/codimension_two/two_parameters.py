@@ -28,7 +28,14 @@ from chilopod.stability.codimension_two.detection import Critical, Detector, Sta
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.equilibria import SHRINKS
-from chilopod.stability.interface import offers, returns_per_period, sizes, system_of, with_shared_symmetries
+from chilopod.stability.interface import (
+    SystemLike,
+    offers,
+    returns_per_period,
+    sizes,
+    system_of,
+    with_shared_symmetries,
+)
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import event_beside, return_duration, returned_states, section_at, whole_period
 from chilopod.stability.symmetry.groups import reverses
@@ -212,13 +219,14 @@ def _followed(
     if ending is Ending.LOST:
         end = last.spot
 
-        def derivative(distance: float) -> Array:
-            return curve.evaluated(end.frame.moved(end.place, distance * end.tangent), end.frame).jacobian
+        def ahead(distance: float) -> tuple[SystemLike, Array]:
+            there = end.frame.moved(end.place, distance * end.tangent)
+            return curve.system(there.values), there.state
 
         about = curve.system(end.values), end.place.state, end.image.duration
         if reason.startswith("step:") and curve.meets(end):
             reason = _TIP
-        reason = event_beside(*about, derivative) or reason
+        reason = event_beside(*about, ahead) or reason
     return _Half(kept, ending, reason)
 
 

@@ -16,9 +16,9 @@ from chilopod.frozen import Array
 from chilopod.stability.branches.parts import find_fold
 from chilopod.stability.crossing_place import Sample
 from chilopod.stability.equilibria import SHRINKS, has_centre
-from chilopod.stability.interface import checked_flow, returns_per_period
+from chilopod.stability.interface import SystemLike, checked_flow, returns_per_period
 from chilopod.stability.points import BifurcationPoint
-from chilopod.stability.returns import Section, event_beside, return_map
+from chilopod.stability.returns import event_beside
 from chilopod.stability.search.samples import NEAR_FOLD, Samples
 
 _BEFORE = 1e-6  # distance from a fold at which the search for crossings ends, relative to the interval
@@ -89,16 +89,13 @@ def extent(samples: Samples) -> Extent:
 def _lost(samples: Samples) -> str:
     """Sentence on the end of the path, with the event that is there if one is."""
     last, value = samples.path[-1], samples.path[-1].value
-    image, units = last.image, samples.size
 
-    def derivative(distance: float) -> Array:
+    def ahead(distance: float) -> tuple[SystemLike, Array]:
         beyond = min(max(value + _PER_UNIT * distance * samples.width, samples.low), samples.high)
-        section = None if image.normal is None else Section(last.orbit, image.normal, image.duration)
-        there = return_map(samples.family(beyond), samples.ahead(beyond), False, section)
-        return np.asarray(there.jacobian * units / units[:, None])
+        return samples.family(beyond), samples.ahead(beyond)
 
     said = f"the orbit cannot be followed beyond {value:.9g}"
-    event = event_beside(samples.family(value), last.orbit, image.duration, derivative)
+    event = event_beside(samples.family(value), last.orbit, last.image.duration, ahead)
     return f"{said}: {event}" if event else said
 
 

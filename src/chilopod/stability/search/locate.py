@@ -250,10 +250,10 @@ def located(
     results += [fold(each) for each in here.folds]
     if status is SearchStatus.BUDGET and not here.ending:
         remarks.append(spent)
-    if samples.family.remarks:
+    if samples.family.remarks or samples.jumps:
         status = status.worst(SearchStatus.INCOMPLETE)
     points = sorted((each for each in results if isinstance(each, BifurcationPoint)), key=lambda point: point.value)
-    remarks += [each for each in results if isinstance(each, str)] + samples.family.remarks
+    remarks += [each for each in results if isinstance(each, str)] + samples.family.remarks + samples.jumps
     searched_part = here.start, max(here.start, here.end)
     spacing = float(np.diff([here.start, *samples.within(*searched_part), searched_part[1]]).max())
     ending = here.ending

@@ -35,7 +35,7 @@ from chilopod.stability.orbits.orbit import (
 )
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint
-from chilopod.stability.returns import return_duration, return_maps, section_at
+from chilopod.stability.returns import JUMPS, events_in, return_duration, return_maps, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -61,6 +61,7 @@ _JUMP = 0.3  # difference of prediction and correction, relative to the orbit's 
 _FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
 _SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
 _HALFWAY = 0.25  # largest distance of an orbit halfway from the mean of its neighbours, relative to their distance
+_TO_EVENT, _TOGETHER = 24, 1e-4  # halvings of the way to where events change, and distance of orbits there: its root
 _HALVED, _CLOSER = 13, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
 _MEETING = 1e-4  # distance of a first multiplier from +1 that does not tell its side
 _TELLING = 1.0 / 128.0  # step, relative to the interval, that resolves a multiplier that turns back at +1
@@ -89,6 +90,7 @@ class Samples:
         self.fold: BifurcationPoint | None = None  # the fold in which the path ends, if its curve was traced to it
         self.merges = False  # the path ends where the orbit meets another one, which continues alone
         self._steep: set[float] = set()  # values up to which the curve was traced from the sample before
+        self.jumps: list[str] = []  # sentences on grazing orbits where multipliers jump
         self.count = 0  # orbits computed
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []  # its keys by size
@@ -99,10 +101,11 @@ class Samples:
         with self.budget, UserCode("family", low):
             self.first = searched_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
+            events = events_in(self.family(low), self.first.state, self.first.period)
         self.budget.left, self.budget.taken = allowed, 0.0  # without the first orbit
         self.known = guess is None and self.family.timed
         if not self.known:
-            self._keep(Sample(low, self.first.state, self.first.image))
+            self._keep(Sample(low, self.first.state, self.first.image, events))
         with self.budget:
             self.path = [] if self.known else self._up_to_merging(self._whole_path())
             self.end = self.path[-1].value if self.path else high
@@ -191,7 +194,7 @@ class Samples:
             if section is not None and (rounds := rounds_in(system, orbit.state, long, self.size, duration)) > 1:
                 once, section = Nodes(orbit.state[None], long / rounds), replace(section, duration=long / rounds)
                 orbit = near_orbit(system, once, False, self.budget, section, units=self.size)
-        return Sample(value, orbit.state, orbit.image)
+            return Sample(value, orbit.state, orbit.image, events_in(system, orbit.state, orbit.period))
 
     def _between(self, value: float) -> Sample:
         """A sample between two others, from their orbits."""
@@ -200,6 +203,7 @@ class Samples:
             found = self._sampled(value, guess := self._predicted(around, value), around[0])
             passes = found.passes(around[0]) and found.passes(around[1])
             other = not self._on_its_side(around, guess, found) or (passes and not self._goes_through(around[0], found))
+            other |= found.events != around[1].events and not self._meets(around[0], found)
             if other or not self._continues(around, guess, found):
                 raise AnalysisError("is another orbit", field="orbit")
             return found
@@ -303,6 +307,7 @@ class Samples:
                     and (not passes or self._goes_through(last, found))
                     and self._continues(recent, guess, found, _SAME if passes else _SMALL)
                     and not self._turns_back(path[-2:], found)
+                    and self._meets(last, found)
                 )
             except SpentError:
                 break
@@ -383,6 +388,22 @@ class Samples:
         if connected and middle.value not in self._by_value:
             self._keep(middle)  # no orbit is left out of the counts
         return connected
+
+    def _meets(self, left: Sample, right: Sample) -> bool:
+        """True if two samples have the same events, or their orbits come together where these change."""
+        ends, units = (left, right), self.size / self.size[:, None]
+        if left.events == right.events:
+            return True
+        for _ in range(_TO_EVENT):
+            middle = self._sampled(0.5 * (left.value + right.value), 0.5 * (left.orbit + right.orbit), left)
+            left, right = (middle, right) if middle.events == left.events else (left, middle)
+        if right.events != ends[1].events or (np.abs(right.orbit - left.orbit) > _TOGETHER * self.size).any():
+            return False
+        self._keep(*[each for each in {left, right}.difference(ends) if each.value not in self._by_value])
+        before, after = left.image.jacobian * units, right.image.jacobian * units
+        if np.linalg.norm(after - before) > JUMPS * max(1.0, float(np.linalg.norm(before))):
+            self.jumps.append(f"multipliers jump at a grazing between {left.value!r} and {right.value!r}")
+        return True
 
     def _goes_through(self, left: Sample, right: Sample) -> bool:
         """True if one orbit has a multiplier that passes +1 between two samples, which come together there: two orbits
