@@ -58,7 +58,7 @@ def test_what_cannot_walk_is_refused_in_one_line(capsys, arguments, complaint, t
 
 def test_a_turn_does_not_walk_its_law_anew(tmp_path, monkeypatch):
     law = importlib.import_module("chilopod.tasks.radius_law")
-    monkeypatch.setattr(law, "bent", partial(law.bent, duration=15.0))
+    monkeypatch.setattr(law, "bent", partial(law.bent, cycles=25.0))
     arguments = ["turn", ROBOT, "--engine", "twin", "--target", "45 deg, 1.3 m", "--k1", "law", "--duration", "2 s"]
     first = printed(*arguments, "--trials", str(tmp_path), "--json")
     kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
