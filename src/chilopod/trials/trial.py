@@ -77,17 +77,17 @@ class Disturbance:
             value = getattr(self, name)
             if not 0.0 <= value < 10.0:
                 raise ParameterError("is out of range", field=name, value=value, allowed="0 or more, less than 10")
-        self.check_foot(10**9)
+        foot: Any = self.slick
+        known = foot is None or (isinstance(foot, tuple) and [type(each) for each in foot] == [int, int])
+        if not known or (foot and not (foot[0] >= 0 <= foot[1] <= 1)):
+            allowed = "(module, side), module from 0, side 0 or 1; or None"
+            raise ParameterError("must be a foot", field="slick", value=foot, allowed=allowed)
 
     def check_foot(self, modules: int) -> None:
         """Refuse a foot without grip that a robot of this many modules does not have."""
-        foot: Any = self.slick
-        if foot is None:
-            return
-        counts = isinstance(foot, tuple) and [type(each) for each in foot] == [int, int]
-        if not (counts and 0 <= foot[0] < modules and 0 <= foot[1] <= 1):
-            allowed = f"(module, side): module 0 to {modules - 1}, side 0 or 1" if counts else "(module, side), or None"
-            raise ParameterError("must be a foot of the robot", field="slick", value=foot, allowed=allowed)
+        if self.slick is not None and self.slick[0] >= modules:
+            allowed = f"module 0 to {modules - 1}"
+            raise ParameterError("must be a foot of the robot", field="slick", value=self.slick, allowed=allowed)
 
 
 NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
