@@ -2,12 +2,15 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import nbformat
+import numpy as np
 import pytest
 
+from chilopod import load_robot
 from chilopod.notebook import check
 
 LESSONS = sorted((Path(__file__).parents[1] / "docs" / "lessons").glob("*.ipynb"))
@@ -54,3 +57,13 @@ def test_an_answer_is_checked(capsys):
     assert others[:2] == ["Not yet. It is negative.", "Not yet. It is no square."]
     assert others[2].startswith("Not yet. This answer cannot be checked: '>' not supported")
     assert others[3:] == ["Right."]
+
+
+@pytest.mark.parametrize(("radius", "said"), [(np.nan, "spring is too soft"), (0.6, "wider"), (0.4, "tighter")])
+def test_a_circle_is_checked(radius, said, capsys):
+    cells = nbformat.read(LESSONS[3], as_version=4).cells
+    (source,) = (cell.source for cell in cells if "def radius(spring):" in cell.source)
+    walk = SimpleNamespace(summaries=[SimpleNamespace(axis_radius=radius)])
+    names = {"robot": load_robot("aoi2022-planar"), "walk": lambda *_, **__: walk, "np": np, "check": check}
+    exec(source.replace("spring = ...", "spring = 9.0"), names)
+    assert said in capsys.readouterr().out

@@ -2,6 +2,7 @@
 
 import inspect
 import io
+import math
 import typing
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
@@ -30,6 +31,7 @@ from chilopod.stability import (
     multipliers,
 )
 from chilopod.stability.branches import inspection
+from chilopod.stability.shown import bounded
 from chilopod.stability.unit_circle.crossings import find_crossings
 from helpers.systems import henon, of_map
 
@@ -392,3 +394,18 @@ def test_every_type_that_users_receive_can_be_imported():
     assert [each for each in results if each.__eq__ is not object.__eq__] == []
     assert len(results) > 10
     assert {"NormalForm", "NormalFormStatus", "SearchStatus", "SymmetricCrossing"} <= set(stability.__all__)
+
+
+@pytest.mark.parametrize(
+    ("value", "bound", "text"),
+    [
+        (4.73584815120351, 3.8e-13, "4.7358481512035 ± 4.0e-13"),
+        (9.0620478560333879, 1.04e-12, "9.0620478560334 ± 1.1e-12"),
+        (1.0 + 2.0**-52, 4.2e-15, "1 ± 4.5e-15"),
+        (-2.5e8, 1e-12, "-250000000 ± 1.0e-12"),
+        (0.1, 0.0, "0.1 ± 0.0e+00"),
+        (math.nan, math.inf, "nan ± inf"),
+    ],
+)
+def test_a_bound_holds_for_the_digits_beside_it(value, bound, text):
+    assert bounded(value, bound) == text

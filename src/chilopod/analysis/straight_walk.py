@@ -18,6 +18,7 @@ from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Kind, Point2
+from chilopod.stability.shown import bounded
 from chilopod.stability.spectrum import VERDICTS
 
 if TYPE_CHECKING:
@@ -155,7 +156,8 @@ class WalkBifurcation(Summary, ReadOnlyArrays):
     def title(self) -> str:
         """Kind and place in words."""
         unit = self.unit.replace("*", "·")
-        return f"{self.point.kind.label} at {self.parameter} = {self.value:.12g} {unit} (± {self.error_bound:.1e})"
+        value, error = bounded(self.value, self.error_bound).split(" ± ")
+        return f"{self.point.kind.label} at {self.parameter} = {value} {unit} (± {error})"
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         point, above = self.point, [f"{self.point.kind.sentence}."]

@@ -29,6 +29,7 @@ from chilopod.stability.interface import Autonomous, Family, SystemLike, offers
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.search.locate import Found, Located, joined, located
 from chilopod.stability.search.samples import Samples
+from chilopod.stability.shown import bounded
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.system import PeriodicSystem
@@ -151,7 +152,7 @@ def _piece(
         return [f"no coefficient at {point.value:.9g}: {reason}", replace(point, multiplier=1j * point.frequency)]
 
     def ended(fold: BifurcationPoint) -> str:
-        where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
+        where = bounded(fold.value, fold.error_bound)
         return f"the equilibrium ends in a fold at {where}: it meets another one there"
 
     return located(samples, crossings, described, ended, _POINTS), samples.path[-1]

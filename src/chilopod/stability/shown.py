@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Sequence
+from decimal import ROUND_CEILING, Context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,8 +104,15 @@ def number(value: complex, digits: int = 10) -> str:
 
 
 def bounded(value: float, bound: float) -> str:
-    """A value with the bound on its error."""
-    return f"{value:.12g} ± {bound:.1e}"
+    """A value with the bound on its error, which holds for the digits that are shown."""
+    for digits in range(12, 18):
+        text = f"{value:.{digits}g}"
+        rounding = abs(float(text) - value)
+        if not rounding > 0.1 * bound:
+            break
+    if np.isfinite(rounding + bound):
+        bound = float(Context(prec=2, rounding=ROUND_CEILING).create_decimal_from_float(bound + rounding))
+    return f"{text} ± {bound:.1e}"
 
 
 def rows(cells: Iterable[Sequence[str]]) -> list[str]:

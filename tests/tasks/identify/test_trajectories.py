@@ -302,3 +302,19 @@ def test_a_straight_walk_leaves_all_constants_open(tmp_path):
     found = identify_recorded(ROBOT, given, tmp_path)
     for path, each in found.as_json()["constants"].items():
         assert each["interval_si"] == pytest.approx(FREE[path])
+
+
+def test_a_search_that_creeps_along_what_the_data_do_not_set_has_converged(tmp_path):
+    record, rng = walked(SOFT, 8.0), np.random.default_rng(5)
+    angles = np.rad2deg(record.joint_angle.values[:, 0]) + rng.normal(0.0, 0.3, (record.time.size, 5))
+    (tmp_path / "walk.csv").write_text(as_csv(record.time.values, angles))
+    own = data("walk.csv")
+    walks = trajectories._Walks(ROBOT, own.free, read_recordings(ROBOT, own, tmp_path))
+    start = np.concatenate([walks.given, [0.0], START[0, 3:8] if START.ndim > 1 else START[3:8]])
+    cost, best = walks.fit(start, 1e-9, 20)
+    # The combination of phase and angles at the start that the walk hardly shows, off by half a standard deviation.
+    _, sizes, ways = np.linalg.svd(walks.jacobian(best)[:, 3:])
+    off = np.concatenate([np.zeros(3), 0.5 * np.sqrt(2.0 * cost / angles.size) / sizes[-1] * ways[-1]])
+    for free, converged in ((start + 0.1, False), (best + off, True)):
+        walks.fit(free, 1e-15, 1)  # ends at once
+        assert walks.converged is converged

@@ -38,6 +38,7 @@ _RESOLVED = 1e-7  # rad, least error of angles, of a recording or computed
 _OPEN = 3.0  # standard deviation of a constant without data, in ranges
 _PRIOR = 1e-3  # weight of constants as given, in rad for a range
 _ALIKE = 2.0  # factor of variances that is said
+_NEAR = 0.1  # distance of a constant from its best value that leaves its interval as it is, standard deviations
 
 
 @dataclass(frozen=True)
@@ -155,20 +156,31 @@ class _Walks:
         has a standard deviation of some ranges."""
         slopes = self.jacobian(free)
         slopes[-self.given.size :] *= error / (_OPEN * _PRIOR)
-        sizes = np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
-        spread = np.linalg.pinv(slopes / sizes, 1e-12) / sizes[:, None]
+        spread = _inverse(slopes)
         return (spread @ spread.T)[: self.given.size, : self.given.size]
 
     def fit(self, free: Array, change: float, most: int) -> tuple[float, Array]:
-        """Half the sum of squares, and the unknowns, by least squares from a start."""
+        """Half the sum of squares, and the unknowns, by least squares from a start. The search has also converged where
+        the data hardly set phases or angles at the start, along which it creeps, and no constant would move further."""
         ends = np.where(np.arange(free.size) < self.given.size, [[0.0], [1.0]], [[-np.inf], [np.inf]])
         start = np.clip(free, ends[0] + _STEP, ends[1] - _STEP)
         found = least_squares(
             lambda here: self.residuals(here[None])[:, 0], start, self.jacobian, ends, x_scale="jac", ftol=change,
             max_nfev=most,
         )  # fmt: skip
-        self.converged = found.status > 0
+        within = found.active_mask == 0
+        rows = _inverse(found.jac[:, within])[: int(within[: self.given.size].sum())]
+        error = np.sqrt(2.0 * found.cost / max(found.fun.size - free.size, 1))
+        near = np.abs(rows @ found.fun) <= _NEAR * error * np.linalg.norm(rows, axis=1)
+        self.converged = found.status > 0 or bool(near.all())
         return float(found.cost), np.asarray(found.x)
+
+
+def _inverse(slopes: Array) -> Array:
+    """Pseudoinverse of derivatives by unknowns, shape (residuals, unknowns), whose units do not matter."""
+    sizes = np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
+    inverse: Array = np.linalg.pinv(slopes / sizes, 1e-12) / sizes[:, None]
+    return inverse
 
 
 def _fit(walks: _Walks, progress: Progress) -> Array:
