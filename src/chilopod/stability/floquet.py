@@ -81,10 +81,8 @@ class Multipliers(Result, ReadOnlyArrays):
         return stable_within(self.values, self.error_bound, self.error_bounds)
 
     def _lines(self) -> list[str]:
-        table = rows(
-            (number(value), f"± {bound:.1e}", f"modulus {abs(value):.10g}")
-            for value, bound in zip(self.values, self.error_bounds, strict=True)
-        )
+        pairs = zip(self.values, self.error_bounds, strict=True)
+        table = rows((number(value), f"± {bound:.1e}", f"modulus {abs(value):.10g}") for value, bound in pairs)
         heading = f"Multipliers: {self.values.size} of an orbit of period {self.period:.10g}, {VERDICTS[self.stable]}"
         return [heading, *table, *said(self.remarks)]
 
@@ -200,8 +198,7 @@ def multipliers(
     decide = "" if result.stable is None else f"{deciding} whether the orbit is stable; "
     least = float(result.error_bounds.max())
     modulus = f"of about {next_one:.3g}" if next_one > least else f"below about {least:.1g}"
-    remark = f"only the {which} computed; {decide}the next one has a modulus {modulus}"
-    return replace(result, remarks=(remark,))
+    return replace(result, remarks=(f"only the {which} computed; {decide}the next one has a modulus {modulus}",))
 
 
 def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[Multipliers]:
@@ -210,8 +207,6 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
         raise ParameterError("must be a list", field="systems", value=systems, allowed="a list of systems")
     for system in systems:
         check_system(system)
-    if not systems:
-        return []
     with Deadline(seconds):
         if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
             with ThreadPoolExecutor(cores()) as threads:  # which share the time limit

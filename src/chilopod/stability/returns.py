@@ -191,16 +191,14 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
         return checked_flow(system, x, t0, t1, with_error=True)
     state, derivative = checked_flow(system, x, t0, t1, compared=True)
     check_finite(state, derivative)
-    times = [t0 + part * (t1 - t0) for part in CUTS] + [t1]
     passing, product = x, np.eye(x.size)
-    for a, b in zip(times, times[1:], strict=False):
+    for a, b in itertools.pairwise([*(t0 + cut * (t1 - t0) for cut in CUTS), t1]):
         passing, factor = checked_flow(system, passing, a, b)
         product = factor @ product
     # In units of the states' sizes: an entry that agrees by chance is as uncertain as the others.
     size = sizes(system, x, t1 - t0)
     units = size[:, None] / size
-    off = float((np.abs(product - derivative) / units).max())
-    largest = float((np.abs(derivative) / units).max())
+    off, largest = (float((np.abs(each) / units).max()) for each in (product - derivative, derivative))
     return state, derivative, (REPEATED * off + 1e-15 * largest) * units
 
 

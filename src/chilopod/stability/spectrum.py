@@ -140,11 +140,8 @@ def spectrum(image: ReturnMap) -> Spectrum:
 
 def return_multipliers(image: ReturnMap) -> ComplexArray:
     """Eigenvalues of a return map by falling modulus, without the zero of the direction of motion."""
-    matrix = image.jacobian
-    if image.normal is not None:
-        into, out_of = _across(image)
-        matrix = out_of @ matrix @ into
-    values = np.linalg.eigvals(matrix).astype(np.complex128)
+    into, out_of = _across(image)
+    values = np.linalg.eigvals(out_of @ image.jacobian @ into).astype(np.complex128)
     return values[np.lexsort((-values.imag, -np.abs(values)))]
 
 
@@ -214,8 +211,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
         whole = image.jacobian * ratios
         product = np.linalg.multi_dot([symmetry, *(part.factor for part in reversed(parts))])
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
-            error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
-            return Cut(units, one, [whole], [error])
+            return Cut(units, one, [whole], [np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)])
     parts = _moderate_parts(system, x, parts, units, unresolved)
     sections = [section_basis(system, state, units) for state in (x, *(part.state for part in parts[:-1]))]
     turns = [one] * (len(parts) - 1) + [symmetry]

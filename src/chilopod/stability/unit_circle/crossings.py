@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -232,14 +233,9 @@ class _Finder:
 
     def _zeros(self, event: CircleEvent, spare: int) -> Zeros:
         spectra = self.spectra
-        return find_zeros(
-            lambda places: spectra.function(places, event),
-            self.a,
-            self.b,
-            error=lambda places: spectra.function_error(places, event),
-            left=lambda: spectra.left - spare,
-            skip=spectra.without_pair if event is CircleEvent.PAIR else None,
-        )
+        function, error = partial(spectra.function, event=event), partial(spectra.function_error, event=event)
+        skip = spectra.without_pair if event is CircleEvent.PAIR else None
+        return find_zeros(function, self.a, self.b, error=error, left=lambda: spectra.left - spare, skip=skip)
 
     def _roots(self, event: CircleEvent, found: Zeros) -> list[Root]:
         report, spectra = self.report, self.spectra

@@ -265,8 +265,7 @@ class Spectra:
     ) -> Root:
         """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
         most = min(200, max(self.left, 1))
-        finest = max(within, 5e-324)
-        place = float(brentq(function, a, b, xtol=finest, rtol=4 * EPSILON, maxiter=most, disp=False))
+        place = brentq(function, a, b, xtol=max(within, 5e-324), rtol=4 * EPSILON, maxiter=most, disp=False)
         reach = within + 4.0 * EPSILON * abs(place)
         return Root(place, max(place - reach, a), min(place + reach, b), event, known=(a, b))
 
