@@ -302,8 +302,7 @@ def _bend(
     weakest = subspace.basis @ right[values.size - 1]
     wrong = float(np.linalg.norm((np.abs(image.state - image.point) + state_error) / size))
     off = wrong * max(1.0, 1.0 / float(values[-1]))
-    x = image.point + returns.BESIDE * size * weakest
-    beside = tangent_map(image.system, x, image.section).images(directions)
-    change = np.linalg.norm((beside - images) / size[:, None], axis=0)
+    moved = tangent_map(image.system, image.point + returns.BESIDE * size * weakest, image.section)
+    change = np.linalg.norm((moved.images(directions) - images) / size[:, None], axis=0)
     half = change.size // 2
     return (change[:half] + change[half:]) * (off / returns.BESIDE)

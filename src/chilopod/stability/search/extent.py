@@ -133,10 +133,9 @@ def _as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising:
     places = np.clip(fold.value + (-away if rising else away), samples.low, samples.end)
     away = np.abs(places - fold.value)
     try:
-        beside = samples.at(places)
+        off = [each.off_plus_one for each in samples.at(places)]
     except (AnalysisError, SpentError):
         return True  # no evidence against it
-    off = [each.off_plus_one for each in beside]
     return bool(away[1] <= away[0] or off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS)
 
 

@@ -24,18 +24,10 @@ from chilopod.stability.branches.branch_starts import Start
 from chilopod.stability.branches.parts import rising_part
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
-from chilopod.stability.orbits.orbit import (
-    Orbit,
-    from_known,
-    known_state,
-    near_orbit,
-    past_event,
-    rounds_in,
-    searched_orbit,
-)
+from chilopod.stability.orbits.orbit import Orbit, known_orbits, near_orbit, past_event, rounds_in, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint
-from chilopod.stability.returns import JUMPS, events_in, return_duration, return_maps, section_at
+from chilopod.stability.returns import JUMPS, events_in, return_duration, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
 NEAR_FOLD = 0.02
@@ -172,10 +164,8 @@ class Samples:
             self.budget.take()
             systems.append(self.family(value))
         with self.family.calling(values[0]) if len(values) == 1 else UserCode("family", values[0]):
-            states = [known_state(system) for system in systems]
-            images = return_maps(systems, states)
-        for value, system, state, image in zip(values, systems, states, images, strict=True):
-            orbit = from_known(system, state, image=image, budget=self.budget)
+            orbits = known_orbits(systems, self.budget)
+        for value, orbit in zip(values, orbits, strict=True):
             self._keep(Sample(value, orbit.state, orbit.image))
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:

@@ -25,7 +25,7 @@ from chilopod.labels import Labelled
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, Matrices, Root, Spectra, factors, margins
-from chilopod.stability.unit_circle.zeros import PLACES, Zeros, find_zeros, first_places
+from chilopod.stability.unit_circle.zeros import PLACES, Zeros, find_zeros, places_in
 
 BUDGET = 5000  # default budget of matrices of a search
 
@@ -105,7 +105,7 @@ def find_crossings(
 def first_values(low: float, high: float) -> Array:
     """First values of the parameter at which a search of an interval evaluates matrices, in order."""
     a, b, parameter, _ = _coordinate(low, high)
-    return np.sort(parameter(first_places(a, b)))
+    return np.sort(parameter(places_in(a, b, PLACES)))
 
 
 def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any], Callable[[Any], Any]]:
@@ -133,7 +133,7 @@ class _Finder:
     def search(self, known: Array) -> tuple[SearchStatus, list[Crossing]]:
         """Find the crossings; eigenvalues outside are counted at ``known`` places too."""
         report, spectra = self.report, self.spectra
-        first = first_places(self.a, self.b)
+        first = places_in(self.a, self.b, PLACES)
         spectra.at(first)
         if not spectra.values:
             if spectra.left <= 0:
