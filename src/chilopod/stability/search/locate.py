@@ -49,9 +49,7 @@ _SAME = 1e-9  # distance of values of one point on the border of two pieces, rel
 _BESIDE = 1e-6  # distance from a crossing at which rates of change are computed, relative to the interval
 _RESOLVED = 256.0  # least such distance, relative to that of two floating-point numbers at the ends of the interval
 
-
-Found = BifurcationPoint | str
-"""A point, or a remark."""
+Found = BifurcationPoint | str  # a point, or a remark
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,11 +30,8 @@ from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.returns import JUMPS, events_in, return_duration, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
-NEAR_FOLD = 0.02
-"""Distance of a multiplier from +1 within which the search may not resolve a fold."""
-
-SPENT = "the orbits (`budget`) were spent"
-"""Remark of a search that computed as many orbits as it may."""
+NEAR_FOLD = 0.02  # distance of a multiplier from +1 within which the search may not resolve a fold
+SPENT = "the orbits (`budget`) were spent"  # remark of a search that computed as many orbits as it may
 
 # Budgets.
 _FIRST = 400  # least number of return maps allowed for the first orbit

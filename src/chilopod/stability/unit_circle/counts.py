@@ -343,8 +343,8 @@ class Accounts:
 def _without_shadows(roots: list[Root]) -> list[Root]:
     """Roots without the touches that lie in the uncertain surroundings of a crossing."""
     crossings = np.array([root.place for root in roots if not root.touch])
-    return [
-        root
-        for root in roots
-        if not root.touch or (np.abs(crossings - root.place) > _SHADOW * (root.right - root.left)).all()
-    ]
+
+    def apart(touch: Root) -> bool:
+        return bool((np.abs(crossings - touch.place) > _SHADOW * (touch.right - touch.left)).all())
+
+    return [root for root in roots if not root.touch or apart(root)]
