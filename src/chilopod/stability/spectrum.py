@@ -417,8 +417,7 @@ def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
     for _ in range(_SHORTENINGS):
         state, derivative = checked_flow(system, x, 0.0, duration)
         derivative = derivative * cut.units / cut.units[:, None]
-        after = section_basis(system, state, cut.units)
-        stretch, right = np.linalg.svd(after.T @ derivative @ cut.section)[1:]
+        stretch, right = np.linalg.svd(section_basis(system, state, cut.units).T @ derivative @ cut.section)[1:]
         largest = max(1.0, float(stretch[0]))
         if _LEFT * largest <= stretch[slow] <= _APART * stretch[slow - 1]:
             return np.asarray(right[slow:].T)

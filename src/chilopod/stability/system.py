@@ -93,8 +93,7 @@ class PeriodicSystem(ReadOnlyArrays):
                 raise ParameterError("must be a function", field=name, value=function)
         if self.period is None:
             if self.velocity is None:
-                allowed = "a number, or None and a velocity"
-                raise ParameterError("must be given", field="period", value=None, allowed=allowed)
+                raise ParameterError("must be given", field="period", allowed="a number, or None and a velocity")
             own["guess_period"] = positive("guess_period", self.guess_period)
         else:
             own["period"] = positive("period", self.period)

@@ -342,8 +342,7 @@ class Samples:
             return False
         rates = np.log1p(off)
         ahead = rates[1] + (rates[1] - rates[0]) * (found.value - left.value) / (left.value - first.value)
-        passes = np.sign(ahead) != np.sign(rates[1])
-        return bool(passes or (abs(ahead) < abs(rates[1]) < abs(rates[2])))
+        return bool(np.sign(ahead) != np.sign(rates[1]) or abs(ahead) < abs(rates[1]) < abs(rates[2]))
 
     def _on_its_side(self, samples: list[Sample], guess: Array, found: Sample) -> bool:
         """True if the multiplier nearest +1 is on the side predicted by samples, the first two next to the one found.

@@ -293,8 +293,7 @@ class Accounts:
         if gap.x == -np.inf or gap.y == np.inf:
             # As if the multipliers continued in their direction.
             number = sum(crossing.multiplicity for crossing in crossings)
-            surely = int((self.spectra.margins(root.place) > self.spectra.tolerances(root)).sum())
-            outside = gap.before - surely
+            outside = gap.before - int((self.spectra.margins(root.place) > self.spectra.tolerances(root)).sum())
             change = (2 * outside - number) * (1 if gap.x == -np.inf else -1) if 0 <= outside <= number else 0
             return [replace(crossing, change=change) for crossing in crossings]
         if len(gap.inside) > 1 or not self._explains(root, gap.change):

@@ -115,8 +115,7 @@ def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], 
 
     def parameter(places: Any) -> Any:
         # The exact ends, in spite of rounding in the logarithm.
-        inner = np.clip(outward(places), low, high)
-        return np.where(places <= a, low, np.where(places >= b, high, inner))
+        return np.where(places <= a, low, np.where(places >= b, high, np.clip(outward(places), low, high)))
 
     return a, b, parameter, inward
 

@@ -364,8 +364,7 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
     # Real and imaginary part separately: the quotient of a complex subnormal and its size would overflow.
     divisors = np.where(sizes == 0.0, 1.0, sizes)
     directions = terms.real / divisors + 1j * (terms.imag / divisors)
-    signs = np.sign((np.prod(directions, axis=1) * last).real)
-    return np.asarray(signs), np.asarray(logs)
+    return np.asarray(np.sign((np.prod(directions, axis=1) * last).real)), np.asarray(logs)
 
 
 @cache
@@ -383,8 +382,7 @@ def _meeting(upper: ComplexArray) -> ComplexArray:
 def _stretches(balanced: Array) -> Array:
     """Logarithms of det(1 + M^T M)^(1/2), M balanced: a positive, analytic divisor that exceeds its dividend."""
     one = np.broadcast_to(np.eye(balanced.shape[-1]), balanced.shape)
-    double = np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]])
-    return np.asarray(0.5 * np.linalg.slogdet(double)[1])
+    return np.asarray(0.5 * np.linalg.slogdet(np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]]))[1])
 
 
 def _eigenvalues(balanced: Array) -> ComplexArray:
