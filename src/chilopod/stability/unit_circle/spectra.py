@@ -238,10 +238,7 @@ class Spectra:
         others: of a symplectic matrix, up to its sign, the discriminant of the polynomial in nu + 1/nu (Howard &
         MacKay, J. Math. Phys. 28, 1987).
         """
-        nu = self.at(values)
-        here = np.isfinite(nu).all(axis=1)
-        signs, logs = np.full((2, values.size), np.nan)
-        signs[here], logs[here] = symmetric(factors(nu[here], event), self.idle[event])
+        signs, logs = symmetric(factors(self.at(values), event), self.idle[event])
         return signs, logs - self._bounds(values, event)
 
     def _bounds(self, values: Array, event: CircleEvent) -> Array:
