@@ -20,19 +20,9 @@ from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.interface import SystemLike, check_system, is_autonomous, offers
 from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
-from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, from_known, known_state
-from chilopod.stability.returns import return_maps
+from chilopod.stability.orbits.orbit import Orbit, find_large_orbit, find_orbit, known_orbits
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
-from chilopod.stability.spectrum import (
-    EPSILON,
-    SAFETY,
-    VERDICTS,
-    ContractionError,
-    phased,
-    spectrum,
-    split_return,
-    stable_within,
-)
+from chilopod.stability.spectrum import VERDICTS, ContractionError, phased, spectrum, split_return, stable_within
 from chilopod.stability.system import PeriodicSystem
 
 if TYPE_CHECKING:
@@ -41,7 +31,6 @@ if TYPE_CHECKING:
 
 
 _RESOLVED = 1e-6  # modulus of a multiplier below which the error bound of an eigenvalue is invalid
-_TELLING = 0.1  # relative error of a multiplier whose exponent is reported alone
 _SAME_ANGLE = 1e-12
 
 
@@ -81,10 +70,8 @@ class Multipliers(Result, ReadOnlyArrays):
         return stable_within(self.values, self.error_bound, self.error_bounds)
 
     def _lines(self) -> list[str]:
-        table = rows(
-            (number(value), f"± {bound:.1e}", f"modulus {abs(value):.10g}")
-            for value, bound in zip(self.values, self.error_bounds, strict=True)
-        )
+        pairs = zip(self.values, self.error_bounds, strict=True)
+        table = rows((number(value), f"± {bound:.1e}", f"modulus {abs(value):.10g}") for value, bound in pairs)
         heading = f"Multipliers: {self.values.size} of an orbit of period {self.period:.10g}, {VERDICTS[self.stable]}"
         return [heading, *table, *said(self.remarks)]
 
@@ -200,8 +187,7 @@ def multipliers(
     decide = "" if result.stable is None else f"{deciding} whether the orbit is stable; "
     least = float(result.error_bounds.max())
     modulus = f"of about {next_one:.3g}" if next_one > least else f"below about {least:.1g}"
-    remark = f"only the {which} computed; {decide}the next one has a modulus {modulus}"
-    return replace(result, remarks=(remark,))
+    return replace(result, remarks=(f"only the {which} computed; {decide}the next one has a modulus {modulus}",))
 
 
 def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[Multipliers]:
@@ -210,8 +196,6 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
         raise ParameterError("must be a list", field="systems", value=systems, allowed="a list of systems")
     for system in systems:
         check_system(system)
-    if not systems:
-        return []
     with Deadline(seconds):
         if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
             with ThreadPoolExecutor(cores()) as threads:  # which share the time limit
@@ -219,9 +203,7 @@ def sweep(systems: Sequence[SystemLike], *, seconds: float = math.inf) -> list[M
                 return [job.result() for job in jobs]
         if any(is_autonomous(system) or not offers(system, "flow_many") for system in systems):
             return [_at(*each) for each in enumerate(systems)]
-        states = [known_state(system) for system in systems]
-        known = zip(systems, states, return_maps(systems, states), strict=True)
-        return [_multipliers(from_known(system, state, image=image)) for system, state, image in known]
+        return [_multipliers(orbit) for orbit in known_orbits(systems)]
 
 
 def _at(index: int, system: SystemLike) -> Multipliers:
@@ -245,16 +227,8 @@ def exponents(
     with Deadline(seconds):
         found = find_orbit(system, orbit)
         image = found.image
-        try:
-            log_nu, modes, moved = split_return(system, found.state, image)
-        except ContractionError:
-            spec = spectrum(image)
-            kept = spec.error < _TELLING * np.abs(spec.values)
-            if not resolved or not kept.any():
-                raise
-            log_nu, modes = np.log(spec.values[kept]), spec.right[:, kept]
-            moved = SAFETY * (spec.error[kept] / np.abs(spec.values[kept]))
-    bound = image.returns * (moved + 4.0 * EPSILON * np.abs(log_nu)) / image.period
+        log_nu, modes, error = split_return(system, found.state, image, resolved)
+    bound = image.returns * error / image.period
     # Principal logarithm of nu^k, with the imaginary part in (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0

@@ -25,19 +25,9 @@ from chilopod.flows.arguments import UserCode, shape_of
 from chilopod.flows.carrying import REPEATED
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.stability import returns
 from chilopod.stability.interface import Capabilities, check_finite, returns_per_period
-from chilopod.stability.returns import (
-    BESIDE,
-    CUTS,
-    RETURN,
-    Section,
-    carried,
-    crossing,
-    return_duration,
-    section_at,
-    turned,
-    velocity_at,
-)
+from chilopod.stability.returns import Section
 from chilopod.stability.spectrum import EPSILON, FIRST_ORDER, ContractionError, eigensystem, eigenvalue_errors
 
 LARGE = 100  # number of states from which a few directions are cheaper than the whole derivative
@@ -129,15 +119,15 @@ class TangentMap(ReadOnlyArrays):
 
     def images(self, directions: Array) -> Array:
         """H' times directions, shape (n, m) both."""
-        return self._in_parts(directions, (0.0,))[1]
+        return self._in_parts(directions)[1]
 
     def images_with_error(self, directions: Array) -> tuple[Array, Array, Array]:
         """The same with bounds on the errors of the images and of ``state``, from a second computation in parts."""
-        state, images = self._in_parts(directions, (0.0,))
-        other, parts = self._in_parts(directions, CUTS)
+        state, images = self._in_parts(directions)
+        other, parts = self._in_parts(directions, returns.CUTS)
         return images, REPEATED * np.abs(parts - images), REPEATED * np.abs(self._across(other - state))
 
-    def _in_parts(self, directions: Array, cuts: tuple[float, ...]) -> tuple[Array, Array]:
+    def _in_parts(self, directions: Array, cuts: tuple[float, ...] = (0.0,)) -> tuple[Array, Array]:
         state, images = self.point, directions
         for a, b in itertools.pairwise([*(cut * self.duration for cut in cuts), self.duration]):
             with UserCode("flow_tangents"):
@@ -163,13 +153,15 @@ class TangentMap(ReadOnlyArrays):
 
 def tangent_map(system: Capabilities, x: Array, section: Section | None = None) -> TangentMap:
     """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time."""
-    duration = return_duration(system) if section is None else sum(crossing(system, x, section, derived=False)[:2])
-    state = turned(system, carried(system, x[None], 0.0, duration))[0]
+    if section is None:
+        duration = returns.return_duration(system)
+    else:
+        duration = sum(returns.crossing(system, x, section, derived=False)[:2])
+        section = replace(section, point=x, duration=duration)
+    state = returns.turned(system, returns.carried(system, x[None], 0.0, duration))[0]
     check_finite(state)
-    velocity, across = None, None
-    if section is not None:
-        velocity, across = velocity_at(system, state), Section(x, section.normal, duration)
-    return TangentMap(system, x, state, duration, returns_per_period(system), across, velocity)
+    velocity = None if section is None else returns.velocity_at(system, state)
+    return TangentMap(system, x, state, duration, returns_per_period(system), section, velocity)
 
 
 def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
@@ -183,7 +175,7 @@ def tangent_sizes(system: Capabilities, x: Array, duration: float) -> Array:
     times = np.linspace(0.0, duration, _PARTS + 1).tolist()
     state, size = x, np.abs(x)
     for a, b in itertools.pairwise(times):
-        state = carried(system, state[None], a, b)[0]
+        state = returns.carried(system, state[None], a, b)[0]
         check_finite(state)
         size = np.maximum(size, np.abs(state))
     moves = bool(size.any())
@@ -206,8 +198,8 @@ def closed_orbit(
 ) -> tuple[TangentMap, Array]:
     """The return map at a state on a periodic orbit near a guess, and the sizes of the states, shape (n,); an
     AnalysisError without one. The first return may displace the guess by ``limit``, relative to the sizes."""
-    size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)
-    section = section_at(system, x, size) if section is None else section
+    size = tangent_sizes(system, x, returns.return_duration(system) if section is None else section.duration)
+    section = returns.section_at(system, x, size) if section is None else section
     best = np.inf
     slowest = np.random.default_rng(0).standard_normal((x.size, _LANES - 1))
     for rounds in range(_ROUNDS):
@@ -217,11 +209,11 @@ def closed_orbit(
         size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
         residual = (image.state - x) / size
         off = float(np.abs(residual).max())
-        if RETURN.met(off, best):
+        if returns.RETURN.met(off, best):
             if image.velocity is not None and np.abs(image.velocity * image.duration / size).max() <= RESTS:
                 break
             if section is not None:
-                image = tangent_map(system, x, section_at(system, x, size, image.duration))
+                image = tangent_map(system, x, returns.section_at(system, x, size, image.duration))
             return image, size
         if off > limit or (rounds > 4 and off > _WORSE * best):
             break
@@ -310,8 +302,7 @@ def _bend(
     weakest = subspace.basis @ right[values.size - 1]
     wrong = float(np.linalg.norm((np.abs(image.state - image.point) + state_error) / size))
     off = wrong * max(1.0, 1.0 / float(values[-1]))
-    x = image.point + BESIDE * size * weakest
-    beside = tangent_map(image.system, x, image.section).images(directions)
-    change = np.linalg.norm((beside - images) / size[:, None], axis=0)
+    moved = tangent_map(image.system, image.point + returns.BESIDE * size * weakest, image.section)
+    change = np.linalg.norm((moved.images(directions) - images) / size[:, None], axis=0)
     half = change.size // 2
-    return (change[:half] + change[half:]) * (off / BESIDE)
+    return (change[:half] + change[half:]) * (off / returns.BESIDE)

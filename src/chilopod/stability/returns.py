@@ -54,12 +54,9 @@ JUMPS = 0.01  # least jump of a derivative in units, relative to it, at a grazin
 _JUMPS, _HALVINGS = 0.3, 20  # the same where events are not known, and halvings to the place: half if they are
 _FALLING = 0.5  # least fall of the residual that is progress
 
+# Remark on a value of the parameter, and sentences on the end of a curve.
 MOVED = "at {:.9g} time 0 was moved along the orbit, away from an event"
-"""Remark on a value of the parameter."""
-
 EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
-"""Sentence on the end of a curve at an event that reaches time 0."""
-
 GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
 
 CUTS = (0.0, 0.0477, 0.382)
@@ -191,16 +188,14 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
         return checked_flow(system, x, t0, t1, with_error=True)
     state, derivative = checked_flow(system, x, t0, t1, compared=True)
     check_finite(state, derivative)
-    times = [t0 + part * (t1 - t0) for part in CUTS] + [t1]
     passing, product = x, np.eye(x.size)
-    for a, b in zip(times, times[1:], strict=False):
+    for a, b in itertools.pairwise([*(t0 + cut * (t1 - t0) for cut in CUTS), t1]):
         passing, factor = checked_flow(system, passing, a, b)
         product = factor @ product
     # In units of the states' sizes: an entry that agrees by chance is as uncertain as the others.
     size = sizes(system, x, t1 - t0)
     units = size[:, None] / size
-    off = float((np.abs(product - derivative) / units).max())
-    largest = float((np.abs(derivative) / units).max())
+    off, largest = (float((np.abs(each) / units).max()) for each in (product - derivative, derivative))
     return state, derivative, (REPEATED * off + 1e-15 * largest) * units
 
 
@@ -436,7 +431,5 @@ def return_maps(systems: Sequence[SystemLike], orbits: Sequence[Array]) -> list[
     count, duration = returns_per_period(first), return_duration(first)
     jacobians, errors = first.flow_many(alike, 0.0, duration)
     turn = np.eye(first.dimension) if first.symmetry is None else first.symmetry
-    return [
-        ReturnMap(orbit, turn @ jacobian, float(error), count, count * duration)
-        for orbit, jacobian, error in zip(orbits, jacobians, errors, strict=True)
-    ]
+    found = zip(orbits, jacobians, errors, strict=True)
+    return [ReturnMap(orbit, turn @ matrix, float(error), count, count * duration) for orbit, matrix, error in found]

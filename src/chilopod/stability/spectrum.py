@@ -140,11 +140,8 @@ def spectrum(image: ReturnMap) -> Spectrum:
 
 def return_multipliers(image: ReturnMap) -> ComplexArray:
     """Eigenvalues of a return map by falling modulus, without the zero of the direction of motion."""
-    matrix = image.jacobian
-    if image.normal is not None:
-        into, out_of = _across(image)
-        matrix = out_of @ matrix @ into
-    values = np.linalg.eigvals(matrix).astype(np.complex128)
+    into, out_of = _across(image)
+    values = np.linalg.eigvals(out_of @ image.jacobian @ into).astype(np.complex128)
     return values[np.lexsort((-values.imag, -np.abs(values)))]
 
 
@@ -173,6 +170,7 @@ class ContractionError(AnalysisError):
     """The flow contracts some directions too strongly for their growth to be resolved."""
 
 
+_TOO_STRONG = "the flow contracts too strongly to be resolved"
 _WORST_CONDITION = 1e6
 _FEWEST, _MOST, _MOST_STIFF = 8, 32768, 4096  # numbers of parts of moderate condition; steps of a stiff flow are costly
 _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, above which the flow has no parts
@@ -214,8 +212,7 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
         whole = image.jacobian * ratios
         product = np.linalg.multi_dot([symmetry, *(part.factor for part in reversed(parts))])
         if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
-            error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
-            return Cut(units, one, [whole], [error])
+            return Cut(units, one, [whole], [np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)])
     parts = _moderate_parts(system, x, parts, units, unresolved)
     sections = [section_basis(system, state, units) for state in (x, *(part.state for part in parts[:-1]))]
     turns = [one] * (len(parts) - 1) + [symmetry]
@@ -252,7 +249,7 @@ def _moderate_parts(system: SystemLike, x: Array, parts: list[_Part], units: Arr
         middle = 0.5 * (part.start + part.end)
         asked += 2
         if asked > most or not part.start < middle < part.end:
-            raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
+            raise ContractionError(_TOO_STRONG, field="flow")
         first = _part(system, done[-1].state if done else x, part.start, middle, units)
         left += [_part(system, first.state, middle, part.end, units), first]
     return done
@@ -264,6 +261,7 @@ _AVERAGED = 20  # number of last passes over which the growth is averaged
 _AT_REST = 1e-8  # motion of a basis in a pass that has converged
 _DRAWS_OF_STIFF = 3  # each costs as much as the result
 _SHORTENINGS = 40
+_TELLING = 0.1  # relative error of a multiplier whose exponent is reported alone
 _LEFT, _APART = 1e-12, 1e-4  # stretches over a short time above round-off, and that separate directions
 
 
@@ -281,7 +279,7 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
         with contextlib.suppress(np.linalg.LinAlgError):
             inverses = np.linalg.inv(np.array(factors[::-1]))
     if not np.isfinite(inverses).all():
-        raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
+        raise ContractionError(_TOO_STRONG, field="flow")
     growth = np.log(stretches).sum(axis=0) / _AVERAGED
     fast, _, fast_motion = _iterate(inverses, n)
     # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
@@ -299,7 +297,7 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
     logarithms = np.concatenate([values for values, _ in found])
     vectors = np.hstack([bases[0] @ columns for bases, (_, columns) in zip(groups, found, strict=True)])
     if not np.isfinite(logarithms).all():  # directions that could not be separated
-        raise ContractionError("the flow contracts too strongly to be resolved", field="flow")
+        raise ContractionError(_TOO_STRONG, field="flow")
     moved = _moved(np.array(factors), np.array(errors or np.zeros(1)), groups, [values for values, _ in found])
     order = np.argsort(-logarithms.real, kind="stable")
     return logarithms[order], vectors[:, order], moved[order]
@@ -366,8 +364,24 @@ def _moved(factors: Array, errors: Array, groups: Sequence[Sequence[Array]], kno
     return SAFETY * moved
 
 
-def split_return(system: SystemLike, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
-    """As :func:`split_product` for a return; AnalysisError if it contracts too strongly to be resolved."""
+def split_return(
+    system: SystemLike, x: Array, image: ReturnMap, resolved: bool = False
+) -> tuple[ComplexArray, ComplexArray, Array]:
+    """As :func:`split_product` for a return, with round-off in the bounds. Where it contracts too strongly an
+    AnalysisError, or those of the multipliers that are ``resolved`` without a cut."""
+    try:
+        values, vectors, moved = _split(system, x, image)
+    except ContractionError:
+        spec = spectrum(image)
+        kept = spec.error < _TELLING * np.abs(spec.values)
+        if not resolved or not kept.any():
+            raise
+        values, vectors = np.log(spec.values[kept]), spec.right[:, kept]
+        moved = SAFETY * (spec.error[kept] / np.abs(spec.values[kept]))
+    return values, vectors, moved + 4.0 * EPSILON * np.abs(values)
+
+
+def _split(system: SystemLike, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
     if x.size == 1 and is_autonomous(system):  # nothing is left beside the motion
         return np.empty(0, np.complex128), np.empty((1, 0), np.complex128), np.empty(0)
     if is_stiff(system, x, image.duration):
@@ -403,8 +417,7 @@ def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
     for _ in range(_SHORTENINGS):
         state, derivative = checked_flow(system, x, 0.0, duration)
         derivative = derivative * cut.units / cut.units[:, None]
-        after = section_basis(system, state, cut.units)
-        stretch, right = np.linalg.svd(after.T @ derivative @ cut.section)[1:]
+        stretch, right = np.linalg.svd(section_basis(system, state, cut.units).T @ derivative @ cut.section)[1:]
         largest = max(1.0, float(stretch[0]))
         if _LEFT * largest <= stretch[slow] <= _APART * stretch[slow - 1]:
             return np.asarray(right[slow:].T)
@@ -413,5 +426,4 @@ def _fastest(system: SystemLike, x: Array, cut: Cut, duration: float) -> Array:
         duration = 0.5 * (short + long)
         if np.isinf(long):
             break
-    said = "the flow contracts too strongly to be resolved"
-    raise ContractionError(said, field="flow", allowed="another state on the orbit")
+    raise ContractionError(_TOO_STRONG, field="flow", allowed="another state on the orbit")

@@ -85,41 +85,35 @@ class PeriodicSystem(ReadOnlyArrays):
     symmetry_order: int = field(init=False, default=1, repr=False)
 
     def __post_init__(self) -> None:
-        self._set("dimension", checked_count("dimension", self.dimension, LARGEST))
+        own = self.__dict__  # the way around the dataclass's own lock
+        own["dimension"] = checked_count("dimension", self.dimension, LARGEST)
         for name in ("flow", "flow_events", *_MORE):
             function = getattr(self, name)
             if not (callable(function) or (function is None and name != "flow")):
                 raise ParameterError("must be a function", field=name, value=function)
         if self.period is None:
             if self.velocity is None:
-                allowed = "a number, or None and a velocity"
-                raise ParameterError("must be given", field="period", value=None, allowed=allowed)
-            self._set("guess_period", positive("guess_period", self.guess_period))
+                raise ParameterError("must be given", field="period", allowed="a number, or None and a velocity")
+            own["guess_period"] = positive("guess_period", self.guess_period)
         else:
-            self._set("period", positive("period", self.period))
+            own["period"] = positive("period", self.period)
         if self.symmetry is not None:
-            symmetry = self._of_finite_order("symmetry", self.symmetry)[0]
-            self._set("symmetry", symmetry)
-            self._set("symmetry_order", max(2, _order(symmetry.tobytes(), len(symmetry))))
+            own["symmetry"] = symmetry = self._of_finite_order("symmetry", self.symmetry)[0]
+            own["symmetry_order"] = max(2, _order(symmetry.tobytes(), len(symmetry)))
         if self.spatial_symmetry is not None:
-            self._set("spatial_symmetry", self._of_finite_order("spatial_symmetry", self.spatial_symmetry))
+            own["spatial_symmetry"] = self._of_finite_order("spatial_symmetry", self.spatial_symmetry)
         if self.orbit is not None:
-            self._set("orbit", finite_array(self.orbit, (self.dimension,), "orbit"))
+            own["orbit"] = finite_array(self.orbit, (self.dimension,), "orbit")
         if self.scale is not None:
             scale = finite_array(self.scale, (self.dimension,), "scale")
             if not (scale > 0.0).all():
                 raise ParameterError("must be positive", field="scale", value=self.scale)
-            self._set("scale", scale)
+            own["scale"] = scale
         super().__post_init__()
 
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
-
     def _of_finite_order(self, name: str, given: ArrayLike) -> Array:
-        matrices = finite_array(given, None, name)
-        n = self.dimension
-        single = matrices.ndim == 2
-        if matrices.shape[-2:] != (n, n) or matrices.ndim > 3 or (name == "symmetry" and not single):
+        matrices, n = finite_array(given, None, name), self.dimension
+        if matrices.shape[-2:] != (n, n) or matrices.ndim > (2 if name == "symmetry" else 3):
             raise ParameterError(f"has the wrong shape {matrices.shape}", field=name, allowed=f"({n}, {n})")
         matrices = matrices.reshape(-1, n, n)
         for matrix in matrices:
@@ -337,12 +331,5 @@ def from_map(
         rounding = _ROUNDING * n * max(1, math.ceil(t1) - math.ceil(t0)) * reach
         return state, derivative, REPEATED * np.abs(other - derivative) + rounding
 
-    return PeriodicSystem(
-        n,
-        1.0,
-        lambda x, t0, t1: iterated(x, t0, t1)[:2],
-        orbit=orbit,  # type: ignore[arg-type]  # checked and converted there, like the next two
-        spatial_symmetry=spatial_symmetry,  # type: ignore[arg-type]
-        scale=scale,  # type: ignore[arg-type]
-        flow_with_error=flow_with_error,
-    )
+    more: dict[str, Any] = {"orbit": orbit, "spatial_symmetry": spatial_symmetry, "scale": scale}  # converted there
+    return PeriodicSystem(n, 1.0, lambda x, t0, t1: iterated(x, t0, t1)[:2], flow_with_error=flow_with_error, **more)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -279,6 +280,14 @@ def from_known(
     said = f"must be a periodic orbit: one return moves the state by {float(moved.max()):.1e}"
     allowed = "a state on the orbit at time 0, or a first guess, which is then improved"
     raise AnalysisError(said, field="orbit", allowed=allowed)
+
+
+def known_orbits(systems: Sequence[SystemLike], budget: Budget | None = None) -> Iterator[Orbit]:
+    """The orbits of systems that know them; the return maps are computed together, and first, if possible."""
+    states = [known_state(system) for system in systems]
+    images = returns.return_maps(systems, states)
+    known = zip(systems, states, images, strict=True)
+    return (from_known(system, state, image=image, budget=budget) for system, state, image in known)
 
 
 def near_orbit(

@@ -41,8 +41,7 @@ class Accuracy:
         of_flow, size = self.of_flow, self._samples.size
         units = size / size[:, None]
         result = np.full(len(found), of_flow)
-        scaled = np.array([each.image.jacobian for each in found]) * units
-        _, values, rows = np.linalg.svd(scaled - np.eye(size.size))
+        _, values, rows = np.linalg.svd(np.array([each.image.jacobian for each in found]) * units - np.eye(size.size))
         for i in np.flatnonzero(values[:, -1] <= _SURE):
             sample = found[i]
             if sample.value not in self._bends:

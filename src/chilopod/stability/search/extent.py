@@ -104,9 +104,9 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
     if rising and samples.fold is not None:
         sure = np.isfinite(samples.fold.error_bound) and _as_a_root(samples, sample, samples.fold, rising)
         return samples.fold if sure else None
-    off = np.array([each.off_plus_one for each in [sample, *others]])
-    clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
-    for each in [[sample, *others][i] for i in clear[:_TRIES]]:
+    near = [sample, *others]
+    clear = min(_CLEAR_OF_FOLD, max(each.off_plus_one for each in near) / 2.0)
+    for each in [each for each in near if each.off_plus_one > clear][:_TRIES]:
         budget = Budget(_FLOWS * samples.orbits, samples.budget.remaining)
         fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising, budget)
         # Close to it a step may land on another curve with another fold.
@@ -133,10 +133,9 @@ def _as_a_root(samples: Samples, sample: Sample, fold: BifurcationPoint, rising:
     places = np.clip(fold.value + (-away if rising else away), samples.low, samples.end)
     away = np.abs(places - fold.value)
     try:
-        beside = samples.at(places)
+        off = [each.off_plus_one for each in samples.at(places)]
     except (AnalysisError, SpentError):
         return True  # no evidence against it
-    off = [each.off_plus_one for each in beside]
     return bool(away[1] <= away[0] or off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS)
 
 

@@ -49,9 +49,7 @@ _SAME = 1e-9  # distance of values of one point on the border of two pieces, rel
 _BESIDE = 1e-6  # distance from a crossing at which rates of change are computed, relative to the interval
 _RESOLVED = 256.0  # least such distance, relative to that of two floating-point numbers at the ends of the interval
 
-
-Found = BifurcationPoint | str
-"""A point, or a remark."""
+Found = BifurcationPoint | str  # a point, or a remark
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +102,8 @@ class Located(Result, Sequence[BifurcationPoint]):
         many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"
         first = f"Located: {many}, {self.status.label}: {self.status.sentence}"
         low, high = self.searched
-        at = f"at {self.evaluations} values, at most {self.spacing:.2g} apart"
-        return [
-            first,
-            f"searched: {low:.9g} to {high:.9g}, {at}",
-            *rows(point.row for point in self.points),
-            *said(self.remarks),
-        ]
+        where = f"{low:.9g} to {high:.9g}, at {self.evaluations} values, at most {self.spacing:.2g} apart"
+        return [first, f"searched: {where}", *rows(point.row for point in self.points), *said(self.remarks)]
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the kinds of bifurcations over the searched interval, on axes of matplotlib or on new ones."""
@@ -118,8 +111,7 @@ class Located(Result, Sequence[BifurcationPoint]):
         for point in self.points:
             axes.plot([point.value], [point.kind.label], "o", color="C0", clip_on=False)
             text = f"{point.value:.6g}\n{point.row[2]}".strip()
-            at = point.value, point.kind.label
-            axes.annotate(text, at, (0, 6), ha="center", textcoords="offset points")
+            axes.annotate(text, (point.value, point.kind.label), (0, 6), ha="center", textcoords="offset points")
         axes.margins(y=0.5)
         ends = [*self.searched, *(point.value for point in self)]  # a fold lies just past the searched part
         if min(ends) < max(ends):
@@ -274,8 +266,7 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
     def whole(block: Block | None, values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
         if samples.known:
-            shape = found[0].image.jacobian.shape
-            errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
+            errors = np.stack([np.broadcast_to(each.image.error, each.image.jacobian.shape) for each in found])
         elif block is None or block.trivial:
             errors = accuracy.errors(found)
         else:  # a symmetry-breaking mode does not affect the orbit's accuracy
@@ -356,7 +347,6 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     if not point.error_bound < samples.width:
         raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
     if touch:
-        value_text = bounded(point.value, point.error_bound)
         said = "only touches the unit circle, within its error, and goes back: nothing changes beside it"
-        return f"at {value_text} a multiplier {said}"
+        return f"at {bounded(point.value, point.error_bound)} a multiplier {said}"
     return point

@@ -24,25 +24,14 @@ from chilopod.stability.branches.branch_starts import Start
 from chilopod.stability.branches.parts import rising_part
 from chilopod.stability.crossing_place import Sample, through
 from chilopod.stability.interface import CheckedFamily, Family, is_autonomous, sizes
-from chilopod.stability.orbits.orbit import (
-    Orbit,
-    from_known,
-    known_state,
-    near_orbit,
-    past_event,
-    rounds_in,
-    searched_orbit,
-)
+from chilopod.stability.orbits.orbit import Orbit, known_orbits, near_orbit, past_event, rounds_in, searched_orbit
 from chilopod.stability.orbits.shooting import Nodes
 from chilopod.stability.points import BifurcationPoint
-from chilopod.stability.returns import JUMPS, events_in, return_duration, return_maps, section_at
+from chilopod.stability.returns import JUMPS, events_in, return_duration, section_at
 from chilopod.stability.unit_circle.crossings import first_values
 
-NEAR_FOLD = 0.02
-"""Distance of a multiplier from +1 within which the search may not resolve a fold."""
-
-SPENT = "the orbits (`budget`) were spent"
-"""Remark of a search that computed as many orbits as it may."""
+NEAR_FOLD = 0.02  # distance of a multiplier from +1 within which the search may not resolve a fold
+SPENT = "the orbits (`budget`) were spent"  # remark of a search that computed as many orbits as it may
 
 # Budgets.
 _FIRST = 400  # least number of return maps allowed for the first orbit
@@ -172,10 +161,8 @@ class Samples:
             self.budget.take()
             systems.append(self.family(value))
         with self.family.calling(values[0]) if len(values) == 1 else UserCode("family", values[0]):
-            states = [known_state(system) for system in systems]
-            images = return_maps(systems, states)
-        for value, system, state, image in zip(values, systems, states, images, strict=True):
-            orbit = from_known(system, state, image=image, budget=self.budget)
+            orbits = known_orbits(systems, self.budget)
+        for value, orbit in zip(values, orbits, strict=True):
             self._keep(Sample(value, orbit.state, orbit.image))
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
@@ -355,8 +342,7 @@ class Samples:
             return False
         rates = np.log1p(off)
         ahead = rates[1] + (rates[1] - rates[0]) * (found.value - left.value) / (left.value - first.value)
-        passes = np.sign(ahead) != np.sign(rates[1])
-        return bool(passes or (abs(ahead) < abs(rates[1]) < abs(rates[2])))
+        return bool(np.sign(ahead) != np.sign(rates[1]) or abs(ahead) < abs(rates[1]) < abs(rates[2]))
 
     def _on_its_side(self, samples: list[Sample], guess: Array, found: Sample) -> bool:
         """True if the multiplier nearest +1 is on the side predicted by samples, the first two next to the one found.

@@ -123,8 +123,7 @@ class Accounts:
         if not decided:
             return []
         first, last = (-np.inf, decided[0][1]), (np.inf, decided[-1][1])
-        neighbours = itertools.pairwise([first, *decided, last])
-        gaps = [_Gap(x, y, before, after, []) for (x, before), (y, after) in neighbours]
+        gaps = [_Gap(x, y, u, v, []) for (x, u), (y, v) in itertools.pairwise([first, *decided, last])]
         places = [place for place, _ in decided]
         for root in roots:
             gaps[bisect.bisect_right(places, root.place)].inside.append(root)
@@ -294,16 +293,23 @@ class Accounts:
         if gap.x == -np.inf or gap.y == np.inf:
             # As if the multipliers continued in their direction.
             number = sum(crossing.multiplicity for crossing in crossings)
-            surely = int((self.spectra.margins(root.place) > self.spectra.tolerances(root)).sum())
-            outside = gap.before - surely
+            outside = gap.before - int((self.spectra.margins(root.place) > self.spectra.tolerances(root)).sum())
             change = (2 * outside - number) * (1 if gap.x == -np.inf else -1) if 0 <= outside <= number else 0
             return [replace(crossing, change=change) for crossing in crossings]
         if len(gap.inside) > 1 or not self._explains(root, gap.change):
             return crossings
         if len(crossings) == 1:
             return [replace(crossings[0], change=gap.change)]
-        beyond = partial(_outside_near, self.spectra)
+        beyond = self._outside_near
         return [replace(each, change=beyond(each, gap.y) - beyond(each, gap.x)) for each in crossings]
+
+    def _outside_near(self, crossing: Crossing, place: float) -> int:
+        """Number of the multipliers nearest to the critical ones outside the circle, at a place beside a crossing."""
+        nu, times = self.spectra.at(np.array([place]))[0], 1
+        if crossing.event is CircleEvent.PAIR:
+            nu, times = nu[nu.imag > 0.0], 2
+        nearest = np.argsort(np.abs(nu - crossing.multiplier))[: crossing.multiplicity // times]
+        return times * int((np.abs(nu[nearest]) > 1.0).sum())
 
     def _critical(self, root: Root) -> list[Crossing]:
         """Crossings at a root, with unknown changes; none without a matrix."""
@@ -323,11 +329,10 @@ class Accounts:
             unknown = float(self.spectra.tolerances(root).max()) > UNKNOWN
             if unknown and gap not in self._settled and not (root.touch and root.event is not None):
                 self._remark(LOST, gap)
-        if root.touch or self.spectra.conservative:  # there multipliers that meet leave like square roots
+        if not crossings or root.touch or self.spectra.conservative:  # there those that meet leave like square roots
             return bool(crossings)
         nu = self.spectra.at(np.array([root.place]))[0]
-        ranks = [int(np.abs(nu - each.multiplier).argmin()) for each in crossings]
-        return bool(crossings) and not any(self._jumps(root.place, rank) for rank in ranks)
+        return not any(self._jumps(root.place, int(np.abs(nu - each.multiplier).argmin())) for each in crossings)
 
     def _remark(self, remark: str, gap: Interval) -> None:
         self._settled.add(gap)
@@ -337,18 +342,8 @@ class Accounts:
 def _without_shadows(roots: list[Root]) -> list[Root]:
     """Roots without the touches that lie in the uncertain surroundings of a crossing."""
     crossings = np.array([root.place for root in roots if not root.touch])
-    return [
-        root
-        for root in roots
-        if not root.touch or (np.abs(crossings - root.place) > _SHADOW * (root.right - root.left)).all()
-    ]
 
+    def apart(touch: Root) -> bool:
+        return bool((np.abs(crossings - touch.place) > _SHADOW * (touch.right - touch.left)).all())
 
-def _outside_near(spectra: Spectra, crossing: Crossing, place: float) -> int:
-    """Number of the multipliers nearest to the critical ones outside the circle, at a place beside a crossing."""
-    nu, number = spectra.at(np.array([place]))[0], crossing.multiplicity
-    times = 2 if crossing.event is CircleEvent.PAIR else 1
-    if times == 2:
-        nu = nu[nu.imag > 0.0]
-    nearest = np.argsort(np.abs(nu - crossing.multiplier))[: number // times]
-    return times * int((np.abs(nu[nearest]) > 1.0).sum())
+    return [root for root in roots if not root.touch or apart(root)]

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from chilopod.labels import Labelled
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.unit_circle.counts import LOST, Accounts, Report
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, Matrices, Root, Spectra, factors, margins
-from chilopod.stability.unit_circle.zeros import PLACES, Zeros, find_zeros, first_places
+from chilopod.stability.unit_circle.zeros import PLACES, Zeros, find_zeros, places_in
 
 BUDGET = 5000  # default budget of matrices of a search
 
@@ -104,7 +105,7 @@ def find_crossings(
 def first_values(low: float, high: float) -> Array:
     """First values of the parameter at which a search of an interval evaluates matrices, in order."""
     a, b, parameter, _ = _coordinate(low, high)
-    return np.sort(parameter(first_places(a, b)))
+    return np.sort(parameter(places_in(a, b, PLACES)))
 
 
 def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], Any], Callable[[Any], Any]]:
@@ -114,8 +115,7 @@ def _coordinate(low: float, high: float) -> tuple[float, float, Callable[[Any], 
 
     def parameter(places: Any) -> Any:
         # The exact ends, in spite of rounding in the logarithm.
-        inner = np.clip(outward(places), low, high)
-        return np.where(places <= a, low, np.where(places >= b, high, inner))
+        return np.where(places <= a, low, np.where(places >= b, high, np.clip(outward(places), low, high)))
 
     return a, b, parameter, inward
 
@@ -132,7 +132,7 @@ class _Finder:
     def search(self, known: Array) -> tuple[SearchStatus, list[Crossing]]:
         """Find the crossings; eigenvalues outside are counted at ``known`` places too."""
         report, spectra = self.report, self.spectra
-        first = first_places(self.a, self.b)
+        first = places_in(self.a, self.b, PLACES)
         spectra.at(first)
         if not spectra.values:
             if spectra.left <= 0:
@@ -232,14 +232,9 @@ class _Finder:
 
     def _zeros(self, event: CircleEvent, spare: int) -> Zeros:
         spectra = self.spectra
-        return find_zeros(
-            lambda places: spectra.function(places, event),
-            self.a,
-            self.b,
-            error=lambda places: spectra.function_error(places, event),
-            left=lambda: spectra.left - spare,
-            skip=spectra.without_pair if event is CircleEvent.PAIR else None,
-        )
+        function, error = partial(spectra.function, event=event), partial(spectra.function_error, event=event)
+        skip = spectra.without_pair if event is CircleEvent.PAIR else None
+        return find_zeros(function, self.a, self.b, error=error, left=lambda: spectra.left - spare, skip=skip)
 
     def _roots(self, event: CircleEvent, found: Zeros) -> list[Root]:
         report, spectra = self.report, self.spectra

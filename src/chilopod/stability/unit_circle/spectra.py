@@ -238,10 +238,7 @@ class Spectra:
         others: of a symplectic matrix, up to its sign, the discriminant of the polynomial in nu + 1/nu (Howard &
         MacKay, J. Math. Phys. 28, 1987).
         """
-        nu = self.at(values)
-        here = np.isfinite(nu).all(axis=1)
-        signs, logs = np.full((2, values.size), np.nan)
-        signs[here], logs[here] = symmetric(factors(nu[here], event), self.idle[event])
+        signs, logs = symmetric(factors(self.at(values), event), self.idle[event])
         return signs, logs - self._bounds(values, event)
 
     def _bounds(self, values: Array, event: CircleEvent) -> Array:
@@ -265,8 +262,7 @@ class Spectra:
     ) -> Root:
         """The root of a function of the eigenvalues between opposite signs, within a distance or to the last digits."""
         most = min(200, max(self.left, 1))
-        finest = max(within, 5e-324)
-        place = float(brentq(function, a, b, xtol=finest, rtol=4 * EPSILON, maxiter=most, disp=False))
+        place = brentq(function, a, b, xtol=max(within, 5e-324), rtol=4 * EPSILON, maxiter=most, disp=False)
         reach = within + 4.0 * EPSILON * abs(place)
         return Root(place, max(place - reach, a), min(place + reach, b), event, known=(a, b))
 
@@ -365,8 +361,7 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
     # Real and imaginary part separately: the quotient of a complex subnormal and its size would overflow.
     divisors = np.where(sizes == 0.0, 1.0, sizes)
     directions = terms.real / divisors + 1j * (terms.imag / divisors)
-    signs = np.sign((np.prod(directions, axis=1) * last).real)
-    return np.asarray(signs), np.asarray(logs)
+    return np.asarray(np.sign((np.prod(directions, axis=1) * last).real)), np.asarray(logs)
 
 
 @cache
@@ -384,8 +379,7 @@ def _meeting(upper: ComplexArray) -> ComplexArray:
 def _stretches(balanced: Array) -> Array:
     """Logarithms of det(1 + M^T M)^(1/2), M balanced: a positive, analytic divisor that exceeds its dividend."""
     one = np.broadcast_to(np.eye(balanced.shape[-1]), balanced.shape)
-    double = np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]])
-    return np.asarray(0.5 * np.linalg.slogdet(double)[1])
+    return np.asarray(0.5 * np.linalg.slogdet(np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]]))[1])
 
 
 def _eigenvalues(balanced: Array) -> ComplexArray:

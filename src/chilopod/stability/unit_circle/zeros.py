@@ -66,11 +66,6 @@ class Zeros(NamedTuple):
     spent: bool  # the budget ended the search
 
 
-def first_places(low: float, high: float) -> Array:
-    """First places at which a search evaluates any function."""
-    return _places(low, high, PLACES)
-
-
 def find_zeros(
     function: SignedLog,
     low: float,
@@ -149,7 +144,7 @@ class _Search:
         """Search some pieces together; return the remaining pieces."""
         left: list[Interval] = []
         for wanted in (PLACES, MORE_PLACES):
-            places = np.array([_places(a, b, wanted) for a, b in pieces]).reshape(-1, wanted.size)
+            places = np.array([places_in(a, b, wanted) for a, b in pieces]).reshape(-1, wanted.size)
             signs, logs = (part.reshape(places.shape) for part in self._ask(places.ravel()))
             promising = []
             for (a, b), row_signs, row_logs in zip(pieces, signs, logs, strict=True):
@@ -197,7 +192,7 @@ class _Search:
         if not deep and signs.size == PLACES.size and wrong <= _PROMISING:
             return None
         if self.error is not None and deep:
-            noise = float(np.exp(min(self.error(_places(a, b, PLACES)).max() - reference, 0.0)))
+            noise = float(np.exp(min(self.error(places_in(a, b, PLACES)).max() - reference, 0.0)))
             if _CLEAR * noise >= 1.0:
                 return [_Part(a, b, _Kind.ZERO)]
             if wrong <= _CLEAR * noise:
@@ -217,7 +212,7 @@ class _Search:
         borders = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [signs.size]])
         parts = []
         for i, j in itertools.pairwise(borders.tolist()):
-            start, end = _places(a, b, ends[[i, j]]).tolist()
+            start, end = places_in(a, b, ends[[i, j]]).tolist()
             if signs[i]:
                 parts.append(_Part(start, end, _Kind.SIGN, float(signs[i])))
                 continue
@@ -326,7 +321,7 @@ def _wide(part: _Part, a: float, b: float) -> bool:
     return part.kind in _OPEN and 0.5 * part.b - 0.5 * part.a > _NARROW * (0.5 * b - 0.5 * a)
 
 
-def _places(a: float, b: float, parts: Array) -> Array:
+def places_in(a: float, b: float, parts: Array) -> Array:
     """Map -1 ... 1 to a ... b, with exact ends and no overflow."""
     places = (0.5 * a + 0.5 * b) + (0.5 * b - 0.5 * a) * parts
     return np.asarray(np.where(parts <= -1.0, a, np.where(parts >= 1.0, b, np.clip(places, a, b))))
