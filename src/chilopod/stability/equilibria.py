@@ -24,14 +24,12 @@ from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.returns import ReturnMap, section_at
 from chilopod.stability.spectrum import EPSILON, SAFETY, disturbed, eigenvalue_errors, phased
 
-SHRINKS = "the orbit shrinks into an equilibrium"
-"""Reason for the end of a curve of cycles."""
+SHRINKS = "the orbit shrinks into an equilibrium"  # reason for the end of a curve of cycles
 
 SHRUNK = 10.0
 """Motion of a cycle, relative to the largest along its curve, that counts as shrunk, in roots of the precision."""
 
-ROUNDING = 16.0 * EPSILON
-"""Rounding error of a right-hand side, relative to its terms: a few roundings in each."""
+ROUNDING = 16.0 * EPSILON  # rounding error of a right-hand side, relative to its terms: a few roundings in each
 
 _ROUNDS = 80  # enough for a triple root, where each leaves two thirds
 _HALVINGS = 12  # halvings of a step of Newton's method
@@ -200,8 +198,7 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
     size = getattr(system, "scale", None)
     if size is None:
         size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
-    curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
-    found, wrong = _expanded(system, curves)
+    found, wrong = _expanded(system, np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1))
     with np.errstate(all="ignore"):
         velocity, matrix = found[0, 0], found[:, 1].T / size
     if not (np.isfinite(velocity).all() and np.isfinite(matrix).all()):

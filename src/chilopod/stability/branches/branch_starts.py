@@ -136,8 +136,7 @@ def begin(
             _check_moving(system, guess)
             raise
         _check_periods(studied, found, periods)
-    period = found.period if is_autonomous(system) else None
-    return Start(value, found.state, rising, periods=periods, period=period)
+    return Start(value, found.state, rising, periods=periods, period=found.period if is_autonomous(system) else None)
 
 
 def check_symmetric(system: SystemLike, symmetric: bool) -> None:
@@ -253,7 +252,7 @@ def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
     if given is not None:
         return given
     period, old = start.period, start.sizes if isinstance(start, Start) else start.units[:-1]
-    base = sizes(system, x, return_duration(system) if period is None else period / returns_per_period(system))
+    base = sizes(system, x, return_duration(system, period))
     if old is not None and (base < _ROUNDING * old).any():  # a state that rests at zero is rounding there
         base = old
     found = _linear_within(curve, x, value, base, period)
@@ -371,8 +370,7 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
 
     def residual(z: Array) -> float:
         x, value = start.orbit + units[:n] * z[:n], start.value + curve.scale * float(z[n])
-        mapped = returned_states(curve.system(value), x[None], section)[0]
-        return float(w @ ((mapped - x) / units[:n]))
+        return float(w @ ((returned_states(curve.system(value), x[None], section)[0] - x) / units[:n]))
 
     here = residual(np.zeros(n + 1))
 
@@ -391,8 +389,7 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
     old = _old_tangent(curve, start, units)
     other = min(found, key=lambda each: abs(float(each @ old)))
     assert start.mode is not None
-    along = float(other[:-1] @ (start.mode / units[:-1]))
-    return other if along >= 0.0 else -other
+    return other if float(other[:-1] @ (start.mode / units[:-1])) >= 0.0 else -other
 
 
 def _old_tangent(curve: Curve, start: Start, units: Array) -> Array:

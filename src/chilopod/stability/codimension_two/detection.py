@@ -56,8 +56,7 @@ _COSINES = {
 Signal = CodimensionTwo | CircleEvent
 """A test function: of the critical multipliers by the kind of its zeros, of the other ones by their event there."""
 
-Signals = dict[Signal, tuple[float, float]]
-"""Test functions and their errors."""
+Signals = dict[Signal, tuple[float, float]]  # test functions and their errors
 
 Test = Callable[[float], tuple[float, float]]
 """A test function and its error at a distance along a step; NaN where undefined."""
@@ -100,7 +99,6 @@ class Critical:
 
     @functools.cached_property
     def system(self) -> SystemLike:
-        """The system at this place."""
         return self._curve.system(self.at.place.values)
 
     @functools.cached_property
@@ -114,7 +112,6 @@ class Critical:
 
     @functools.cached_property
     def form(self) -> NormalForm:
-        """The normal form."""
         at, orbit_error = self.at, 0.0
         if isinstance(at, Spot):  # whose errors are known
             state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
@@ -124,8 +121,7 @@ class Critical:
 
     def fifth(self, *beside: Critical) -> Quintic | None:
         """The terms of fifth order, sampled up to about the amplitude of the normal form here, or else beside."""
-        amplitudes = (each.form.amplitude for each in (self, *beside))
-        amplitude = next(filter(np.isfinite, amplitudes), None)
+        amplitude = next(filter(np.isfinite, (each.form.amplitude for each in (self, *beside))), None)
         return None if amplitude is None else quintic(self._returned, self.orbit, amplitude)
 
     def _returned(self, states: Array) -> Array:
@@ -257,8 +253,7 @@ class Detector:
             # Two real multipliers with product 1 are not critical.
             reals = nu[np.abs(nu.imag) <= _COMPLEX].real
             products = np.abs(reals[:, None] * reals - 1.0)[np.triu_indices(reals.size, 1)]
-            critical = off_circle <= products.min(initial=np.inf)
-            return together(self._kind, Kind.NEIMARK_SACKER) if critical else None
+            return together(self._kind, Kind.NEIMARK_SACKER) if off_circle <= products.min(initial=np.inf) else None
         sign = TARGETS[signal]
         if sign == self.curve.target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +39,7 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import event_beside, return_duration, returned_states, section_at, whole_period
 from chilopod.stability.symmetry.groups import reverses
 
-BUDGET = 20_000
-"""Default budget of a curve, in return maps with derivatives."""
+BUDGET = 20_000  # default budget of a curve, in return maps with derivatives
 
 _MOVED = 1e-4  # largest correction of the start, relative to the box, and of its orbit, relative to the states
 _MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
@@ -129,13 +127,13 @@ def follow2(
             ahead = float(first.frame.between(first.place, beside) @ first.tangent)
         else:
             ahead = float(first.tangent[first.frame.parameters][1]) * (-1.0 if rising is False else 1.0)
-        steps, sign = (min(step, longest), longest), math.copysign(1.0, ahead)
-        after = _followed(detector, origin._replace(spot=first.towards(sign)), steps, points, progress)
-        before = _Half([], Ending.CLOSED if after.ending is Ending.CLOSED else Ending.START)
-        if after.ending is not Ending.CLOSED and outward is None and rising is None:
-            before = _followed(detector, origin._replace(spot=first.towards(-sign)), steps, points, progress)
-    found, endings = (*reversed(before.points), origin.point, *after.points), (before.ending, after.ending)
-    return Curve2(start.kind, found, endings, (before.reason, after.reason), periods)
+        wanted, sign = ((min(step, longest), longest), points, progress), math.copysign(1.0, ahead)
+        after, last, why = _followed(detector, origin._replace(spot=first.towards(sign)), *wanted)
+        before, begin, whence = list[Point2](), Ending.CLOSED if last is Ending.CLOSED else Ending.START, ""
+        if begin is Ending.START and outward is None and rising is None:
+            before, begin, whence = _followed(detector, origin._replace(spot=first.towards(-sign)), *wanted)
+    found = *reversed(before), origin.point, *after
+    return Curve2(start.kind, found, (begin, last), (whence, why), periods)
 
 
 def _over_periods(family2: Family2, periods: int) -> Family2:
@@ -180,21 +178,12 @@ _Looked = tuple[Station | None, list[SpecialPoint2]]
 """The station at the end of a step, if any, and the events within the step."""
 
 
-class _Half(NamedTuple):
-    """A curve in one direction, without its start."""
-
-    points: list[Point2]
-    ending: Ending
-    reason: str = ""
-
-
 def _followed(
     detector: Detector, origin: Station, steps: tuple[float, float], points: int | None, progress: Progress2
-) -> _Half:
-    """The curve from its first point, towards the tangent there."""
-    curve, last = detector.curve, origin
+) -> tuple[list[Point2], Ending, str]:
+    """The points after the first one of a curve, towards the tangent there, its ending, and the reason."""
+    curve, kept, last = detector.curve, list[Point2](), origin
     curve.first = origin.spot
-    kept: list[Point2] = []
 
     def look(step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
@@ -227,7 +216,7 @@ def _followed(
         if reason.startswith("step:") and curve.meets(end):
             reason = _TIP
         reason = event_beside(*about, ahead) or reason
-    return _Half(kept, ending, reason)
+    return kept, ending, reason
 
 
 _TIP = "the equations are singular here, as at the tip of an Arnold tongue, where periodic orbits form a continuum"
@@ -319,8 +308,7 @@ class _Unfolding:
         aside = fifth.coefficient * a**4 / self.at.times * self._response
         if not (abs(away) <= _FARTHEST and np.abs(aside).max() <= _FARTHEST):
             return None
-        base = self._equations.along(spot, away)
-        place = spot.frame.moved(base.place, aside)
+        place = spot.frame.moved(self._equations.along(spot, away).place, aside)
         bent = self.at.displacements(fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
 

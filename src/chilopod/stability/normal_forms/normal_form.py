@@ -117,8 +117,7 @@ def _of_full_period(fit: Fit, manifold: Manifold, orbit_error: float | None) -> 
         return NormalForm(status, 0.0, 0.0, -k * cubic, k * cubic_error, amplitude=sampled.radius)
     cubic = k * cubic + k * (k - 1) * quadratic.real**2
     cubic_error = k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error
-    amplitude = sampled.radius
-    return NormalForm(status, k * quadratic.real, k * quadratic_error, cubic, cubic_error, amplitude=amplitude)
+    return NormalForm(status, k * quadratic.real, k * quadratic_error, cubic, cubic_error, amplitude=sampled.radius)
 
 
 def _loose_by(manifold: Manifold, quadratic: float, cubic: float) -> float:

@@ -75,7 +75,6 @@ class Orbit(Shown, ReadOnlyArrays):
 
     @property
     def period(self) -> float:
-        """Full period."""
         return self.image.period
 
     @property
@@ -345,8 +344,7 @@ def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array, 
     """AnalysisError if the second return from an orbit's state is not symmetric to the first, with its derivative."""
     symmetry = np.asarray(system.symmetry)
     after: Array = np.linalg.solve(symmetry, x).astype(np.float64)
-    second = returns.carried(system, after[None], duration, 2.0 * duration)[0]
-    off = _relative(symmetry @ second - after, size)
+    off = _relative(symmetry @ returns.carried(system, after[None], duration, 2.0 * duration)[0] - after, size)
     if off > _ALIKE * max(1.0, float(np.abs(jacobian * size / size[:, None]).max())):
         said = f"must be one of the motion: after a return it misses the symmetric one by {off:.1e} of its size"
         allowed = "S with S f(t + T/k, x) = f(t, S x), of order k, also for guards and resets"

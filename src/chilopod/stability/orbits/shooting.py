@@ -227,9 +227,16 @@ class _Equations:
             return np.asarray(states / sizes @ basis @ basis.T * sizes)
 
     def _to_nodes(self, system: SystemLike) -> None:
-        """Carry every node to the next one."""
+        """Carry every node to the next one, and beside it by a neighbouring system if the parameter is unknown."""
         (m, n), part = self.nodes.states.shape, self.nodes.duration / len(self.nodes.states)
-        beside, step = self._beside()
+        beside, free = None, self._problem.free
+        if free is not None:
+            step = _DIFFERENCE * free.scale
+            try:
+                beside = self._problem.system_at(self.nodes.value + step)
+            except AnalysisError:  # the family ends here
+                step = -step
+                beside = self._problem.system_at(self.nodes.value + step)
         for i, x in enumerate(self.nodes.states):
             a, b = (0.0, part) if is_autonomous(system) else (i * part, (i + 1) * part)
             try:
@@ -242,24 +249,12 @@ class _Equations:
                     raise
                 raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
 
-    def _beside(self) -> tuple[SystemLike | None, float]:
-        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
-        problem, value = self._problem, self.nodes.value
-        if problem.free is None:
-            return None, 0.0
-        step = _DIFFERENCE * problem.free.scale
-        try:
-            return problem.system_at(value + step), step
-        except AnalysisError:  # the family ends here
-            return problem.system_at(value - step), -step
-
     def _to_section(self, system: SystemLike, frame: _Frame) -> _Frame:
         """Carry a single node until its motion returns to the section, or over the time, to a new section."""
         x, duration = self.nodes.states[0], self.nodes.duration
         if not frame.astray and frame.section is not None:
             try:
-                near = replace(frame.section, duration=duration)
-                start, rest, before, first = crossing(system, x, near)
+                start, rest, before, first = crossing(system, x, replace(frame.section, duration=duration))
                 self._ends[0], second = checked_flow(system, before, 0.0, rest)
                 self._linear[0, :, : x.size] = second @ first
                 self.nodes, self._returned = self.nodes._replace(duration=start + rest), True
@@ -283,7 +278,6 @@ class _Equations:
         return totals
 
     def closed(self) -> Closed:
-        """The nodes as a solution."""
         total, n = self._totals(self._off)[-1], self._off.shape[1]
         return Closed(self.nodes, self.frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
 

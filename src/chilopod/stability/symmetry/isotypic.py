@@ -51,7 +51,6 @@ class Block(ReadOnlyArrays):
 
     @property
     def multiplicity(self) -> int:
-        """Number m of copies."""
         return self.basis.shape[1] // self.dimension
 
     @property
