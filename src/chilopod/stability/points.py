@@ -257,8 +257,7 @@ def _with_coefficients(point: BifurcationPoint, form: NormalForm) -> Bifurcation
 def _critical(
     system: SystemLike, orbit: Orbit, spec: Spectrum, index: int, event: CircleEvent
 ) -> tuple[complex, ComplexArray, ComplexArray, float]:
-    """A critical multiplier, its right and left eigenvectors, and the frequency of the mode; those of positive
-    frequency of a conjugate pair."""
+    """A critical multiplier, of a pair that of positive frequency, right and left eigenvectors, and that frequency."""
     nu, mode, left = complex(spec.values[index]), spec.right[:, index], spec.left[:, index]
     peak = mode[np.abs(mode).argmax()]
     scale = np.abs(peak) / peak / mean_size(system, orbit.state, orbit.image.duration, mode)

@@ -24,16 +24,8 @@ from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
 from chilopod.notebook import picture
-from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchPoint, OnCurve
-from chilopod.stability.branches.branch_starts import (
-    IN_FOLD,
-    Start,
-    anchored,
-    begin,
-    branch_sizes,
-    check_symmetric,
-    switch,
-)
+from chilopod.stability.branches.branch_points import IN_FOLD, PRECISION, Anchor, BranchPoint, OnCurve
+from chilopod.stability.branches.branch_starts import Start, anchored, begin, branch_sizes, check_symmetric, switch
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, by_energy, inspect
 from chilopod.stability.continuation.equations import Step
@@ -358,8 +350,7 @@ def _renewed(curve: Curve, last: BranchPoint) -> Anchor:
 
 
 def _unpaired_folds(points: list[BranchPoint]) -> list[str]:
-    """Sentences for folds across which an even number of multipliers passes 1: at a fold one passes, so another
-    event is too near to be told apart."""
+    """Sentences for folds across which an even number of multipliers passes 1, and not the one of a fold alone."""
     remarks = []
     for before, fold, after in zip(points, points[1:], points[2:], strict=False):
         beyond = []

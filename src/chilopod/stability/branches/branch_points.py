@@ -144,9 +144,8 @@ def null_vector(bordered: Array) -> Array:
     return tangent / np.linalg.norm(tangent)
 
 
-PRECISION = 1e-12
-"""Default precision of orbits, relative to the sizes of the states; the accuracy of the flow limits it."""
-
+PRECISION = 1e-12  # default precision of orbits, relative to the sizes of the states; the flow's accuracy limits it
+IN_FOLD = 1e-6  # component of a unit tangent along the parameter, within the start's error, of a start in a fold
 _PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
 _STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink
 _KEPT = 8  # cached systems: making one may cost more than a flow

@@ -19,7 +19,7 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows.arguments import UserCode, check_arguments, finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
+from chilopod.stability.branches.branch_points import IN_FOLD, Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.interface import (
@@ -35,9 +35,6 @@ from chilopod.stability.interface import (
 from chilopod.stability.orbits.orbit import Orbit, known_state, past_event, searched_orbit, with_bounds
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import Section, carried, return_duration, returned_states, whole_period
-
-IN_FOLD = 1e-6
-"""Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
 
 _CLOSES = 1e-6  # distance, relative to the sizes, at which an orbit closes
 _CLOSING = "a point of a branch, or a system with its `spatial_symmetry`"
@@ -202,8 +199,7 @@ def switch(
             raise ParameterError("must be a special point", field="point", value=point.value)
         # At the start of a branch of doubled period the point belongs to the orbits that it leaves.
         halved = point.period is not None and point.bifurcation.period < 0.75 * point.period
-        old, known = point.tangent * point.units, point.periods // (2 if halved else 1)
-        along = point.units[:-1]
+        old, known, along = point.tangent * point.units, point.periods // (2 if halved else 1), point.units[:-1]
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")

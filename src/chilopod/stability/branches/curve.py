@@ -79,8 +79,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return start.orbit + total[:-1], start.value + float(total[-1])
 
     def anchor(self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0) -> Anchor:
-        """The anchor of a point; at a branch point its matrix is computed ``ahead`` by a distance along the tangent, or
-        by less where there is none."""
+        """The anchor of a point; at a branch point its matrix is computed ``ahead`` along the tangent, or less far."""
         section = self.section_at(last.orbit, last.value, last.period)
         x = last.orbit + ahead * last.tangent[:-1] * self.sizes
         try:
@@ -267,13 +266,12 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return float(np.array([bend, by_parameter]) @ wrong)
 
     def _bend_by_parameter(self, anchor: Anchor, x: Array, image: ReturnMap, moved: float) -> float:
-        """Change of the return map's derivative with the parameter, in units, for a step that does not change the
-        parameter by more than its error: the change along the curve does not show it."""
-        section = anchor.section and replace(anchor.section, duration=image.duration)
-        step = max(_BESIDE, 8.0 * float(np.spacing(abs(anchor.last.value))) / self.scale)
-        step = step if anchor.last.value + (moved + step) * self.scale <= self.between[1] else -step
+        """Change of the return map's derivative with the parameter, in units, where that along the curve hides it."""
+        section, value = anchor.section and replace(anchor.section, duration=image.duration), anchor.last.value
+        step = max(_BESIDE, 8.0 * float(np.spacing(abs(value))) / self.scale)
+        step = step if value + (moved + step) * self.scale <= self.between[1] else -step
         try:
-            beside = self.image(x, anchor.last.value + (moved + step) * self.scale, section)
+            beside = self.image(x, value + (moved + step) * self.scale, section)
         except AnalysisError:
             return np.inf
         change = (beside.jacobian - image.jacobian) * self.sizes / self.sizes[:, None]

@@ -71,8 +71,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         return np.asarray(matrix * sizes[:, None] / sizes)
 
     def near(self, place: float) -> tuple[Array, float]:
-        """Derivative and duration of the return at a place, computed once, by the cubic through the ends of the step,
-        corrected until it is close enough."""
+        """Derivative and duration of the return at a place, computed once, by the cubic through the step's ends."""
         if place not in self._near:
             image = self._near_image(place)
             self._near[place] = image.jacobian, image.duration
@@ -145,6 +144,7 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
         before, after = within.sides(crossing.value)
         between = before.tangent + after.tangent
         point = replace(point, tangent=between / np.linalg.norm(between))
+    value = point.value
     if not place.fold and (block is None or block.trivial):
 
         def bounded_at(_: float, moved: Array, error: Array, duration: float) -> Orbit:
@@ -158,19 +158,17 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
         if regular is not None and not regular.error_bound < along:
             regular = None
     if regular is not None:
-        orbit, along = regular.orbit, regular.error_bound
-        point = replace(point, value=curve.reached(start, regular.sampled)[1])
+        orbit, along, value = regular.orbit, regular.error_bound, curve.reached(start, regular.sampled)[1]
     if place.branching and crossing.change == 0:
         value, error = _turn(within, crossing.value)
     else:
-        value, error = point.value, _value_error(within, place, along, orbit.image)
+        error = _value_error(within, place, along, orbit.image)
         if not place.fold:
             # The orbits beside a singular one, from which it is interpolated, are the less certain the closer they are.
             reach = regular.reach if regular else _BESIDE * (high - low)
             beside = max(crossing.value - reach, low), min(crossing.value + reach, high)
             error += max(_noise(curve, within.at(each), within.step.start.section) for each in beside)
             error += curve.scale * float(regular.sampled_error[-1]) if regular else 0.0
-    point = replace(point, value=value)
     kind = Kind.FOLD if place.fold else None
     found = described(curve.system(value), (value, error), orbit, crossing, block, kind=kind)
     if place.branching and found.kind is Kind.TRANSCRITICAL:
@@ -181,7 +179,8 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
     if (away > _CRITICAL and not crossing.collision) or np.isinf(found.error_bound):
         return None
     bound = curve.multipliers(orbit.image)[1]
-    return replace(point, orbit=orbit.state, special=found.kind, error_bound=bound, bifurcation=found)
+    point = replace(point, value=value, orbit=orbit.state, error_bound=bound)
+    return replace(point, special=found.kind, bifurcation=found)
 
 
 def _orbit(within: Within, point: BranchPoint, place: EventPlace) -> Orbit:

@@ -31,9 +31,9 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step, inverted
 from chilopod.stability.continuation.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk
-from chilopod.stability.interface import SystemLike, offers, returns_per_period, sizes, system_of
+from chilopod.stability.interface import SystemLike, offers, sizes, system_of
 from chilopod.stability.orbits.orbit import closings, from_known, known_state
-from chilopod.stability.returns import ReturnMap, Section, return_map, section_at, velocity_at
+from chilopod.stability.returns import ReturnMap, Section, return_duration, return_map, section_at, velocity_at
 from chilopod.stability.symmetry.groups import symmetric_states
 
 Family2 = Callable[[float, float], SystemLike]  # ``family2(p, q)`` is the system at values of two parameters
@@ -127,7 +127,6 @@ class Spot(Evaluated):
         return np.asarray(np.abs(np.linalg.pinv(self.matrix[:-1])) @ self.uncertainty)
 
     def towards(self, sign: float) -> Spot:
-        """Point with its tangent multiplied by the sign."""
         tangent = sign * self.tangent
         return replace(self, tangent=tangent, matrix=np.vstack([self.matrix[:-1], tangent]))
 
@@ -150,13 +149,12 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         self.precision, self.settled = self.narrowness * ROUND_OFF, self.narrowness * SETTLED
 
     def system(self, values: Array) -> SystemLike:
-        """The system at values of both parameters."""
         return system_of(self._family2, *values.tolist())
 
     def begin(self, place: Place, period: float) -> Spot:
         """The point of the curve nearest to a place beside it, with about the full period there, NaN if unknown."""
         system = self.system(place.values)
-        duration = period / returns_per_period(system) if np.isfinite(period) else None
+        duration = return_duration(system, period) if np.isfinite(period) else None
         section = None if self.known else section_at(system, place.state, duration=duration)
         place, image = self._mapped(place, section, False)
         frame = self._framed(system, place, image, self._size(system, place, image, section), None)

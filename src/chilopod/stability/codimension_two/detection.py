@@ -146,7 +146,6 @@ class Detector:
         self._signals: list[Signal] = [*filter(None, [self._degenerate]), *resonances, *CircleEvent]
 
     def station(self, spot: Spot) -> Station:
-        """The point at a spot, and the test functions."""
         here = Critical(self.curve, spot)
         signals = {signal: self._measured(signal, here) for signal in self._signals}
         bound = across(spot) + 4.0 * EPSILON * np.abs(spot.values)
@@ -257,11 +256,11 @@ class Detector:
         sign = TARGETS[signal]
         if sign == self.curve.target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier
-        # At the point itself the modes of two equal multipliers are any combinations of both.
-        nearest = int(np.abs(there.spectrum.values[there.others] - sign).argmin())
-        mode = there.spectrum.right[:, there.others[nearest]]
         if sign < 0:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
+        # At the point itself the modes of two equal multipliers are any combinations of both.
+        nearest = there.others[np.abs(there.spectrum.values[there.others] - sign).argmin()]
+        mode = there.spectrum.right[:, nearest]
         if reverses(here.system, mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
         meets = self.curve.known or self.curve.meets(spot)

@@ -27,14 +27,7 @@ from chilopod.stability.codimension_two.detection import Critical, Detector, Sta
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.equilibria import SHRINKS
-from chilopod.stability.interface import (
-    SystemLike,
-    offers,
-    returns_per_period,
-    sizes,
-    system_of,
-    with_shared_symmetries,
-)
+from chilopod.stability.interface import SystemLike, offers, sizes, system_of, with_shared_symmetries
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import event_beside, return_duration, returned_states, section_at, whole_period
 from chilopod.stability.symmetry.groups import reverses
@@ -146,7 +139,7 @@ def _over_its_periods(family2: Family2, values: Array, orbit: Array, period: flo
     system = system_of(family2, *values.tolist())
     if not np.isfinite(period) or orbit.shape != (system.dimension,):
         return family2, 1
-    periods, duration = max(1, round(period / (system.period or period))), period / returns_per_period(system)
+    periods, duration = max(1, round(period / (system.period or period))), return_duration(system, period)
     whole = periods > 1
     if system.symmetry is not None and not whole:
         back = returned_states(system, orbit[None], section_at(system, orbit, duration=duration))[0]
@@ -301,13 +294,13 @@ class _Unfolding:
         self._slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)  # by the length of ``spot.tangent``
         self._response = _response(spot, target)
 
-    def fold(self, a: float) -> Place | None:
-        """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
+    def fold(self, a: float) -> Place:
+        """Predicted place of a fold at an amplitude along the mode, negative against it; AnalysisError if too far."""
         spot, fifth = self.spot, self.fifth
         away = -2.0 * fifth.coefficient * a * a / self._slope
         aside = fifth.coefficient * a**4 / self.at.times * self._response
         if not (abs(away) <= _FARTHEST and np.abs(aside).max() <= _FARTHEST):
-            return None
+            raise AnalysisError("the fold is predicted too far from the point", field="point")
         place = spot.frame.moved(self._equations.along(spot, away).place, aside)
         bent = self.at.displacements(fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
@@ -331,8 +324,6 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         amplitude = there.fifth.amplitude * 0.5**k
         try:
             place = there.fold(sign * amplitude)
-            if place is None:
-                continue
             found = folds.begin(place, periods * there.spot.image.period)
         except (AnalysisError, ArithmeticError, ValueError) as error:
             cause = error

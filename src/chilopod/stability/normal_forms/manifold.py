@@ -50,7 +50,6 @@ class CriticalOrbit(ReadOnlyArrays):
 
     @property
     def real(self) -> bool:
-        """True for a real multiplier."""
         return self.multiplier.imag == 0.0
 
     @property

@@ -63,7 +63,7 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
         if not abs(lasts - whole) <= _SAME_PERIOD * whole:
             raise ParameterError("must cover one period", field="orbit", value=f"{lasts:g}", allowed=f"{whole:g}")
         first = -float(times[0]) % whole  # time 0, from the first state on
-    duration = lasts / returns_per_period(system)
+    duration = return_duration(system, lasts)
     nodes = (first + np.arange(_OF_GUESS) * duration / _OF_GUESS) % lasts
     return Nodes(CubicSpline(times - times[0], states)(nodes), duration)
 
@@ -125,7 +125,7 @@ def _settled_autonomous(system: Autonomous, x: Array) -> Iterator[Nodes]:
     except AnalysisError:
         return
     if back:
-        yield Nodes(x[None], float(times[back[0]]) / returns_per_period(system))
+        yield Nodes(x[None], return_duration(system, float(times[back[0]])))
 
 
 def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
@@ -146,7 +146,7 @@ def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
                 break
             there = carried(system, states[i - 1][None], 0.0, later)[0]
         if (np.abs(there - x) <= _RETURNS * units).all():
-            yield Nodes(x[None], float(times[i - 1] + later) / returns_per_period(system))
+            yield Nodes(x[None], return_duration(system, float(times[i - 1] + later)))
             return
 
 

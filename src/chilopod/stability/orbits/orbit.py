@@ -22,16 +22,7 @@ from chilopod.flows.carrying import REPEATED, TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability import returns
-from chilopod.stability.interface import (
-    Capabilities,
-    SystemLike,
-    check_system,
-    is_autonomous,
-    is_stiff,
-    offers,
-    returns_per_period,
-    sizes,
-)
+from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
 from chilopod.stability.krylov import LARGE, RESTS, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, own_return, past_impact, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, nodes_along, shot
@@ -160,9 +151,8 @@ def searched_orbit(
     if whole is not None:
         return near_orbit(system, whole, with_error, budget)
     x = finite_array(guess, (system.dimension,), "orbit")
-    duration = returns.return_duration(system) if section is None else section.duration
-    if isinstance(guess, Orbit) and section is None and is_autonomous(system):
-        duration = guess.period / returns_per_period(system)
+    period = guess.period if isinstance(guess, Orbit) and is_autonomous(system) else None
+    duration = returns.return_duration(system, period) if section is None else section.duration
 
     def near(start: Nodes, section: Section | None = None, careful: bool = False) -> Orbit:
         found = near_orbit(system, start, with_error, budget, section, careful)

@@ -266,8 +266,7 @@ class _Equations:
         return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
 
     def _totals(self, off: Array) -> list[Array]:
-        """The node after each, with the residuals ``off``, as a linear function of first state, time, parameter, and 1,
-        shape (n, n+3)."""
+        """The node after each, with the residuals ``off``, by first state, time, parameter, and 1: shape (n, n+3)."""
         rows, n = self._linear.copy(), off.shape[1]
         rows[:, :, -1] = off
         totals = [rows[0]]
