@@ -25,12 +25,8 @@ from chilopod.stability.returns import ReturnMap, section_at
 from chilopod.stability.spectrum import EPSILON, SAFETY, disturbed, eigenvalue_errors, phased
 
 SHRINKS = "the orbit shrinks into an equilibrium"  # reason for the end of a curve of cycles
-
-SHRUNK = 10.0
-"""Motion of a cycle, relative to the largest along its curve, that counts as shrunk, in roots of the precision."""
-
+SHRUNK = 10.0  # motion of a shrunk cycle, relative to the largest along its curve, in roots of the precision
 ROUNDING = 16.0 * EPSILON  # rounding error of a right-hand side, relative to its terms: a few roundings in each
-
 _ROUNDS = 80  # enough for a triple root, where each leaves two thirds
 _HALVINGS = 12  # halvings of a step of Newton's method
 _SETTLED = 1e-9  # step, relative to the sizes of the states, that may stop falling

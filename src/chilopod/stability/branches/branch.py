@@ -43,11 +43,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "switch"]
 
-
 LONGEST = 0.15  # default largest step along a curve, in units of the states' sizes and of the branch's scale
-
 BUDGET = 200_000  # default budget of flows of a branch
-
 _MEETING = 1e-6  # distance of a multiplier from +1 at a special point where branches meet
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _IN_FOLD = "the branch starts in a fold"

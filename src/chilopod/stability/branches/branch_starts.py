@@ -47,12 +47,11 @@ _BOUNDED = 0.03  # such a departure that no longer grows: half of it defines the
 _PARTS = 2.0**-8, 2.0**-4  # fractions of a return
 _DECADES, _HALVINGS = 12, 12  # range and halvings of the search for the logarithm of a size
 
-_LEFT_BY_NONE = {
+_LEFT_BY_NONE = {  # kinds of points without a branch to switch to, with the reason
     Kind.FOLD: "is a fold: `follow` passes it along the same branch",
     Kind.NEIMARK_SACKER: "is a Neimark-Sacker point: a torus leaves it, which cannot be followed",
     Kind.KREIN_COLLISION: "is a Krein collision: no periodic orbits leave it",
 }
-"""Kinds of points without a branch to switch to, with the reason."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,7 @@ from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, distances
 
 CLOSE = 1e-9  # precision of a located point along the curve, relative to the step
-
 SAME_ORBIT = 1e-6  # distance between states of one orbit, relative to the sizes of the states
-
 _FURTHER = 0.1  # factor on the precision of orbits within a step
 _OFF = 1e-5  # error of the cubic, relative to the step, above which an orbit is corrected
 _CORRECTED = 3  # returns to correct the cubic, by the matrix between those of the ends, before the corrector does

@@ -37,7 +37,6 @@ from chilopod.stability.returns import ReturnMap, Section, return_duration, retu
 from chilopod.stability.symmetry.groups import symmetric_states
 
 Family2 = Callable[[float, float], SystemLike]  # ``family2(p, q)`` is the system at values of two parameters
-
 _AT_ZERO = 1e6  # change over the box, relative to the sizes of the states, of an orbit at zero
 _STEP = 1e-6  # step of differences, in units of the frame: it affects only the speed of Newton's method
 _RESOLVED, _LONGEST = 1e-8, 0.1  # least such step of a parameter, relative to its values, and the longest

@@ -44,22 +44,18 @@ _JUMP = 0.5  # the same for values beside it, which are at most 0.2 at a simple 
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
-
-_COSINES = {
+_COSINES = {  # of the angle of the critical multipliers at a resonance
     CodimensionTwo.RESONANCE_1_1: 1.0,
     CodimensionTwo.RESONANCE_1_2: -1.0,
     CodimensionTwo.RESONANCE_1_3: -0.5,
     CodimensionTwo.RESONANCE_1_4: 0.0,
 }
-"""Cosine of the angle of the critical multipliers at a resonance."""
 
 Signal = CodimensionTwo | CircleEvent
 """A test function: of the critical multipliers by the kind of its zeros, of the other ones by their event there."""
 
 Signals = dict[Signal, tuple[float, float]]  # test functions and their errors
-
-Test = Callable[[float], tuple[float, float]]
-"""A test function and its error at a distance along a step; NaN where undefined."""
+Test = Callable[[float], tuple[float, float]]  # a test function and its error along a step; NaN where undefined
 
 _Parts = Parts[Spot, Evaluated, Evaluated]
 

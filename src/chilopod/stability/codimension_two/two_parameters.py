@@ -33,7 +33,6 @@ from chilopod.stability.returns import event_beside, return_duration, returned_s
 from chilopod.stability.symmetry.groups import reverses
 
 BUDGET = 20_000  # default budget of a curve, in return maps with derivatives
-
 _MOVED = 1e-4  # largest correction of the start, relative to the box, and of its orbit, relative to the states
 _MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
 
@@ -167,8 +166,7 @@ def _target(family2: Family2, start: BifurcationPoint, second: float) -> tuple[i
     return target, known
 
 
-_Looked = tuple[Station | None, list[SpecialPoint2]]
-"""The station at the end of a step, if any, and the events within the step."""
+_Looked = tuple[Station | None, list[SpecialPoint2]]  # the station at the end of a step, if any, and its events
 
 
 def _followed(

@@ -23,7 +23,6 @@ from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.returns import ReturnMap
 
 StateMap = Callable[[Array], Array]  # the return map: states, shape (k, n), to their images, shape (k, n)
-
 Powers = tuple[int, int]  # i and j of a monomial z^i conj(z)^j; j = 0 where z is real
 
 ManifoldCurve = Mapping[Powers, ComplexArray]

@@ -154,8 +154,7 @@ _ENOUGH = 3e-8  # relative error that ends the search
 _FULL = 8  # highest visible order above which a larger amplitude would lose accuracy
 _BETTER = 0.3  # factor on the error that justifies a further step
 
-Fit = tuple[NormalFormStatus, Sampled, Term]
-"""Status, FOUND or LINEAR, the map at the best amplitude, and the resonant cubic term of one return."""
+Fit = tuple[NormalFormStatus, Sampled, Term]  # FOUND or LINEAR, the map at the best amplitude, cubic term of a return
 
 
 def _fitted(manifold: Manifold, radius: float) -> Fit | None:
