@@ -246,8 +246,7 @@ def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> H
         _hopf_form(system, other, matrix + off * random.choice([-1.0, 1.0], off.shape), frequency, draws=0).cubic
         for other in disturbed(x, error + 4.0 * EPSILON * np.abs(x))
     ]
-    moved = float(np.abs(np.array(scatter).real - form.cubic.real).max())
-    return replace(form, error=form.error + SAFETY * moved)
+    return replace(form, error=form.error + SAFETY * float(np.abs(np.array(scatter).real - form.cubic.real).max()))
 
 
 def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, draws: int = 2) -> HopfForm:

@@ -180,8 +180,7 @@ def _of_map(
     relative = float(matrices(np.array([crossing.value]))[1][0])
     units = numerical_balance(sample.image.jacobian)
     ratios = units / units[:, None]
-    largest = float(np.abs(sample.image.jacobian * ratios).max())
-    image = replace(sample.image, error=relative * largest / ratios)
+    image = replace(sample.image, error=relative * float(np.abs(sample.image.jacobian * ratios).max()) / ratios)
     values, vectors = np.linalg.eig(image.jacobian)
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
     frequency = abs(float(np.angle(crossing.multiplier))) / duration

@@ -306,16 +306,14 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         self._motion = max(self._motion, motion)
         if float(section.normal @ velocity) > 0.0 and motion >= SHRUNK * np.cbrt(self.precision) * self._motion:
             return
-        said = "the motion nearly stops in the section, and the next step has no direction"
         self.budget.take()
         if has_shrunk(self.system(found.value), found.x, self.sizes, motion, found.image):
-            said = f"{SHRINKS}: a Hopf point"
-        raise AnalysisError(said, field="orbit")
+            raise AnalysisError(f"{SHRINKS}: a Hopf point", field="orbit")
+        raise AnalysisError("the motion nearly stops in the section, and the next step has no direction", field="orbit")
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
         moved = self.moved(anchor.last, self.first.orbit, self.first.value)
-        seen = slice(None) if anchor.section is None else slice(moved.size - 1, None)
-        return moved, self.first.tangent, seen
+        return moved, self.first.tangent, slice(0 if anchor.section is None else moved.size - 1, None)
 
     def is_first(self, step: Step[Anchor, OnCurve]) -> bool:
         """True if a state of the first orbit is on the orbit at the end of a step, for any choice of time 0."""

@@ -259,8 +259,7 @@ class Detector:
         mode = there.spectrum.right[:, nearest]
         if reverses(here.system, mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
-        meets = self.curve.known or self.curve.meets(spot)
-        return together(self._kind, Kind.BRANCH_POINT if meets else Kind.FOLD)
+        return together(self._kind, Kind.BRANCH_POINT if self.curve.known or self.curve.meets(spot) else Kind.FOLD)
 
 
 def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.nan, np.nan)) -> Point2:

@@ -124,8 +124,7 @@ def follow2(
         before, begin, whence = list[Point2](), Ending.CLOSED if last is Ending.CLOSED else Ending.START, ""
         if begin is Ending.START and outward is None and rising is None:
             before, begin, whence = _followed(detector, origin._replace(spot=first.towards(-sign)), *wanted)
-    found = *reversed(before), origin.point, *after
-    return Curve2(start.kind, found, (begin, last), (whence, why), periods)
+    return Curve2(start.kind, (*reversed(before), origin.point, *after), (begin, last), (whence, why), periods)
 
 
 def _over_periods(family2: Family2, periods: int) -> Family2:

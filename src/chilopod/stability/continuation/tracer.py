@@ -213,5 +213,4 @@ def _closed(equations: Equations[A, S, R], step: Step[A, S]) -> Step[A, S] | Non
     except ChilopodError:
         return None
     near = float(np.abs(part.moved - first)[seen].max()) <= tolerances.SAME * step.size
-    same = near and float(part.tangent[seen] @ ahead[seen]) > 0.0 and equations.is_first(part)
-    return part if same else None
+    return part if near and float(part.tangent[seen] @ ahead[seen]) > 0.0 and equations.is_first(part) else None

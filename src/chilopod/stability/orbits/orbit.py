@@ -164,8 +164,7 @@ def searched_orbit(
         found = near(Nodes(x[None], duration), section)
     except TooManySteps as error:
         allowed = ", ".join(filter(None, ("a guess closer to the orbit and its period", error.allowed)))
-        said = f"the motion from the guess {error.problem}"
-        raise TooManySteps(said, field="orbit", allowed=allowed) from error
+        raise TooManySteps(f"the motion from the guess {error.problem}", field="orbit", allowed=allowed) from error
     except AnalysisError as failed:
         if not settle:
             raise
@@ -243,8 +242,7 @@ def closings(system: SystemLike, x: Array, duration: float, size: Array, most: i
     # Over several rounds a sixteenth of the time may be half a round, where a state is zero again.
     size = np.maximum(size, np.abs(states).max(axis=0))
     near = _CLOSES * min(1.0, _relative(returns.velocity_at(system, x) * duration, size))
-    away = (np.abs(returns.turned(system, np.array(states[1:])) - x) / size).max(axis=1)
-    closed = counts[away <= near]
+    closed = counts[(np.abs(returns.turned(system, np.array(states[1:])) - x) / size).max(axis=1) <= near]
     return int(closed[0]) if closed.size else 1
 
 

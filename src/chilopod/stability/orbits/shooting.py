@@ -296,8 +296,7 @@ class _Equations:
         matrix, right = last[:, :n] * sizes / sizes[:, None], -last[:, n + 2] / sizes
         matrix.flat[:: n + 1] -= 1.0
         if free is not None:
-            by_value = last[:, n + 1] * free.scale / sizes
-            matrix = np.block([[matrix, by_value[:, None]], [free.row[None]]])
+            matrix = np.block([[matrix, (last[:, n + 1] * free.scale / sizes)[:, None]], [free.row[None]]])
             right = np.append(right, -other._missing)
         move = _solution(matrix, right, cutoff, self._problem.shared, sizes)
         every = np.zeros(n + 3)
