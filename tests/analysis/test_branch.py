@@ -144,6 +144,7 @@ def test_the_direction_confirms_the_verdict(right):
 
 def test_orbits_and_multipliers_are_as_good_as_is_said(right):
     curve = Curve(lambda value: PlanarModel(ROBOT.with_value(K1, value), tolerance=1e-14), right.attrs["scale"])
+    curve.sizes = np.ones(right.isel(point=0).orbit.size)
     for index in (3, 8, 12, -1):
         at = right.isel(point=index)
         multipliers = at.multiplier_real.values + 1j * at.multiplier_imag.values

@@ -24,15 +24,9 @@ from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.returns import ReturnMap, section_at
 from chilopod.stability.spectrum import EPSILON, SAFETY, disturbed, eigenvalue_errors, phased
 
-SHRINKS = "the orbit shrinks into an equilibrium"
-"""Reason for the end of a curve of cycles."""
-
-SHRUNK = 10.0
-"""Motion of a cycle, relative to the largest along its curve, that counts as shrunk, in roots of the precision."""
-
-ROUNDING = 16.0 * EPSILON
-"""Rounding error of a right-hand side, relative to its terms: a few roundings in each."""
-
+SHRINKS = "the orbit shrinks into an equilibrium"  # reason for the end of a curve of cycles
+SHRUNK = 10.0  # motion of a shrunk cycle, relative to the largest along its curve, in roots of the precision
+ROUNDING = 16.0 * EPSILON  # rounding error of a right-hand side, relative to its terms: a few roundings in each
 _ROUNDS = 80  # enough for a triple root, where each leaves two thirds
 _HALVINGS = 12  # halvings of a step of Newton's method
 _SETTLED = 1e-9  # step, relative to the sizes of the states, that may stop falling
@@ -200,8 +194,7 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
     size = getattr(system, "scale", None)
     if size is None:
         size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
-    curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
-    found, wrong = _expanded(system, curves)
+    found, wrong = _expanded(system, np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1))
     with np.errstate(all="ignore"):
         velocity, matrix = found[0, 0], found[:, 1].T / size
     if not (np.isfinite(velocity).all() and np.isfinite(matrix).all()):
@@ -253,8 +246,7 @@ def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> H
         _hopf_form(system, other, matrix + off * random.choice([-1.0, 1.0], off.shape), frequency, draws=0).cubic
         for other in disturbed(x, error + 4.0 * EPSILON * np.abs(x))
     ]
-    moved = float(np.abs(np.array(scatter).real - form.cubic.real).max())
-    return replace(form, error=form.error + SAFETY * moved)
+    return replace(form, error=form.error + SAFETY * float(np.abs(np.array(scatter).real - form.cubic.real).max()))
 
 
 def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, draws: int = 2) -> HopfForm:

@@ -45,7 +45,7 @@ _KEPT = 64  # cached systems
 _WIDE, _SHORTER = 3.7, 0.25  # ratio of the ends of a piece, on no round number, and factor on its width after a failure
 _NARROWEST = 1e-6  # width, relative to the interval, below which a piece is not made shorter
 _LEAST = 50  # least budget of a piece
-_WORDS = (
+_WORDS = (  # for orbits and multipliers, and for equilibria and eigenvalues in their place
     ("a multiplier is +1", "an eigenvalue is 0"),
     ("a multiplier", "an eigenvalue"),
     ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
@@ -57,7 +57,6 @@ _WORDS = (
     ("orbits", "equilibria"),
     ("orbit", "equilibrium"),
 )
-"""Words for equilibria and eigenvalues in place of those for orbits and multipliers."""
 
 
 def locate_hopf(
@@ -182,8 +181,7 @@ def _of_map(
     relative = float(matrices(np.array([crossing.value]))[1][0])
     units = numerical_balance(sample.image.jacobian)
     ratios = units / units[:, None]
-    largest = float(np.abs(sample.image.jacobian * ratios).max())
-    image = replace(sample.image, error=relative * largest / ratios)
+    image = replace(sample.image, error=relative * float(np.abs(sample.image.jacobian * ratios).max()) / ratios)
     values, vectors = np.linalg.eig(image.jacobian)
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
     frequency = abs(float(np.angle(crossing.multiplier))) / duration

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
 from chilopod.stability.crossing_place import critical_multipliers
 from chilopod.stability.interface import SystemLike, checked_flow, is_autonomous, sizes
-from chilopod.stability.normal_forms.manifold import CriticalOrbit
+from chilopod.stability.normal_forms.manifold import CriticalOrbit, StateMap
 from chilopod.stability.normal_forms.normal_form import NormalForm, NormalFormStatus, normal_form
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.returns import returned_states, velocity_at
@@ -237,10 +236,9 @@ def described(
         if kind is Kind.TRANSCRITICAL and modes is not None and symmetry is not None:
             kind, symmetry = _by_quadratic_term(system, orbit, modes, symmetry)
     verdict = Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED
-    about: dict[str, Any] = {"period": orbit.period, "multiplicity": critical.size, "modes": modes}
-    about |= {"symmetry": symmetry, "criticality": verdict}
     error_bound += 4.0 * EPSILON * abs(value)
-    point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, **about)
+    point = BifurcationPoint(kind, value, error_bound, orbit.state, mode, nu, frequency, verdict, period=orbit.period)
+    point = replace(point, multiplicity=critical.size, modes=modes, symmetry=symmetry)
     return _with_coefficients(point, form) if form is not None and with_normal_form else point
 
 
@@ -259,8 +257,7 @@ def _with_coefficients(point: BifurcationPoint, form: NormalForm) -> Bifurcation
 def _critical(
     system: SystemLike, orbit: Orbit, spec: Spectrum, index: int, event: CircleEvent
 ) -> tuple[complex, ComplexArray, ComplexArray, float]:
-    """A critical multiplier, its right and left eigenvectors, and the frequency of the mode; those of positive
-    frequency of a conjugate pair."""
+    """A critical multiplier, of a pair that of positive frequency, right and left eigenvectors, and that frequency."""
     nu, mode, left = complex(spec.values[index]), spec.right[:, index], spec.left[:, index]
     peak = mode[np.abs(mode).argmax()]
     scale = np.abs(peak) / peak / mean_size(system, orbit.state, orbit.image.duration, mode)
@@ -330,10 +327,13 @@ def _formed(
     bounded = replace(image, error=np.nan_to_num(image.error, nan=0.0, posinf=0.0))
     scale = sizes(system, orbit.state, image.duration)
     mapped = partial(returned_states, system, section=orbit.section)
-    try:
-        return normal_form(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale=scale)
-    except (AnalysisError, SpentError, ValueError):
-        return None
+    return _computed(mapped, CriticalOrbit(orbit.state, bounded, exact, mode, left), scale)
+
+
+def _computed(mapped: StateMap, at: CriticalOrbit, scale: Array | float = 1.0) -> NormalForm | None:
+    with contextlib.suppress(AnalysisError, SpentError, ValueError):
+        return normal_form(mapped, at, scale=scale)
+    return None
 
 
 def _by_quadratic_term(
@@ -368,10 +368,7 @@ def _along_axis(system: SystemLike, orbit: Orbit, mode: Array) -> Kind:
         moved = returned_states(system, x + size * ((states - start) @ basis.T), orbit.section)
         return np.asarray(start + ((moved - x) / size) @ basis)
 
-    try:
-        return kind_at_plus_one(normal_form(mapped, CriticalOrbit(start, within, 1.0 + 0.0j, right, left)))
-    except (AnalysisError, SpentError, ValueError):
-        return Kind.BRANCH_POINT
+    return kind_at_plus_one(_computed(mapped, CriticalOrbit(start, within, 1.0 + 0.0j, right, left)))
 
 
 def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: SymmetricCrossing | None) -> Kind:
@@ -384,7 +381,7 @@ def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: Sym
     if broken is not None:
         return Kind.PITCHFORK if broken.quadratic == 0 else Kind.TRANSCRITICAL
     # The orbit exists on both sides, so it does not end in a fold here.
-    return kind_at_plus_one(form) if form is not None else Kind.BRANCH_POINT
+    return kind_at_plus_one(form)
 
 
 def _modes(
@@ -413,10 +410,10 @@ def _have_own_modes(jacobian: Array, crossing: Crossing, block: Block | None) ->
     return int((stretches <= _CRITICAL * max(1.0, stretches[0])).sum()) >= max(there, 2)
 
 
-def kind_at_plus_one(form: NormalForm) -> Kind:
+def kind_at_plus_one(form: NormalForm | None) -> Kind:
     """Kind at a real multiplier +1 if the orbit continues: transcritical with a significant quadratic term, pitchfork
     without one but with a cubic one, branch point if the errors leave that open."""
-    if form.status is not NormalFormStatus.FOUND:
+    if form is None or form.status is not NormalFormStatus.FOUND:
         return Kind.BRANCH_POINT
     if abs(form.quadratic) > _CLEAR * form.quadratic_error:
         return Kind.TRANSCRITICAL

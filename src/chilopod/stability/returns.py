@@ -162,8 +162,10 @@ def section_at(
     return Section(x, normal / float(np.linalg.norm(normal * scale)), duration)
 
 
-def return_duration(system: SystemLike) -> float:
-    """Duration of a return; approximate if the period belongs to the orbit."""
+def return_duration(system: SystemLike, period: float | None = None) -> float:
+    """Duration of a return in a full period; by default in that of the system, or its guess."""
+    if period is not None:
+        return period / returns_per_period(system)
     whole = system.guess_period if is_autonomous(system) else system.period
     if whole is None:
         allowed = "a duration, or a velocity and a guess of the period"

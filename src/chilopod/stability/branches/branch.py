@@ -24,21 +24,13 @@ from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
 from chilopod.notebook import picture
-from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchPoint, OnCurve
-from chilopod.stability.branches.branch_starts import (
-    IN_FOLD,
-    Start,
-    anchored,
-    begin,
-    branch_sizes,
-    check_symmetric,
-    switch,
-)
+from chilopod.stability.branches.branch_points import IN_FOLD, PRECISION, Anchor, BranchPoint, OnCurve
+from chilopod.stability.branches.branch_starts import Start, anchored, begin, branch_sizes, check_symmetric, switch
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, by_energy, inspect
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, outward, trace
-from chilopod.stability.interface import Family, SystemLike, offers, returns_per_period, sizes, with_shared_symmetries
+from chilopod.stability.interface import Family, SystemLike, offers, sizes, with_shared_symmetries
 from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import EVENT_AT_ZERO, MOVED, event_beside, return_duration, starts
@@ -51,13 +43,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "switch"]
 
-
-LONGEST = 0.15
-"""Default largest step along a curve, in units of the states' sizes and of the branch's scale."""
-
-BUDGET = 200_000
-"""Default budget of flows of a branch."""
-
+LONGEST = 0.15  # default largest step along a curve, in units of the states' sizes and of the branch's scale
+BUDGET = 200_000  # default budget of flows of a branch
 _MEETING = 1e-6  # distance of a multiplier from +1 at a special point where branches meet
 _STYLES = {True: "-", False: "--", None: ":"}  # line styles by stability
 _IN_FOLD = "the branch starts in a fold"
@@ -122,21 +109,15 @@ class Branch(Result):
         return found or [(self.points[0].stable, 0, 0)]
 
     def _lines(self) -> list[str]:
-        values = [point.value for point in self.points]
-        head = f"Branch: {len(values)} points between {min(values):.9g} and {max(values):.9g}, periods: {self.periods}"
-        special = [
-            each.bifurcation.row if each.bifurcation else (each.special.label, f"{each.value:.12g}", "")
-            for each in self.points
-            if each.special is not None
-        ]
+        values, named = [point.value for point in self.points], [(p, p.special.label) for p in self.points if p.special]
+        head, tail = f"Branch: {len(values)} points", f", periods: {self.periods}"
+        special = [p.bifurcation.row if p.bifurcation else (label, f"{p.value:.12g}", "") for p, label in named]
         if by_energy(values, self.scale):
-            special = [(each.special.label, f"{each.period:.9g}", "") for each in self.special_points if each.special]
+            head, tail = f"Branch by energy: {len(values)} orbits with periods", ""
+            special = [(label, f"{p.period:.9g}", "") for p, label in named]
             values = [float(point.period or 0.0) for point in self.points]
-            head = (
-                f"Branch by energy: {len(values)} orbits with periods between {min(values):.9g} and {max(values):.9g}"
-            )
         return [
-            head,
+            f"{head} between {min(values):.9g} and {max(values):.9g}{tail}",
             f"ends: {self.ending.sentence}{f' ({self.reason})' if self.reason else ''}",
             *(["special points:", *rows(special)] if special else ["special points: none"]),
             "stability along it:",
@@ -335,7 +316,8 @@ def followed(
         beside = None
         if ending is Ending.LOST:
             system = curve.system(last.value)
-            reason = event_beside(system, last.orbit, _duration(system, last), partial(_ahead, curve, last)) or reason
+            duration = return_duration(system, last.period)
+            reason = event_beside(system, last.orbit, duration, partial(_ahead, curve, last)) or reason
             beside = _elsewhere(curve, last) if reason == EVENT_AT_ZERO and done > before else None
         if beside is None:
             break
@@ -351,23 +333,21 @@ def _outgrown(curve: Curve, points: list[BranchPoint]) -> bool:
     """True if the orbit has changed by many of its units since these were determined, unless the system gives them."""
     end = points[-1]
     first = next(point for point in points if np.array_equal(point.units, end.units))
-    if offers(curve.system(end.value), "scale"):
-        return False
-    return bool((np.abs(end.orbit - first.orbit) > _OUTGROWN * end.units[:-1]).any())
+    grown = np.abs(end.orbit - first.orbit) > _OUTGROWN * end.units[:-1]
+    return bool(grown.any()) and not offers(curve.system(end.value), "scale")
 
 
 def _renewed(curve: Curve, last: BranchPoint) -> Anchor:
     """The anchor at a point, in units determined there; no state's unit exceeds its motion."""
     system = curve.system(last.value)
-    motion = sizes(system, last.orbit, _duration(system, last))
+    motion = sizes(system, last.orbit, return_duration(system, last.period))
     curve.sizes = np.minimum(branch_sizes(curve, last), np.maximum(motion, last.units[:-1]))
     curve.first = _in_units(curve.first, curve.units)
     return curve.anchor(_in_units(last, curve.units))
 
 
 def _unpaired_folds(points: list[BranchPoint]) -> list[str]:
-    """Sentences for folds across which an even number of multipliers passes 1: at a fold one passes, so another
-    event is too near to be told apart."""
+    """Sentences for folds across which an even number of multipliers passes 1, and not the one of a fold alone."""
     remarks = []
     for before, fold, after in zip(points, points[1:], points[2:], strict=False):
         beyond = []
@@ -390,14 +370,10 @@ def _elsewhere(curve: Curve, last: BranchPoint) -> Anchor | None:
     """The anchor at another state of the orbit of a point; None if time 0 is fixed, or no state suits."""
     system = curve.system(last.value)
     with contextlib.suppress(ChilopodError):
-        for x in starts(system, last.orbit, _duration(system, last)):
+        for x in starts(system, last.orbit, return_duration(system, last.period)):
             rising = bool(last.tangent[-1] > 0.0)
             return anchored(curve, Start(last.value, x, rising, periods=curve.periods, period=last.period), 0.0)
     return None
-
-
-def _duration(system: SystemLike, point: BranchPoint) -> float:
-    return return_duration(system) if point.period is None else point.period / returns_per_period(system)
 
 
 def _passed(values: list[float]) -> str:

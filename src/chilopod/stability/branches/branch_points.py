@@ -12,10 +12,11 @@ import numpy as np
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.stability import returns
 from chilopod.stability.continuation.equations import Before
-from chilopod.stability.interface import Family, SystemLike, returns_per_period, system_of
+from chilopod.stability.interface import Family, SystemLike, system_of
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
+from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.spectrum import stable_within
 from chilopod.stability.symmetry.groups import symmetric_basis
 
@@ -75,12 +76,10 @@ class Anchor(ReadOnlyArrays):
 
     @property
     def tangent(self) -> Array:
-        """Unit tangent."""
         return self.last.tangent
 
     @property
     def values(self) -> Array:
-        """Value of the parameter, shape (1,)."""
         return np.array([self.last.value])
 
 
@@ -145,9 +144,8 @@ def null_vector(bordered: Array) -> Array:
     return tangent / np.linalg.norm(tangent)
 
 
-PRECISION = 1e-12
-"""Default precision of orbits, relative to the sizes of the states; the accuracy of the flow limits it."""
-
+PRECISION = 1e-12  # default precision of orbits, relative to the sizes of the states; the flow's accuracy limits it
+IN_FOLD = 1e-6  # component of a unit tangent along the parameter, within the start's error, of a start in a fold
 _PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
 _STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink
 _KEPT = 8  # cached systems: making one may cost more than a flow
@@ -159,13 +157,13 @@ class FamilyReturns:
 
     family: Family
     scale: float  # scale of the parameter
-    sizes: Array | None = None  # sizes of the states; None: their own units
     _: KW_ONLY
     between: tuple[float, float] = (-np.inf, np.inf)  # interval of the values at which the family is called
     periods: int = 1  # number of the systems' periods in one period of the orbits
     symmetric: bool = False  # True for orbits with the systems' symmetry in time
     precision: float = PRECISION  # precision of orbits, relative to the sizes of the states
     budget: Budget = field(default_factory=lambda: Budget(math.inf))
+    sizes: Array = field(init=False)  # sizes of the states, shape (n,), set at the first point
     steepness: float = field(default=1.0, init=False)  # of the return map over the parameter, in units
     _dimension: int = field(default=0, init=False)
 
@@ -181,34 +179,27 @@ class FamilyReturns:
             allowed = f"{self._dimension} states"
             raise AnalysisError("changes its dimension", field="family", value=value, allowed=allowed)
         studied = self.symmetric or (own.symmetry is None and self.periods == 1)
-        return own if studied else whole_period(own, self.periods)
-
-    @property
-    def state_units(self) -> Array:
-        """Units of the states, shape (n,): their sizes, or one before these are known."""
-        return np.ones(self._dimension) if self.sizes is None else self.sizes
+        return own if studied else returns.whole_period(own, self.periods)
 
     @property
     def units(self) -> Array:
-        """Units of the states and scale of the parameter, shape (n+1,)."""
-        return np.append(self.state_units, self.scale)
+        """Sizes of the states and scale of the parameter, shape (n+1,)."""
+        return np.append(self.sizes, self.scale)
 
     def image(self, x: Array, value: float, section: Section | None = None, with_error: bool = False) -> ReturnMap:
-        """The return map and its derivative."""
         system = self.system(value)
         self.budget.take()
-        return return_map(system, x, with_error, section)
+        return returns.return_map(system, x, with_error, section)
 
     def section_at(self, x: Array, value: float, period: float | None) -> Section | None:
         """Section across the motion at a state, if returns need one; by default the system guesses the full period."""
         system = self.system(value)
-        duration = None if period is None else period / returns_per_period(system)
-        return section_at(system, x, self.sizes, duration)
+        return returns.section_at(system, x, self.sizes, returns.return_duration(system, period))
 
     def mapped(self, x: Array, value: float, section: Section | None) -> Array:
         """H at a state."""
         self.budget.take()
-        return np.asarray(returned_states(self.system(value), x[None], section)[0])
+        return np.asarray(returns.returned_states(self.system(value), x[None], section)[0])
 
     def by_parameter(self, x: Array, value: float, section: Section | None, mapped: Array | None = None) -> Array:
         """dH/dp at a state, per scale, shape (n,), from H there if it is known. The parabola through a third value is
@@ -226,7 +217,7 @@ class FamilyReturns:
                 steepness *= 100.0
                 continue
             difference: Array = (beside - mapped) / (step / self.scale)
-            found = float(np.abs(difference / self.state_units).max())
+            found = float(np.abs(difference / self.sizes).max())
             # A return that magnifies needs a smaller step of the parameter.
             if last or not 2.0 * max(_STEEP, steepness) < found < np.inf:
                 break

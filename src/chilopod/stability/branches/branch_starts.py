@@ -19,7 +19,7 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows.arguments import UserCode, check_arguments, finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, symmetric_space, within_space
+from chilopod.stability.branches.branch_points import IN_FOLD, Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.interface import (
@@ -36,9 +36,6 @@ from chilopod.stability.orbits.orbit import Orbit, known_state, past_event, sear
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import Section, carried, return_duration, returned_states, whole_period
 
-IN_FOLD = 1e-6
-"""Component of a unit tangent along the parameter below which a curve starts in a fold, within the start's error."""
-
 _CLOSES = 1e-6  # distance, relative to the sizes, at which an orbit closes
 _CLOSING = "a point of a branch, or a system with its `spatial_symmetry`"
 _ROUNDING = 1e-9  # size of a state, relative to that along the old branch, that is rounding
@@ -50,12 +47,11 @@ _BOUNDED = 0.03  # such a departure that no longer grows: half of it defines the
 _PARTS = 2.0**-8, 2.0**-4  # fractions of a return
 _DECADES, _HALVINGS = 12, 12  # range and halvings of the search for the logarithm of a size
 
-_LEFT_BY_NONE = {
+_LEFT_BY_NONE = {  # kinds of points without a branch to switch to, with the reason
     Kind.FOLD: "is a fold: `follow` passes it along the same branch",
     Kind.NEIMARK_SACKER: "is a Neimark-Sacker point: a torus leaves it, which cannot be followed",
     Kind.KREIN_COLLISION: "is a Krein collision: no periodic orbits leave it",
 }
-"""Kinds of points without a branch to switch to, with the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +132,7 @@ def begin(
             _check_moving(system, guess)
             raise
         _check_periods(studied, found, periods)
-    period = found.period if is_autonomous(system) else None
-    return Start(value, found.state, rising, periods=periods, period=period)
+    return Start(value, found.state, rising, periods=periods, period=found.period if is_autonomous(system) else None)
 
 
 def check_symmetric(system: SystemLike, symmetric: bool) -> None:
@@ -203,8 +198,7 @@ def switch(
             raise ParameterError("must be a special point", field="point", value=point.value)
         # At the start of a branch of doubled period the point belongs to the orbits that it leaves.
         halved = point.period is not None and point.bifurcation.period < 0.75 * point.period
-        old, known = point.tangent * point.units, point.periods // (2 if halved else 1)
-        along = point.units[:-1]
+        old, known, along = point.tangent * point.units, point.periods // (2 if halved else 1), point.units[:-1]
         point = point.bifurcation
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("must be a located point", field="point", value=point, allowed="a point from `locate`")
@@ -253,7 +247,7 @@ def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
     if given is not None:
         return given
     period, old = start.period, start.sizes if isinstance(start, Start) else start.units[:-1]
-    base = sizes(system, x, return_duration(system) if period is None else period / returns_per_period(system))
+    base = sizes(system, x, return_duration(system, period))
     if old is not None and (base < _ROUNDING * old).any():  # a state that rests at zero is rounding there
         base = old
     found = _linear_within(curve, x, value, base, period)
@@ -371,8 +365,7 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
 
     def residual(z: Array) -> float:
         x, value = start.orbit + units[:n] * z[:n], start.value + curve.scale * float(z[n])
-        mapped = returned_states(curve.system(value), x[None], section)[0]
-        return float(w @ ((mapped - x) / units[:n]))
+        return float(w @ ((returned_states(curve.system(value), x[None], section)[0] - x) / units[:n]))
 
     here = residual(np.zeros(n + 1))
 
@@ -391,8 +384,7 @@ def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -
     old = _old_tangent(curve, start, units)
     other = min(found, key=lambda each: abs(float(each @ old)))
     assert start.mode is not None
-    along = float(other[:-1] @ (start.mode / units[:-1]))
-    return other if along >= 0.0 else -other
+    return other if float(other[:-1] @ (start.mode / units[:-1])) >= 0.0 else -other
 
 
 def _old_tangent(curve: Curve, start: Start, units: Array) -> Array:

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray
+from chilopod.stability import returns
 from chilopod.stability.branches.branch_points import (
     Anchor,
     BranchPoint,
@@ -35,16 +35,7 @@ from chilopod.stability.floquet import full_period
 from chilopod.stability.interface import is_autonomous, offers
 from chilopod.stability.orbits.orbit import rounds_in
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
-from chilopod.stability.returns import (
-    ReturnMap,
-    Section,
-    in_parts,
-    on_section,
-    return_duration,
-    scatter,
-    section_at,
-    velocity_at,
-)
+from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.spectrum import return_multipliers, spectrum
 
 _CLEAR = 10.0  # factor on the difference of two computations for a residual that may be the flow's error
@@ -67,10 +58,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
-        sizes = self.state_units
         with np.errstate(over="ignore"):
-            scaled = jacobian * sizes / sizes[:, None] - np.eye(len(jacobian))
-        return np.block([[scaled, (derivative / sizes)[:, None]], [tangent[None]]])
+            scaled = jacobian * self.sizes / self.sizes[:, None] - np.eye(len(jacobian))
+        return np.block([[scaled, (derivative / self.sizes)[:, None]], [tangent[None]]])
 
     def matrix_at(
         self, x: Array, value: float, section: Section | None, row: Array, bounded: bool, mapped: Array | None = None
@@ -89,10 +79,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return start.orbit + total[:-1], start.value + float(total[-1])
 
     def anchor(self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0) -> Anchor:
-        """The anchor of a point; at a branch point its matrix is computed ``ahead`` by a distance along the tangent, or
-        by less where there is none."""
+        """The anchor of a point; at a branch point its matrix is computed ``ahead`` along the tangent, or less far."""
         section = self.section_at(last.orbit, last.value, last.period)
-        x = last.orbit + ahead * last.tangent[:-1] * self.state_units
+        x = last.orbit + ahead * last.tangent[:-1] * self.sizes
         try:
             # With errors, to be equal to the end of a step, to the bit.
             matrix = self.matrix_at(x, last.value, section, last.tangent, True)[1]
@@ -100,18 +89,18 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             if ahead <= SHORTEST:
                 raise
             return self.anchor(last, before, RETRY * ahead)
+        earlier = None
         # The matrix of a branch point was computed ahead, so it gives no prediction.
-        if before is None or before.special is not None:
-            return self.anchored(last, matrix, section, None, ahead > 0.0)
-        matrix_before = self.matrix_at(before.orbit, before.value, section, before.tangent, True)[1]
-        return self.anchored(last, matrix, section, Anchor(before, matrix_before))
+        if before is not None and before.special is None:
+            earlier = Anchor(before, self.matrix_at(before.orbit, before.value, section, before.tangent, True)[1])
+        return self.anchored(last, matrix, section, earlier, ahead > 0.0)
 
     def anchored(
         self, last: BranchPoint, matrix: Array, section: Section | None, before: Anchor | None, leaving: bool = False
     ) -> Anchor:
         """The anchor of a point with its matrix, after the previous point with its matrix."""
         system, mode = self.system(last.value), last.tangent[:-1] if leaving else None
-        space = symmetric_space(system, last.orbit, self.state_units, mode)
+        space = symmetric_space(system, last.orbit, self.sizes, mode)
         if before is None:
             return Anchor(last, matrix, None, section, space, leaving)
         earlier, tangent, lengthening = before.last, np.array(before.tangent), 0.0
@@ -120,7 +109,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             assert last.period is not None
             assert earlier.period is not None
             lengthening = (last.period - earlier.period) / last.period / float(np.linalg.norm(back))
-            along = self._projection(velocity_at(system, section.point), section)
+            along = self._projection(returns.velocity_at(system, section.point), section)
             back[:-1], tangent[:-1] = along @ back[:-1], along @ tangent[:-1]
         return Anchor(last, matrix, Before(back, tangent, before.matrix), section, space, leaving, lengthening)
 
@@ -129,7 +118,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return slice(n, n + 1), np.array([self.scale])
 
     def residual(self, anchor: Anchor, moved: Array, values: Array) -> tuple[Returned, Array]:
-        sizes, space, value = self.state_units, anchor.space, float(values[0])
+        sizes, space, value = self.sizes, anchor.space, float(values[0])
         x = anchor.last.orbit + sizes * moved[:-1]
         if space is not None:
             x = sizes * (space @ (x / sizes))
@@ -154,20 +143,18 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def noise(self, x: Array, value: float, section: Section | None) -> Array:
         """Parts of a residual, shape (n,), in units, due to the error of a return: the difference of two computations,
         or the scatter of neighbouring returns, as a map has no parts."""
-        image, system, sizes = self.image(x, value, section), self.system(value), self.state_units
-        off = np.abs(in_parts(system, x, image.duration) - image.state)
-        return np.asarray((off if off.any() else scatter(system, image, x, sizes, section)) / sizes)
+        image, system, sizes = self.image(x, value, section), self.system(value), self.sizes
+        off = np.abs(returns.in_parts(system, x, image.duration) - image.state)
+        return np.asarray((off if off.any() else returns.scatter(system, image, x, sizes, section)) / sizes)
 
     def size(self, step: Step[Anchor, OnCurve]) -> float:
-        x = step.found.x
-        return float(np.linalg.norm(x / self.state_units))
+        return float(np.linalg.norm(step.found.x / self.sizes))
 
     def stretches(self, step: Step[Anchor, OnCurve]) -> bool:
         """True unless short steps are wanted, or the system gives the sizes of its states."""
         return self.long_steps and not offers(self.system(step.found.value), "scale")
 
     def exact(self, anchor: Anchor, found: Returned, row: Array) -> Array | None:
-        """The matrix at an orbit near a branch point."""
         if not anchor.leaving:
             return None
         matrix = self.matrix_at(found.x, found.value, anchor.section, row, False, found.mapped)[1]
@@ -183,7 +170,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         x, value, image, _ = step.found
         # The end of an orbit of two rounds may be a special point, but no ordinary one.
         suspect = bounded or image.duration > _LONGER * expected
-        if suspect and (rounds := rounds_in(self.system(value), x, image.duration, self.state_units, expected)) > 1:
+        if suspect and (rounds := rounds_in(self.system(value), x, image.duration, self.sizes, expected)) > 1:
             again = self._step(anchor, image.duration / rounds, Guess(step.moved, guess.matrix), plane, bounded)
             return replace(again, missed=step.missed)
         return step
@@ -239,7 +226,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         system, units, shared = self.system(last.value), self.units, None
         if space is not None:
             shared = units[:-1, None] * np.linalg.eigh(space)[1][:, -round(float(np.trace(space))) :]
-        duration = return_duration(system) if section is None else section.duration
+        duration = returns.return_duration(system) if section is None else section.duration
         start = np.append(last.orbit, last.value)
         self.budget.take(2 * FEW_ROUNDS)  # each in parts
         nodes = nodes_along(system, last.orbit, duration, count, last.value)
@@ -250,7 +237,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         found = shot(problem, nodes, units[:-1], section)
         x, value = found.nodes.states[0], self._inside(found.nodes.value) if plane.edge is None else plane.edge[1]
         system = self.system(value)
-        image = on_section(system, section, x, found.jacobian, found.nodes.duration)
+        image = returns.on_section(system, section, x, found.jacobian, found.nodes.duration)
         matrix = self.matrix(image.jacobian, image.across @ found.by_value * self.scale, last.tangent)
         return (np.append(x, value) - start) / units, x, value, image, matrix
 
@@ -265,13 +252,12 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         self, anchor: Anchor, x: Array, image: ReturnMap, moved: Array, matrix: Array, off: Array, weakest: Array
     ) -> float:
         """Error of the derivative due to that of the orbit: ``off``, and ``weakest`` times the error of the flow."""
-        n = x.size
+        n, sizes = x.size, self.sizes
         # Units may be much larger than the orbit.
-        reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.state_units)))
+        reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / sizes)))
         length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(matrix[:n, :n] - anchor.matrix[:n, :n])) / length
         # The flow's error relative to its magnification is a bound already.
-        sizes = self.state_units
         error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
         flow = float(error.max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
         wrong = off + weakest * flow * max(1.0, self._relative_size(x))
@@ -280,17 +266,15 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         return float(np.array([bend, by_parameter]) @ wrong)
 
     def _bend_by_parameter(self, anchor: Anchor, x: Array, image: ReturnMap, moved: float) -> float:
-        """Change of the return map's derivative with the parameter, in units, for a step that does not change the
-        parameter by more than its error: the change along the curve does not show it."""
-        section = anchor.section and replace(anchor.section, duration=image.duration)
-        step = max(_BESIDE, 8.0 * float(np.spacing(abs(anchor.last.value))) / self.scale)
-        step = step if anchor.last.value + (moved + step) * self.scale <= self.between[1] else -step
+        """Change of the return map's derivative with the parameter, in units, where that along the curve hides it."""
+        section, value = anchor.section and replace(anchor.section, duration=image.duration), anchor.last.value
+        step = max(_BESIDE, 8.0 * float(np.spacing(abs(value))) / self.scale)
+        step = step if value + (moved + step) * self.scale <= self.between[1] else -step
         try:
-            beside = self.image(x, anchor.last.value + (moved + step) * self.scale, section)
+            beside = self.image(x, value + (moved + step) * self.scale, section)
         except AnalysisError:
             return np.inf
-        sizes = self.state_units
-        change = (beside.jacobian - image.jacobian) * sizes / sizes[:, None]
+        change = (beside.jacobian - image.jacobian) * self.sizes / self.sizes[:, None]
         return float(np.linalg.norm(change)) / abs(step)
 
     def arrived(self, step: Step[Anchor, OnCurve]) -> Step[Anchor, OnCurve]:
@@ -298,9 +282,9 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
         tangent, matrix, system = step.tangent, step.matrix, self.system(value)
-        section = section_at(system, x, self.sizes, image.duration)
+        section = returns.section_at(system, x, self.sizes, image.duration)
         if section is not None and anchor.section is not None and is_autonomous(system):
-            velocity = velocity_at(system, x)
+            velocity = returns.velocity_at(system, x)
             self._check_moving(anchor.section, velocity, step.found)
             along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
@@ -310,8 +294,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             # H - x on the new section: it maps the direction of the motion to zero.
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
-        about: dict[str, Any] = {"period": image.period, "error_bound": bound, "periods": self.periods}
-        point = BranchPoint(value, x, values, tangent, self.units, **about)
+        point = BranchPoint(value, x, values, tangent, self.units, None, image.period, bound, periods=self.periods)
         before = None if anchor.leaving or anchor.last.special is not None else anchor
         return replace(step, end=self.anchored(point, matrix, section, before))
 
@@ -319,21 +302,18 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """Check that an orbit has not shrunk into an equilibrium, beyond which the same orbits come again half a period
         later. A fraction f of the largest motion lies at a distance f^2 in the parameter from the Hopf point, and the
         precision leaves that uncertain by an f-th part."""
-        motion = float(np.linalg.norm(velocity / self.state_units)) * found.image.period
+        motion = float(np.linalg.norm(velocity / self.sizes)) * found.image.period
         self._motion = max(self._motion, motion)
         if float(section.normal @ velocity) > 0.0 and motion >= SHRUNK * np.cbrt(self.precision) * self._motion:
             return
-        said = "the motion nearly stops in the section, and the next step has no direction"
         self.budget.take()
-        if has_shrunk(self.system(found.value), found.x, self.state_units, motion, found.image):
-            said = f"{SHRINKS}: a Hopf point"
-        raise AnalysisError(said, field="orbit")
+        if has_shrunk(self.system(found.value), found.x, self.sizes, motion, found.image):
+            raise AnalysisError(f"{SHRINKS}: a Hopf point", field="orbit")
+        raise AnalysisError("the motion nearly stops in the section, and the next step has no direction", field="orbit")
 
     def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and the coordinates that identify it at any time 0."""
         moved = self.moved(anchor.last, self.first.orbit, self.first.value)
-        seen = slice(None) if anchor.section is None else slice(moved.size - 1, None)
-        return moved, self.first.tangent, seen
+        return moved, self.first.tangent, slice(0 if anchor.section is None else moved.size - 1, None)
 
     def is_first(self, step: Step[Anchor, OnCurve]) -> bool:
         """True if a state of the first orbit is on the orbit at the end of a step, for any choice of time 0."""
@@ -344,7 +324,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             return False
         self.budget.take()
         states = nodes_along(self.system(point.value), point.orbit, point.period, _PARTS).states
-        away = (np.vstack([states, point.orbit]) - first.orbit) / self.state_units
+        away = (np.vstack([states, point.orbit]) - first.orbit) / self.sizes
         chords = np.diff(away, axis=0)
         lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
         share = np.clip(-(away[:-1] * chords).sum(axis=1) / lengths, 0.0, 1.0)
@@ -357,18 +337,16 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         for an additional error of the derivative, in units; infinite without a bound."""
         if not (np.isfinite(wrong) and np.isfinite(image.error).all()):
             return return_multipliers(image) ** image.returns, np.inf
-        sizes = self.state_units
-        spec = spectrum(replace(image, error=image.error + wrong * sizes[:, None] / sizes))
+        spec = spectrum(replace(image, error=image.error + wrong * self.sizes[:, None] / self.sizes))
         found = full_period(spec.values, spec.error, image.returns, image.state, image.period)
         moduli = np.abs(spec.values)
         telling = found.error_bounds[moduli >= min(_NOT_SMALL, moduli.max(initial=0.0))]
         return found.values, float(telling.max(initial=0.0))
 
     def _relative_size(self, x: Array) -> float:
-        return float(np.abs(x / self.state_units).max())
+        return float(np.abs(x / self.sizes).max())
 
     def _projection(self, velocity: Array, section: Section) -> Array:
         """Projection along the motion onto a section, in units, shape (n, n)."""
-        sizes = self.state_units
-        normal = section.normal * sizes
-        return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)
+        across = np.outer(velocity / self.sizes, section.normal * self.sizes)
+        return np.eye(velocity.size) - across / float(section.normal @ velocity)

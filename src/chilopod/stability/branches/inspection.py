@@ -79,9 +79,11 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
     if (flipped and not branching) or (touches and not flipped and step.size > _TELLING):
         raise AnalysisError("the step landed on another curve", field="step")
     sure = offers(curve.system(step.found.value), "flow_with_error")
-    found: list[tuple[float, BranchPoint]] = []
+    points: list[BranchPoint] = []
+    last = np.inf
     for place in places:
-        near, event = _near(within, place.crossing.value), place.crossing.event
+        at, event = place.crossing.value, place.crossing.event
+        near = _near(within, at)
         breaking = place.block is not None and not place.block.trivial
         lone = event is CircleEvent.PLUS and not (place.crossing.collision or place.branching or place.fold or breaking)
         if leaving and event is CircleEvent.PLUS and not _confirmed(within, place):
@@ -102,14 +104,10 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Inspect
             continue
         if point is None:
             remarks += (f"{near}: {event.sentence}, which the orbit that is found there does not confirm",)
-        else:
-            found.append((place.crossing.value, point))
-    points: list[BranchPoint] = []
-    last = np.inf
-    for at, special in found:
+            continue
         if last < at:  # an ordinary point gives the stability between two special ones
             points.append(within.ordinary(0.5 * (last + at)))
-        points.append(special)
+        points.append(point)
         last = at
     return Inspected(tuple(points), remarks)
 
@@ -197,7 +195,6 @@ def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[EventPlac
 
 
 def _placed(within: Within, crossing: Crossing, block: Block | None) -> EventPlace:
-    """Place where multipliers cross."""
     if crossing.event is not CircleEvent.PLUS:
         return EventPlace(crossing, block)
     before, after = within.sides(crossing.value)
@@ -264,7 +261,7 @@ def _check_period(within: Within) -> None:
 
 def _check_events(within: Within) -> None:
     """AnalysisError if an event begins or ceases to happen within a step, unless returns are smooth there."""
-    low, high, units = within.low, within.step.size, within.curve.state_units
+    low, high, units = within.low, within.step.size, within.curve.sizes
 
     def seen(place: float) -> tuple[tuple[float, ...], Array]:
         x, value, image, _ = within.at(place).found

@@ -25,12 +25,8 @@ from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing, distances
 
-CLOSE = 1e-9
-"""Precision of a located point along the curve, relative to the step."""
-
-SAME_ORBIT = 1e-6
-"""Distance between states of one orbit, relative to the sizes of the states."""
-
+CLOSE = 1e-9  # precision of a located point along the curve, relative to the step
+SAME_ORBIT = 1e-6  # distance between states of one orbit, relative to the sizes of the states
 _FURTHER = 0.1  # factor on the precision of orbits within a step
 _OFF = 1e-5  # error of the cubic, relative to the step, above which an orbit is corrected
 _CORRECTED = 3  # returns to correct the cubic, by the matrix between those of the ends, before the corrector does
@@ -47,7 +43,9 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         super().__init__(closer, step)
         self.curve = curve
         self.low = _LEAVING * step.size if step.start.leaving else 0.0
-        self._near: dict[float, tuple[Array, float]] = {}
+        section, image = step.start.section, step.found.image
+        first = self.jacobian(0.0), np.nan if section is None else section.duration
+        self._near = {0.0: first, step.size: (image.jacobian, image.duration)}
 
     @functools.cached_property
     def blocks(self) -> tuple[Block | None, ...]:
@@ -56,8 +54,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         section = curve.section_at(last.orbit, last.value, last.period)
         image = curve.image(last.orbit, last.value, section, with_error=True)
         # On a branch orbits are not corrected to the last digit.
-        orbit = Orbit(last.orbit, image, SAME_ORBIT * curve.state_units)
-        return orbit_blocks(curve.system(last.value), orbit)[0]
+        return orbit_blocks(curve.system(last.value), Orbit(last.orbit, image, SAME_ORBIT * curve.sizes))[0]
 
     def sides(self, place: float) -> tuple[Step[Anchor, OnCurve], Step[Anchor, OnCurve]]:
         """Parts of the step that end just before and just after a place."""
@@ -68,20 +65,14 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         """Derivative of the return map at a place."""
         if place > 0.0:
             return self.at(place).found.image.jacobian
-        matrix = self.step.start.matrix[:-1, :-1]
-        sizes = self.curve.state_units
-        return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
+        sizes, matrix = self.curve.sizes, self.step.start.matrix[:-1, :-1] + np.eye(self.curve.sizes.size)
+        return np.asarray(matrix * sizes[:, None] / sizes)
 
     def near(self, place: float) -> tuple[Array, float]:
-        """Derivative and duration of the return at a place, computed once, by the cubic through the ends of the step,
-        corrected until it is close enough."""
+        """Derivative and duration of the return at a place, computed once, by the cubic through the step's ends."""
         if place not in self._near:
-            if place == 0.0:
-                section = self.step.start.section
-                self._near[place] = self.jacobian(place), np.nan if section is None else section.duration
-            else:
-                image = self.step.found.image if place == self.step.size else self._near_image(place)
-                self._near[place] = image.jacobian, image.duration
+            image = self._near_image(place)
+            self._near[place] = image.jacobian, image.duration
         return self._near[place]
 
     def _near_image(self, place: float) -> ReturnMap:
@@ -92,8 +83,7 @@ class Within(Parts[Anchor, OnCurve, Returned]):
             for _ in range(_CORRECTED):
                 x, value = self.curve.reached(start.last, moved)
                 image = self.curve.image(x, value, start.section)
-                off = np.append((image.state - x) / self.curve.state_units, 0.0)
-                correction = np.linalg.solve(matrix, off)
+                correction = np.linalg.solve(matrix, np.append((image.state - x) / self.curve.sizes, 0.0))
                 if float(np.abs(correction).max()) <= _OFF * step.size:
                     return image
                 moved = moved - correction
@@ -107,9 +97,8 @@ class Within(Parts[Anchor, OnCurve, Returned]):
         return exact.found.image
 
     def ordinary(self, place: float) -> BranchPoint:
-        """An ordinary point of the branch."""
-        plane = Plane(self.step.start.tangent, place)
-        part = self.curve.step(self.step.start, self.step.between(place), plane, bounded=True)
+        start = self.step.start
+        part = self.curve.step(start, self.step.between(place), Plane(start.tangent, place), bounded=True)
         return self.curve.arrived(part).end.last
 
 
@@ -145,8 +134,7 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
     start, low, high = within.step.start.last, within.low, within.step.size
 
     def samples(places: Array) -> list[Sample]:
-        parts = [(at, within.at(at)) for at in places.tolist()]
-        return [Sample(at, part.moved, part.found.image) for at, part in parts]
+        return [Sample(at, within.at(at).moved, within.at(at).found.image) for at in places.tolist()]
 
     course = Course(samples, low, high, high - low, _BESIDE * (high - low))
     point, regular = curve.arrived(within.at(crossing.value)).end.last, None
@@ -154,32 +142,31 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
         before, after = within.sides(crossing.value)
         between = before.tangent + after.tangent
         point = replace(point, tangent=between / np.linalg.norm(between))
+    value = point.value
     if not place.fold and (block is None or block.trivial):
 
         def bounded_at(_: float, moved: Array, error: Array, duration: float) -> Orbit:
             x, value = curve.reached(start, moved)
-            return with_bounds(curve.system(value), x, duration, error[:-1] * curve.state_units)
+            return with_bounds(curve.system(value), x, duration, error[:-1] * curve.sizes)
 
         regular = past_singular(course, crossing, bounded_at)
     if regular is None or crossing.multiplicity > 1:
         orbit = _orbit(within, point, place)
         along = place_error(course, crossing, orbit.image)
-    if regular is not None and crossing.multiplicity > 1 and not regular.error_bound < along:
-        regular = None
+        if regular is not None and not regular.error_bound < along:
+            regular = None
     if regular is not None:
-        orbit, along = regular.orbit, regular.error_bound
-        point = replace(point, value=curve.reached(start, regular.sampled)[1])
+        orbit, along, value = regular.orbit, regular.error_bound, curve.reached(start, regular.sampled)[1]
     if place.branching and crossing.change == 0:
         value, error = _turn(within, crossing.value)
     else:
-        value, error = point.value, _value_error(within, place, along, orbit.image)
+        error = _value_error(within, place, along, orbit.image)
         if not place.fold:
             # The orbits beside a singular one, from which it is interpolated, are the less certain the closer they are.
             reach = regular.reach if regular else _BESIDE * (high - low)
             beside = max(crossing.value - reach, low), min(crossing.value + reach, high)
             error += max(_noise(curve, within.at(each), within.step.start.section) for each in beside)
             error += curve.scale * float(regular.sampled_error[-1]) if regular else 0.0
-    point = replace(point, value=value)
     kind = Kind.FOLD if place.fold else None
     found = described(curve.system(value), (value, error), orbit, crossing, block, kind=kind)
     if place.branching and found.kind is Kind.TRANSCRITICAL:
@@ -190,7 +177,8 @@ def special_point(within: Within, place: EventPlace) -> BranchPoint | None:
     if (away > _CRITICAL and not crossing.collision) or np.isinf(found.error_bound):
         return None
     bound = curve.multipliers(orbit.image)[1]
-    return replace(point, orbit=orbit.state, special=found.kind, error_bound=bound, bifurcation=found)
+    point = replace(point, value=value, orbit=orbit.state, error_bound=bound)
+    return replace(point, special=found.kind, bifurcation=found)
 
 
 def _orbit(within: Within, point: BranchPoint, place: EventPlace) -> Orbit:
@@ -205,7 +193,7 @@ def _orbit(within: Within, point: BranchPoint, place: EventPlace) -> Orbit:
     if not place.fold:
         with contextlib.suppress(AnalysisError):
             orbit = searched_orbit(system, x, section=section)
-            if float((np.abs(orbit.state - x) / curve.state_units).max()) <= SAME_ORBIT:
+            if float((np.abs(orbit.state - x) / curve.sizes).max()) <= SAME_ORBIT:
                 return orbit
     return Orbit(x, curve.image(x, point.value, section, with_error=True), np.zeros(x.size))
 
@@ -252,7 +240,7 @@ def _noise(curve: Curve, here: Step[Anchor, OnCurve], section: Section | None) -
 
 def _off(curve: Curve, found: OnCurve, section: Section | None, image: ReturnMap) -> Array:
     """Distance by which an orbit may miss its return, in units of the states, shape (n,)."""
-    x, sizes = found.x, curve.state_units
+    x, sizes = found.x, curve.sizes
     wrong = np.broadcast_to(image.error, image.jacobian.shape)
     off = (np.abs(image.state - x) + wrong @ np.maximum(np.abs(x), sizes)) / sizes
     return np.asarray(off + curve.noise(x, found.value, section))

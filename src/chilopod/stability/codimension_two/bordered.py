@@ -31,14 +31,12 @@ from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step, inverted
 from chilopod.stability.continuation.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk
-from chilopod.stability.interface import SystemLike, offers, returns_per_period, sizes, system_of
+from chilopod.stability.interface import SystemLike, offers, sizes, system_of
 from chilopod.stability.orbits.orbit import closings, from_known, known_state
-from chilopod.stability.returns import ReturnMap, Section, return_map, section_at, velocity_at
+from chilopod.stability.returns import ReturnMap, Section, return_duration, return_map, section_at, velocity_at
 from chilopod.stability.symmetry.groups import symmetric_states
 
-Family2 = Callable[[float, float], SystemLike]
-"""``family2(p, q)`` is the system at values of two parameters."""
-
+Family2 = Callable[[float, float], SystemLike]  # ``family2(p, q)`` is the system at values of two parameters
 _AT_ZERO = 1e6  # change over the box, relative to the sizes of the states, of an orbit at zero
 _STEP = 1e-6  # step of differences, in units of the frame: it affects only the speed of Newton's method
 _RESOLVED, _LONGEST = 1e-8, 0.1  # least such step of a parameter, relative to its values, and the longest
@@ -120,7 +118,6 @@ class Spot(Evaluated):
 
     @property
     def values(self) -> Array:
-        """Values of both parameters, shape (2,)."""
         return self.place.values
 
     @property
@@ -129,7 +126,6 @@ class Spot(Evaluated):
         return np.asarray(np.abs(np.linalg.pinv(self.matrix[:-1])) @ self.uncertainty)
 
     def towards(self, sign: float) -> Spot:
-        """Point with its tangent multiplied by the sign."""
         tangent = sign * self.tangent
         return replace(self, tangent=tangent, matrix=np.vstack([self.matrix[:-1], tangent]))
 
@@ -152,17 +148,15 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         self.precision, self.settled = self.narrowness * ROUND_OFF, self.narrowness * SETTLED
 
     def system(self, values: Array) -> SystemLike:
-        """The system at values of both parameters."""
         return system_of(self._family2, *values.tolist())
 
     def begin(self, place: Place, period: float) -> Spot:
         """The point of the curve nearest to a place beside it, with about the full period there, NaN if unknown."""
         system = self.system(place.values)
-        duration = period / returns_per_period(system) if np.isfinite(period) else None
+        duration = return_duration(system, period) if np.isfinite(period) else None
         section = None if self.known else section_at(system, place.state, duration=duration)
         place, image = self._mapped(place, section, False)
-        size = self._size(system, place, image, section)
-        frame = self._framed(system, place, image, size, None)
+        frame = self._framed(system, place, image, self._size(system, place, image, section), None)
         anchor = self.spot(place, frame, None)
         try:
             found = self._nearest(anchor)
@@ -273,7 +267,6 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return bool(np.linalg.svd(spot.matrix[:-1], compute_uv=False)[-1] <= _MEETING / self.narrowness)
 
     def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
-        """Displacement of the first point, its tangent, and coordinates that do not change with the time 0."""
         frame, first = anchor.frame, self.first
         seen = slice(0 if frame.section is None else frame.parameters.start, None)
         return frame.between(anchor.place, first.place), frame.carried(first.tangent, first.frame), seen
@@ -302,8 +295,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             values[j] += self._inward(place, j) * self.widths[j]
             moved = self._mapped(replace(place, values=values), section, False)[1].state - image.state
             reach = max(reach, float((np.abs(moved) / size).max()) / self._steps[j])
-        at_zero = reach > (_AT_ZERO if place.state.any() else 0.0)
-        return size * reach if at_zero else size
+        return size * reach if reach > (_AT_ZERO if place.state.any() else 0.0) else size
 
     def _inward(self, place: Place, j: int) -> float:
         """A step of one parameter, in units of its interval, that stays within it."""
@@ -360,8 +352,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             step[j] = self._inward(at.place, j - m) if j >= m else _STEP
             columns.append((self.evaluated(frame.moved(at.place, step), frame).residual - at.residual) / step[j])
         if k == 2:
-            turned = 2.0 * frame.mixture @ (at.left.T @ at.jacobian @ at.right).ravel()
-            columns.append(np.append(np.zeros(m), turned))
+            columns.append(np.append(np.zeros(m), 2.0 * frame.mixture @ (at.left.T @ at.jacobian @ at.right).ravel()))
         matrix = np.array(columns).T
         matrix[:m, :m] = frame.basis.T @ (at.jacobian @ frame.basis - frame.basis)
         return matrix

@@ -44,23 +44,18 @@ _JUMP = 0.5  # the same for values beside it, which are at most 0.2 at a simple 
 _RESOLVED = 3.0  # factor on its error that a test function must reach within a step to be resolved
 _COMPLEX = 1e-6  # least imaginary part of a pair
 _OVERLAP = 1e-5  # overlap of the two critical eigenvectors below which a multiplier is double
-
-_COSINES = {
+_COSINES = {  # of the angle of the critical multipliers at a resonance
     CodimensionTwo.RESONANCE_1_1: 1.0,
     CodimensionTwo.RESONANCE_1_2: -1.0,
     CodimensionTwo.RESONANCE_1_3: -0.5,
     CodimensionTwo.RESONANCE_1_4: 0.0,
 }
-"""Cosine of the angle of the critical multipliers at a resonance."""
 
 Signal = CodimensionTwo | CircleEvent
 """A test function: of the critical multipliers by the kind of its zeros, of the other ones by their event there."""
 
-Signals = dict[Signal, tuple[float, float]]
-"""Test functions and their errors."""
-
-Test = Callable[[float], tuple[float, float]]
-"""A test function and its error at a distance along a step; NaN where undefined."""
+Signals = dict[Signal, tuple[float, float]]  # test functions and their errors
+Test = Callable[[float], tuple[float, float]]  # a test function and its error along a step; NaN where undefined
 
 _Parts = Parts[Spot, Evaluated, Evaluated]
 
@@ -100,7 +95,6 @@ class Critical:
 
     @functools.cached_property
     def system(self) -> SystemLike:
-        """The system at this place."""
         return self._curve.system(self.at.place.values)
 
     @functools.cached_property
@@ -114,7 +108,6 @@ class Critical:
 
     @functools.cached_property
     def form(self) -> NormalForm:
-        """The normal form."""
         at, orbit_error = self.at, 0.0
         if isinstance(at, Spot):  # whose errors are known
             state = at.frame.size * (np.abs(at.frame.basis) @ at.shift[: at.frame.parameters.start])
@@ -124,8 +117,7 @@ class Critical:
 
     def fifth(self, *beside: Critical) -> Quintic | None:
         """The terms of fifth order, sampled up to about the amplitude of the normal form here, or else beside."""
-        amplitudes = (each.form.amplitude for each in (self, *beside))
-        amplitude = next(filter(np.isfinite, amplitudes), None)
+        amplitude = next(filter(np.isfinite, (each.form.amplitude for each in (self, *beside))), None)
         return None if amplitude is None else quintic(self._returned, self.orbit, amplitude)
 
     def _returned(self, states: Array) -> Array:
@@ -150,7 +142,6 @@ class Detector:
         self._signals: list[Signal] = [*filter(None, [self._degenerate]), *resonances, *CircleEvent]
 
     def station(self, spot: Spot) -> Station:
-        """The point at a spot, and the test functions."""
         here = Critical(self.curve, spot)
         signals = {signal: self._measured(signal, here) for signal in self._signals}
         bound = across(spot) + 4.0 * EPSILON * np.abs(spot.values)
@@ -257,20 +248,18 @@ class Detector:
             # Two real multipliers with product 1 are not critical.
             reals = nu[np.abs(nu.imag) <= _COMPLEX].real
             products = np.abs(reals[:, None] * reals - 1.0)[np.triu_indices(reals.size, 1)]
-            critical = off_circle <= products.min(initial=np.inf)
-            return together(self._kind, Kind.NEIMARK_SACKER) if critical else None
+            return together(self._kind, Kind.NEIMARK_SACKER) if off_circle <= products.min(initial=np.inf) else None
         sign = TARGETS[signal]
         if sign == self.curve.target and abs(here.overlap) < _OVERLAP:
             return None  # the overlap identifies a double multiplier
-        # At the point itself the modes of two equal multipliers are any combinations of both.
-        nearest = int(np.abs(there.spectrum.values[there.others] - sign).argmin())
-        mode = there.spectrum.right[:, there.others[nearest]]
         if sign < 0:
             return together(self._kind, Kind.PITCHFORK if here.at.image.returns % 2 == 0 else Kind.PERIOD_DOUBLING)
+        # At the point itself the modes of two equal multipliers are any combinations of both.
+        nearest = there.others[np.abs(there.spectrum.values[there.others] - sign).argmin()]
+        mode = there.spectrum.right[:, nearest]
         if reverses(here.system, mode, here.at.frame.size):
             return together(self._kind, Kind.PITCHFORK)
-        meets = self.curve.known or self.curve.meets(spot)
-        return together(self._kind, Kind.BRANCH_POINT if meets else Kind.FOLD)
+        return together(self._kind, Kind.BRANCH_POINT if self.curve.known or self.curve.meets(spot) else Kind.FOLD)
 
 
 def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.nan, np.nan)) -> Point2:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,21 +27,12 @@ from chilopod.stability.codimension_two.detection import Critical, Detector, Sta
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
 from chilopod.stability.equilibria import SHRINKS
-from chilopod.stability.interface import (
-    SystemLike,
-    offers,
-    returns_per_period,
-    sizes,
-    system_of,
-    with_shared_symmetries,
-)
+from chilopod.stability.interface import SystemLike, offers, sizes, system_of, with_shared_symmetries
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import event_beside, return_duration, returned_states, section_at, whole_period
 from chilopod.stability.symmetry.groups import reverses
 
-BUDGET = 20_000
-"""Default budget of a curve, in return maps with derivatives."""
-
+BUDGET = 20_000  # default budget of a curve, in return maps with derivatives
 _MOVED = 1e-4  # largest correction of the start, relative to the box, and of its orbit, relative to the states
 _MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
 
@@ -129,13 +119,12 @@ def follow2(
             ahead = float(first.frame.between(first.place, beside) @ first.tangent)
         else:
             ahead = float(first.tangent[first.frame.parameters][1]) * (-1.0 if rising is False else 1.0)
-        steps, sign = (min(step, longest), longest), math.copysign(1.0, ahead)
-        after = _followed(detector, origin._replace(spot=first.towards(sign)), steps, points, progress)
-        before = _Half([], Ending.CLOSED if after.ending is Ending.CLOSED else Ending.START)
-        if after.ending is not Ending.CLOSED and outward is None and rising is None:
-            before = _followed(detector, origin._replace(spot=first.towards(-sign)), steps, points, progress)
-    found, endings = (*reversed(before.points), origin.point, *after.points), (before.ending, after.ending)
-    return Curve2(start.kind, found, endings, (before.reason, after.reason), periods)
+        wanted, sign = ((min(step, longest), longest), points, progress), math.copysign(1.0, ahead)
+        after, last, why = _followed(detector, origin._replace(spot=first.towards(sign)), *wanted)
+        before, begin, whence = list[Point2](), Ending.CLOSED if last is Ending.CLOSED else Ending.START, ""
+        if begin is Ending.START and outward is None and rising is None:
+            before, begin, whence = _followed(detector, origin._replace(spot=first.towards(-sign)), *wanted)
+    return Curve2(start.kind, (*reversed(before), origin.point, *after), (begin, last), (whence, why), periods)
 
 
 def _over_periods(family2: Family2, periods: int) -> Family2:
@@ -148,7 +137,7 @@ def _over_its_periods(family2: Family2, values: Array, orbit: Array, period: flo
     system = system_of(family2, *values.tolist())
     if not np.isfinite(period) or orbit.shape != (system.dimension,):
         return family2, 1
-    periods, duration = max(1, round(period / (system.period or period))), period / returns_per_period(system)
+    periods, duration = max(1, round(period / (system.period or period))), return_duration(system, period)
     whole = periods > 1
     if system.symmetry is not None and not whole:
         back = returned_states(system, orbit[None], section_at(system, orbit, duration=duration))[0]
@@ -176,25 +165,15 @@ def _target(family2: Family2, start: BifurcationPoint, second: float) -> tuple[i
     return target, known
 
 
-_Looked = tuple[Station | None, list[SpecialPoint2]]
-"""The station at the end of a step, if any, and the events within the step."""
-
-
-class _Half(NamedTuple):
-    """A curve in one direction, without its start."""
-
-    points: list[Point2]
-    ending: Ending
-    reason: str = ""
+_Looked = tuple[Station | None, list[SpecialPoint2]]  # the station at the end of a step, if any, and its events
 
 
 def _followed(
     detector: Detector, origin: Station, steps: tuple[float, float], points: int | None, progress: Progress2
-) -> _Half:
-    """The curve from its first point, towards the tangent there."""
-    curve, last = detector.curve, origin
+) -> tuple[list[Point2], Ending, str]:
+    """The points after the first one of a curve, towards the tangent there, its ending, and the reason."""
+    curve, kept, last = detector.curve, list[Point2](), origin
     curve.first = origin.spot
-    kept: list[Point2] = []
 
     def look(step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
         """Station at the end of a step, and events within it. The curve of a pair ends where the pair meets."""
@@ -227,7 +206,7 @@ def _followed(
         if reason.startswith("step:") and curve.meets(end):
             reason = _TIP
         reason = event_beside(*about, ahead) or reason
-    return _Half(kept, ending, reason)
+    return kept, ending, reason
 
 
 _TIP = "the equations are singular here, as at the tip of an Arnold tongue, where periodic orbits form a continuum"
@@ -312,15 +291,14 @@ class _Unfolding:
         self._slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)  # by the length of ``spot.tangent``
         self._response = _response(spot, target)
 
-    def fold(self, a: float) -> Place | None:
-        """Predicted place of a fold at an amplitude along the mode, negative against it; None if that is too far."""
+    def fold(self, a: float) -> Place:
+        """Predicted place of a fold at an amplitude along the mode, negative against it; AnalysisError if too far."""
         spot, fifth = self.spot, self.fifth
         away = -2.0 * fifth.coefficient * a * a / self._slope
         aside = fifth.coefficient * a**4 / self.at.times * self._response
         if not (abs(away) <= _FARTHEST and np.abs(aside).max() <= _FARTHEST):
-            return None
-        base = self._equations.along(spot, away)
-        place = spot.frame.moved(base.place, aside)
+            raise AnalysisError("the fold is predicted too far from the point", field="point")
+        place = spot.frame.moved(self._equations.along(spot, away).place, aside)
         bent = self.at.displacements(fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
 
@@ -343,8 +321,6 @@ def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -
         amplitude = there.fifth.amplitude * 0.5**k
         try:
             place = there.fold(sign * amplitude)
-            if place is None:
-                continue
             found = folds.begin(place, periods * there.spot.image.period)
         except (AnalysisError, ArithmeticError, ValueError) as error:
             cause = error

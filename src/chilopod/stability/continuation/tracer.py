@@ -170,10 +170,10 @@ def _to_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[
             step = _on_edge(equations, anchor, size, edge)
         except OutsideBoxError as error:  # of the other parameter, and before
             edge = error.edge
-            continue
-        if not 0.0 < step.size <= tolerances.OVER * size:
+        else:
+            if 0.0 < step.size <= tolerances.OVER * size:
+                return step
             break
-        return step
     raise AnalysisError("the curve does not reach the end of the interval within the step", field="step")
 
 
@@ -213,5 +213,4 @@ def _closed(equations: Equations[A, S, R], step: Step[A, S]) -> Step[A, S] | Non
     except ChilopodError:
         return None
     near = float(np.abs(part.moved - first)[seen].max()) <= tolerances.SAME * step.size
-    same = near and float(part.tangent[seen] @ ahead[seen]) > 0.0 and equations.is_first(part)
-    return part if same else None
+    return part if near and float(part.tangent[seen] @ ahead[seen]) > 0.0 and equations.is_first(part) else None

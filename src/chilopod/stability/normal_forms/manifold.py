@@ -22,17 +22,13 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
 from chilopod.stability.returns import ReturnMap
 
-StateMap = Callable[[Array], Array]
-"""The return map: states, shape (k, n), to their images, shape (k, n)."""
-
-Powers = tuple[int, int]
-"""i and j of a monomial z^i conj(z)^j; j = 0 where z is real."""
+StateMap = Callable[[Array], Array]  # the return map: states, shape (k, n), to their images, shape (k, n)
+Powers = tuple[int, int]  # i and j of a monomial z^i conj(z)^j; j = 0 where z is real
 
 ManifoldCurve = Mapping[Powers, ComplexArray]
 """Coefficient of every monomial, shape (n,); of two conjugate ones only the one with i >= j."""
 
-Term = tuple[complex, float]
-"""A coefficient and its error."""
+Term = tuple[complex, float]  # a coefficient and its error
 
 _ANGLES = 8
 _HIGHEST = 5.0  # highest power of a radius that must not overflow
@@ -53,7 +49,6 @@ class CriticalOrbit(ReadOnlyArrays):
 
     @property
     def real(self) -> bool:
-        """True for a real multiplier."""
         return self.multiplier.imag == 0.0
 
     @property
@@ -318,5 +313,4 @@ def _weights(order: int, parity: int) -> tuple[Array, Array]:
     orders = np.arange(parity, 2 * RADII.size, 2)
     one = np.eye(2 * RADII.size)
     weights = np.array([chebyshev.cheb2poly(one[k])[order] if k >= order else 0.0 for k in orders])
-    gains = np.abs(np.cumsum(weights[:, None] * _transform(parity), axis=0)).sum(axis=1)
-    return weights, gains
+    return weights, np.abs(np.cumsum(weights[:, None] * _transform(parity), axis=0)).sum(axis=1)

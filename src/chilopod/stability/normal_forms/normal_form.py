@@ -117,8 +117,7 @@ def _of_full_period(fit: Fit, manifold: Manifold, orbit_error: float | None) -> 
         return NormalForm(status, 0.0, 0.0, -k * cubic, k * cubic_error, amplitude=sampled.radius)
     cubic = k * cubic + k * (k - 1) * quadratic.real**2
     cubic_error = k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error
-    amplitude = sampled.radius
-    return NormalForm(status, k * quadratic.real, k * quadratic_error, cubic, cubic_error, amplitude=amplitude)
+    return NormalForm(status, k * quadratic.real, k * quadratic_error, cubic, cubic_error, amplitude=sampled.radius)
 
 
 def _loose_by(manifold: Manifold, quadratic: float, cubic: float) -> float:
@@ -155,8 +154,7 @@ _ENOUGH = 3e-8  # relative error that ends the search
 _FULL = 8  # highest visible order above which a larger amplitude would lose accuracy
 _BETTER = 0.3  # factor on the error that justifies a further step
 
-Fit = tuple[NormalFormStatus, Sampled, Term]
-"""Status, FOUND or LINEAR, the map at the best amplitude, and the resonant cubic term of one return."""
+Fit = tuple[NormalFormStatus, Sampled, Term]  # FOUND or LINEAR, the map at the best amplitude, cubic term of a return
 
 
 def _fitted(manifold: Manifold, radius: float) -> Fit | None:

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from chilopod.errors import AnalysisError, ParameterError
@@ -64,7 +63,7 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
         if not abs(lasts - whole) <= _SAME_PERIOD * whole:
             raise ParameterError("must cover one period", field="orbit", value=f"{lasts:g}", allowed=f"{whole:g}")
         first = -float(times[0]) % whole  # time 0, from the first state on
-    duration = lasts / returns_per_period(system)
+    duration = return_duration(system, lasts)
     nodes = (first + np.arange(_OF_GUESS) * duration / _OF_GUESS) % lasts
     return Nodes(CubicSpline(times - times[0], states)(nodes), duration)
 
@@ -122,12 +121,11 @@ def _settled_autonomous(system: Autonomous, x: Array) -> Iterator[Nodes]:
     try:
         for _ in range(_LONGEST_SETTLING // 4):
             x = carried(system, x[None], 0.0, system.guess_period)[0]
-        times, _, away = _marched(system, x, _MARCHES)
+        times, _, back = _marched(system, x, _MARCHES)
     except AnalysisError:
         return
-    back = _minima(away)
-    if back.size:
-        yield Nodes(x[None], float(times[back[0]]) / returns_per_period(system))
+    if back:
+        yield Nodes(x[None], return_duration(system, float(times[back[0]])))
 
 
 def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
@@ -135,11 +133,11 @@ def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
     if not is_autonomous(system):
         return
     try:
-        times, states, away = _marched(system, x, 2)
+        times, states, back = _marched(system, x, 2)
     except AnalysisError:
         return
     units = np.maximum(sizes(system, x, system.guess_period), np.abs(states).max(axis=0))
-    for i in (i for i in _minima(away) if times[i] >= 0.5 * system.guess_period):
+    for i in (i for i in back if times[i] >= 0.5 * system.guess_period):
         later, there = times[1], states[i]
         for _ in range(_CORRECTIONS):  # to the plane across the motion
             velocity = velocity_at(system, there) / units
@@ -148,13 +146,12 @@ def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
                 break
             there = carried(system, states[i - 1][None], 0.0, later)[0]
         if (np.abs(there - x) <= _RETURNS * units).all():
-            yield Nodes(x[None], float(times[i - 1] + later) / returns_per_period(system))
+            yield Nodes(x[None], return_duration(system, float(times[i - 1] + later)))
             return
 
 
-def _marched(system: Autonomous, x: Array, periods: int) -> tuple[Array, Array, Array]:
-    """Times of a motion over guessed periods, its states, and their distances from the first, relative to the motion
-    and infinite where that gives no information."""
+def _marched(system: Autonomous, x: Array, periods: int) -> tuple[Array, Array, list[int]]:
+    """Times of a motion over guessed periods, its states, and the numbers of those that come back near the first."""
     times, path = np.linspace(0.0, periods * system.guess_period, periods * _MARCHED + 1), [x]
     for _ in times[1:]:
         path.append(carried(system, path[-1][None], 0.0, float(times[1]))[0])
@@ -163,11 +160,8 @@ def _marched(system: Autonomous, x: Array, periods: int) -> tuple[Array, Array, 
     size = sizes(system, x, system.guess_period)
     moves = np.ptp(states, axis=0) / size
     size = size * np.maximum(moves, _STILL * moves.max())
-    known = np.isfinite(states).all() and size.all()
-    return times, states, (np.abs(states - x) / size).max(axis=1) if known else np.full(times.size, np.inf)
-
-
-def _minima(away: Array) -> NDArray[np.intp]:
-    """Indices of close returns."""
+    if not (np.isfinite(states).all() and size.all()):
+        return times, states, []
+    away = (np.abs(states - x) / size).max(axis=1)
     back = (away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)
-    return 1 + np.flatnonzero(back)
+    return times, states, (1 + np.flatnonzero(back)).tolist()

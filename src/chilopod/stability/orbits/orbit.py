@@ -23,16 +23,7 @@ from chilopod.flows.carrying import REPEATED, TooManySteps
 from chilopod.flows.deadline import Budget, Deadline
 from chilopod.frozen import Array, ReadOnlyArrays, in_one_line
 from chilopod.stability import returns
-from chilopod.stability.interface import (
-    Capabilities,
-    SystemLike,
-    check_system,
-    is_autonomous,
-    is_stiff,
-    offers,
-    returns_per_period,
-    sizes,
-)
+from chilopod.stability.interface import Capabilities, SystemLike, check_system, is_autonomous, is_stiff, offers, sizes
 from chilopod.stability.krylov import LARGE, RESTS, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.orbits.guesses import nearer_orbits, own_return, past_impact, whole_orbit
 from chilopod.stability.orbits.shooting import Nodes, Problem, nodes_along, shot
@@ -76,7 +67,6 @@ class Orbit(Shown, ReadOnlyArrays):
 
     @property
     def period(self) -> float:
-        """Full period."""
         return self.image.period
 
     @property
@@ -162,9 +152,8 @@ def searched_orbit(
     if whole is not None:
         return near_orbit(system, whole, with_error, budget)
     x = finite_array(guess, (system.dimension,), "orbit")
-    duration = returns.return_duration(system) if section is None else section.duration
-    if isinstance(guess, Orbit) and section is None and is_autonomous(system):
-        duration = guess.period / returns_per_period(system)
+    period = guess.period if isinstance(guess, Orbit) and is_autonomous(system) else None
+    duration = returns.return_duration(system, period) if section is None else section.duration
 
     def near(start: Nodes, section: Section | None = None, careful: bool = False) -> Orbit:
         found = near_orbit(system, start, with_error, budget, section, careful)
@@ -176,8 +165,7 @@ def searched_orbit(
         found = near(Nodes(x[None], duration), section)
     except TooManySteps as error:
         allowed = ", ".join(filter(None, ("a guess closer to the orbit and its period", error.allowed)))
-        said = f"the motion from the guess {error.problem}"
-        raise TooManySteps(said, field="orbit", allowed=allowed) from error
+        raise TooManySteps(f"the motion from the guess {error.problem}", field="orbit", allowed=allowed) from error
     except AnalysisError as failed:
         if not settle:
             raise
@@ -255,8 +243,7 @@ def closings(system: SystemLike, x: Array, duration: float, size: Array, most: i
     # Over several rounds a sixteenth of the time may be half a round, where a state is zero again.
     size = np.maximum(size, np.abs(states).max(axis=0))
     near = _CLOSES * min(1.0, _relative(returns.velocity_at(system, x) * duration, size))
-    away = (np.abs(returns.turned(system, np.array(states[1:])) - x) / size).max(axis=1)
-    closed = counts[away <= near]
+    closed = counts[(np.abs(returns.turned(system, np.array(states[1:])) - x) / size).max(axis=1) <= near]
     return int(closed[0]) if closed.size else 1
 
 
@@ -354,8 +341,7 @@ def _check_symmetry(system: SystemLike, x: Array, duration: float, size: Array, 
     """AnalysisError if the second return from an orbit's state is not symmetric to the first, with its derivative."""
     symmetry = np.asarray(system.symmetry)
     after: Array = np.linalg.solve(symmetry, x).astype(np.float64)
-    second = returns.carried(system, after[None], duration, 2.0 * duration)[0]
-    off = _relative(symmetry @ second - after, size)
+    off = _relative(symmetry @ returns.carried(system, after[None], duration, 2.0 * duration)[0] - after, size)
     if off > _ALIKE * max(1.0, float(np.abs(jacobian * size / size[:, None]).max())):
         said = f"must be one of the motion: after a return it misses the symmetric one by {off:.1e} of its size"
         allowed = "S with S f(t + T/k, x) = f(t, S x), of order k, also for guards and resets"

@@ -227,9 +227,16 @@ class _Equations:
             return np.asarray(states / sizes @ basis @ basis.T * sizes)
 
     def _to_nodes(self, system: SystemLike) -> None:
-        """Carry every node to the next one."""
+        """Carry every node to the next one, and beside it by a neighbouring system if the parameter is unknown."""
         (m, n), part = self.nodes.states.shape, self.nodes.duration / len(self.nodes.states)
-        beside, step = self._beside()
+        beside, free = None, self._problem.free
+        if free is not None:
+            step = _DIFFERENCE * free.scale
+            try:
+                beside = self._problem.system_at(self.nodes.value + step)
+            except AnalysisError:  # the family ends here
+                step = -step
+                beside = self._problem.system_at(self.nodes.value + step)
         for i, x in enumerate(self.nodes.states):
             a, b = (0.0, part) if is_autonomous(system) else (i * part, (i + 1) * part)
             try:
@@ -242,24 +249,12 @@ class _Equations:
                     raise
                 raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
 
-    def _beside(self) -> tuple[SystemLike | None, float]:
-        """The system at a neighbouring value of the parameter, and the difference; None for a given parameter."""
-        problem, value = self._problem, self.nodes.value
-        if problem.free is None:
-            return None, 0.0
-        step = _DIFFERENCE * problem.free.scale
-        try:
-            return problem.system_at(value + step), step
-        except AnalysisError:  # the family ends here
-            return problem.system_at(value - step), -step
-
     def _to_section(self, system: SystemLike, frame: _Frame) -> _Frame:
         """Carry a single node until its motion returns to the section, or over the time, to a new section."""
         x, duration = self.nodes.states[0], self.nodes.duration
         if not frame.astray and frame.section is not None:
             try:
-                near = replace(frame.section, duration=duration)
-                start, rest, before, first = crossing(system, x, near)
+                start, rest, before, first = crossing(system, x, replace(frame.section, duration=duration))
                 self._ends[0], second = checked_flow(system, before, 0.0, rest)
                 self._linear[0, :, : x.size] = second @ first
                 self.nodes, self._returned = self.nodes._replace(duration=start + rest), True
@@ -271,8 +266,7 @@ class _Equations:
         return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
 
     def _totals(self, off: Array) -> list[Array]:
-        """The node after each, with the residuals ``off``, as a linear function of first state, time, parameter, and 1,
-        shape (n, n+3)."""
+        """The node after each, with the residuals ``off``, by first state, time, parameter, and 1: shape (n, n+3)."""
         rows, n = self._linear.copy(), off.shape[1]
         rows[:, :, -1] = off
         totals = [rows[0]]
@@ -283,7 +277,6 @@ class _Equations:
         return totals
 
     def closed(self) -> Closed:
-        """The nodes as a solution."""
         total, n = self._totals(self._off)[-1], self._off.shape[1]
         return Closed(self.nodes, self.frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
 
@@ -303,8 +296,7 @@ class _Equations:
         matrix, right = last[:, :n] * sizes / sizes[:, None], -last[:, n + 2] / sizes
         matrix.flat[:: n + 1] -= 1.0
         if free is not None:
-            by_value = last[:, n + 1] * free.scale / sizes
-            matrix = np.block([[matrix, by_value[:, None]], [free.row[None]]])
+            matrix = np.block([[matrix, (last[:, n + 1] * free.scale / sizes)[:, None]], [free.row[None]]])
             right = np.append(right, -other._missing)
         move = _solution(matrix, right, cutoff, self._problem.shared, sizes)
         every = np.zeros(n + 3)

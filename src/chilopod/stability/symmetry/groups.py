@@ -56,12 +56,10 @@ class Group(ReadOnlyArrays):
 
     @property
     def order(self) -> int:
-        """Number of elements."""
         return len(self.elements)
 
     @property
     def dimension(self) -> int:
-        """Number n of states."""
         return int(self.elements.shape[1])
 
     @cached_property
@@ -127,8 +125,7 @@ def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
     np.maximum.at(largest, pairs, np.abs(matrix / sizes))
     bound = error + _ROUND_OFF * n * largest[pairs] * sizes
     p = group.generators
-    explained = np.abs(p) @ bound + bound @ np.abs(p)
-    return float((np.abs(p @ matrix - matrix @ p) / explained).max())
+    return float((np.abs(p @ matrix - matrix @ p) / (np.abs(p) @ bound + bound @ np.abs(p))).max())
 
 
 def _powers(matrix: Array, most: int) -> tuple[Array, Array]:

@@ -51,7 +51,6 @@ class Block(ReadOnlyArrays):
 
     @property
     def multiplicity(self) -> int:
-        """Number m of copies."""
         return self.basis.shape[1] // self.dimension
 
     @property
@@ -283,11 +282,7 @@ def _fixed_lines(rho: Array, critical: CircleEvent) -> tuple[list[Array], bool]:
             return
         for image in rho @ projector @ np.swapaxes(rho, 1, 2) @ seen.probes:
             seen.new(image)
-        space = np.linalg.eigh(projector)[1][:, -size:]
-        if size == 1:
-            lines.append(space[:, 0])
-        else:
-            waiting.append(space)
+        (lines if size == 1 else waiting).append(np.linalg.eigh(projector)[1][:, -size:])
 
     for projector in projectors:
         take(projector)
@@ -302,7 +297,7 @@ def _fixed_lines(rho: Array, critical: CircleEvent) -> tuple[list[Array], bool]:
             bases = space @ vectors[sizes == size][:, :, -size:]
             for common in _once(bases @ np.swapaxes(bases, 1, 2)):
                 take(common)
-    return lines, complete and not waiting
+    return [space[:, 0] for space in lines], complete and not waiting
 
 
 def _once(matrices: Array) -> Array:
