@@ -1,5 +1,4 @@
-"""Datasets as netCDF-4, built in memory because the library crashes when the disk is full, and checksums behind
-them."""
+"""Datasets as netCDF-4, built in memory because the library crashes on a full disk, and checksums."""
 
 from __future__ import annotations
 
@@ -80,15 +79,10 @@ def sealed_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def unsealed(path: Path) -> bytes:
-    """The netCDF file that was :func:`sealed`; errors as for :func:`sealed_file`, UnsoundError also if the seal is
-    broken."""
+    """The netCDF file that was :func:`sealed`; errors as for :func:`sealed_file`, or of a broken seal."""
     with sealed_file(path) as file:
         content = file.read()
     data = content[:-_LENGTH]
-    if not _is_whole(data, content):
+    if sealed(data) != content:
         raise UnsoundError("is damaged or was edited, or chilopod did not write it")
     return data
-
-
-def _is_whole(data: bytes, content: bytes) -> bool:
-    return sealed(data) == content
