@@ -46,7 +46,8 @@ def _real_cos_sin(a: float) -> Any:
 
 @njit
 def _lanes_turned(a: Any) -> Any:
-    """Cosine and sine in lanes, accurate to the last bits for angles of up to a million; small angles by the series."""
+    """Cosine and sine in lanes, accurate to the last bits for angles of up to a million; small angles have the bits of
+    the series."""
     turns = nearest_integer(a * (2.0 / math.pi))
     one, two, three = _RIGHT_ANGLES
     c, s = _lanes_series(((a - turns * one) - turns * two) - turns * three)

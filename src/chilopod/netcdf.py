@@ -1,4 +1,4 @@
-"""Datasets as netCDF-4, built in memory because the library crashes on a full disk, and checksums."""
+"""Datasets as netCDF-4, built in memory because the library crashes on a full disk, and checksums behind them."""
 
 from __future__ import annotations
 
@@ -79,7 +79,8 @@ def sealed_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def unsealed(path: Path) -> bytes:
-    """The netCDF file that was :func:`sealed`; errors as for :func:`sealed_file`, or of a broken seal."""
+    """The netCDF file that was :func:`sealed`; errors as for :func:`sealed_file`, UnsoundError also if the seal is
+    broken."""
     with sealed_file(path) as file:
         content = file.read()
     data = content[:-_LENGTH]
