@@ -59,6 +59,16 @@ class Outcome(NamedTuple):
     report: Any  # number of steps, time reached, and logarithm of the growth of volume, which is added, shape (3,)
 
 
+class Problem(NamedTuple):
+    """A right-hand side on an interval, in units of the states."""
+
+    tape: Any  # its operations
+    units: Any  # units of the states, shape (n,), positive; everything else here is in these units
+    # values and tangents of the tape, with the states' own tangents 1, and the branches of its switches on the interval
+    series: Any
+    largest: Any  # largest moduli of the states so far, shape (n,)
+
+
 class Method(NamedTuple):
     """Coefficients of Radau IIA."""
 
@@ -68,16 +78,6 @@ class Method(NamedTuple):
     # of the filter 1 / (1 - h gamma J) in the estimate of the error: the inverse of the real eigenvalue of the inverse
     # of `weights` (Hairer and Wanner, equation IV.8.18)
     gamma: float
-
-
-class Problem(NamedTuple):
-    """All that the steps over an interval share."""
-
-    tape: Any  # operations of the right-hand side
-    series: Any  # values and tangents of the tape, with the states' own tangents 1, and the branches on the interval
-    method: Method
-    control: Control
-    result: Outcome
 
 
 class Step(NamedTuple):
@@ -141,23 +141,21 @@ def _newton_matrix(weights: Any, h: float, jacobians: Any, matrix: Any) -> None:
         matrix[i, i] += 1.0
 
 
-@fused_njit(error_model="numpy", inline="always")
-def _slope(problem: Any, t: float, x: Any, shake: Any, slope: Any, jacobian: Any) -> bool:
-    return slope_at(problem.tape, problem.series, problem.control.units, t, x, shake, slope, jacobian)
-
-
 @fused_njit(error_model="numpy")
-def _stages(problem: Any, x: Any, t: float, h: float, step: Any) -> bool:
+def _stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
     """Solve for the stages, from ``moved``, with ``columns``, ``slopes``, ``jacobians``; False if that fails."""
-    nodes, weights, largest = problem.method.nodes, problem.method.weights, problem.result.largest
+    tape, nodes, weights, largest = problem.tape, method.nodes, method.weights, problem.largest
     moved, slopes = step.moved, step.slopes
     s, n = moved.shape
-    y, before, close = np.empty(n), math.inf, False
+    y = np.empty(n)
+    before = math.inf
+    close = False
     for _ in range(_MOST_ROUNDS):
         for j in range(s):
             for i in range(n):
                 y[i] = x[i] + moved[j, i]
-            if not _slope(problem, t + nodes[j] * h, y, _EXACT, slopes[j], step.jacobians[j]):
+            at = t + nodes[j] * h
+            if not slope_at(tape, problem.series, problem.units, at, y, _EXACT, slopes[j], step.jacobians[j]):
                 return False
         # The residual and, in the last round, the derivative of the equations with respect to the state at the start.
         right = np.zeros((s * n, 1 + n if close else 1))
@@ -195,10 +193,10 @@ def _stages(problem: Any, x: Any, t: float, h: float, step: Any) -> bool:
 
 
 @fused_njit(error_model="numpy")
-def _defects(problem: Any, x: Any, h: float, step: Any) -> tuple[Any, Any, Any]:
+def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple[Any, Any, Any]:
     """Defect of f at the start from the polynomial through its values in the stages, filtered by the inverse of
     1 - h gamma J, of the state and the columns of the derivative, shape (n, 1 + columns); its round-off; and filter."""
-    start, gamma, derivative = problem.method.start, problem.method.gamma, problem.result.derivative
+    start, gamma = method.start, method.gamma
     s, n = step.moved.shape
     size = derivative.shape[0]
     off, terms = np.empty((n, 1 + size)), np.empty((n, 1 + size))
@@ -229,15 +227,15 @@ def _defects(problem: Any, x: Any, h: float, step: Any) -> tuple[Any, Any, Any]:
 
 
 @fused_njit(error_model="numpy")
-def _swings(problem: Any, t: float, x: Any, step: Any) -> Any:
+def _swings(problem: Any, t: float, x: Any, step: Any, derivative: Any) -> Any:
     """Changes of f and its jacobian at the end of a step per relative change of all that they are computed from, as
     terms of round-off, if finite. What passes zero at the start, as cos t and 1 - sin t do, shrinks with the step, its
     round-off does not."""
-    n, size = x.size, problem.result.derivative.shape[0]
-    y, scale, found = x + step.moved[-1], np.abs(problem.result.derivative) / _SHAKE, np.zeros((n, 1 + size))
+    n, size = x.size, derivative.shape[0]
+    y, scale, found = x + step.moved[-1], np.abs(derivative) / _SHAKE, np.zeros((n, 1 + size))
     slopes, jacobians = np.empty((3, n)), np.empty((3, n, n))
     for k, shake in enumerate((_EXACT, (_SHAKE, 0.0), (0.0, _SHAKE))):
-        if not _slope(problem, t, y, shake, slopes[k], jacobians[k]):
+        if not slope_at(problem.tape, problem.series, problem.units, t, y, shake, slopes[k], jacobians[k]):
             return 0.0 * found
         for i in range(n):
             found[i, 0] += abs(slopes[k, i] - slopes[0, i]) / _SHAKE
@@ -248,21 +246,20 @@ def _swings(problem: Any, t: float, x: Any, step: Any) -> Any:
 
 
 @fused_njit(error_model="numpy")
-def _estimate(problem: Any, x: Any, t: float, h: float, step: Any) -> float:
+def _estimate(problem: Any, method: Any, x: Any, t: float, h: float, step: Any, control: Any, result: Any) -> float:
     """The error of a step relative to the largest values of states and entries of the derivative so far."""
-    off, noise, rounding = _defects(problem, x, h, step)
-    worst = _worst(problem, x, step, off, noise)
-    if problem.control.tolerance < worst < math.inf:
-        noise += rounding @ _swings(problem, t + h, x, step)
-        worst = _worst(problem, x, step, off, noise)
+    off, noise, rounding = _defects(x, h, method, step, result.derivative)
+    worst = _worst(x, step, off, noise, control.near, result)
+    if control.tolerance < worst < math.inf:
+        noise += rounding @ _swings(problem, t + h, x, step, result.derivative)
+        worst = _worst(x, step, off, noise, control.near, result)
     return worst
 
 
 @fused_njit(error_model="numpy")
-def _worst(problem: Any, x: Any, step: Any, off: Any, noise: Any) -> float:
+def _worst(x: Any, step: Any, off: Any, noise: Any, near: Any, result: Any) -> float:
     """The largest relative error that is not noise."""
-    largest, derivative, extent = problem.result.largest, problem.result.derivative, problem.result.extent
-    near, reached = problem.control.near, step.reached
+    largest, reached, derivative, extent = result.largest, step.reached, result.derivative, result.extent
     s, n = step.moved.shape
     end = step.columns[(s - 1) * n :]
     worst = 0.0
@@ -350,12 +347,16 @@ def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: A
     series = loaded(tape, params, 1, n, control.branches)
     for i in range(n):
         series.tangents[i, 0, i] = 1.0
-    problem, step, last = Problem(tape, series, method, control, result), _room(n, s), np.zeros((s, n))
+    problem = Problem(tape, control.units, series, result.largest)
+    step = _room(n, s)
+    last = np.zeros((s, n))
     t, h, h_last = control.t0, 0.0, 0.0
-    steps, status, fresh = 0, DONE, True
+    steps = 0
+    status = DONE
+    fresh = True
     while t < t1:
         if fresh:
-            if not _slope(problem, t, x, _EXACT, step.slope, step.jacobian):
+            if not slope_at(tape, problem.series, problem.units, t, x, _EXACT, step.slope, step.jacobian):
                 status = NOT_FINITE
                 break
             rate = 0.0
@@ -379,10 +380,11 @@ def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: A
             status = STALLED
             break
         _predict(method.nodes, h / h_last if h_last > 0.0 else 0.0, last, step.moved)
-        if not _stages(problem, x, t, h, step):
-            h, h_last = 0.3 * h, 0.0
+        if not _stages(problem, method, x, t, h, step):
+            h *= 0.3
+            h_last = 0.0
             continue
-        off = _estimate(problem, x, t, h, step)
+        off = _estimate(problem, method, x, t, h, step, control, result)
         factor = _FASTEST_GROWTH
         if off > 0.0:
             factor = min(factor, max(_FASTEST_FALL, _SAFETY * (control.tolerance / off) ** (1.0 / (s + 1))))
@@ -394,6 +396,8 @@ def advance(tape: Any, method: Any, params: Any, x: Any, control: Any, result: A
             for i in range(n):
                 result.report[2] += h * method.weights[s - 1, j] * step.jacobians[j, i, i]
         t = t1 if ends else t + h
-        h, h_last, fresh = h * factor, h, True
+        h_last = h
+        h *= factor
+        fresh = True
     result.report[0], result.report[1] = steps, t
     return status
