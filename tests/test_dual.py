@@ -3,10 +3,21 @@
 import numpy as np
 import pytest
 
-from chilopod.dual import cos_sin, reciprocal
+from chilopod import dual
+from chilopod.compiled import fused_njit
 from chilopod.integrate import COMPLEX_STEP
 
 ANGLES = [*np.linspace(-0.8, 0.8, 161), -40.0, -3.0, 1.0, 7.5, 0.25 * np.pi, 1e5]
+
+
+@fused_njit
+def cos_sin(angle):
+    return dual.cos_sin(angle)
+
+
+@fused_njit
+def reciprocal(number):
+    return dual.reciprocal(number)
 
 
 @pytest.mark.parametrize("angle", ANGLES)

@@ -20,8 +20,7 @@ class LeftError(Exception):
 @pytest.fixture
 def answering(monkeypatch):
     """Ctrl-C answered as by the command line, but the process stays."""
-    ends = [each for each in signal.Signals if each.name in process._ENDS]
-    handlers, hook = [signal.getsignal(each) for each in ends], sys.unraisablehook
+    handlers, hook = [signal.getsignal(each) for each in process._ENDS], sys.unraisablehook
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def leave(words=""):
@@ -33,7 +32,7 @@ def answering(monkeypatch):
     process.answer_interrupts()
     yield
     os.close(signal.set_wakeup_fd(-1))
-    for each, handler in zip(ends, handlers, strict=True):
+    for each, handler in zip(process._ENDS, handlers, strict=True):
         signal.signal(each, handler)
     sys.unraisablehook = hook
 

@@ -80,3 +80,11 @@ def copy_into(target: Any, source: Any) -> None:
     """
     for i in range(target.size):
         target[i] = source[i]
+
+
+@njit
+def assign(target: Any, source: Any) -> None:
+    """Copy a matrix, or the start of it, over another; see :func:`copy_into`."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] = source[i, j]

@@ -21,25 +21,17 @@ _SMALL = 0.25 * math.pi
 _NO_TURN = 0.78  # rad: below 45 degrees however that is rounded
 _RIGHT_ANGLES = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
 """Their sum is a right angle to 53 + 66 bits; the first two have 33, so that a million times them is exact (fdlibm)."""
-_SIN = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8))
-_COS = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(9))
+_SIN = np.array([(-1.0) ** k / math.factorial(2 * k + 1) for k in range(8)])
+_COS = np.array([(-1.0) ** k / math.factorial(2 * k) for k in range(9)])
 
 
 def _series(a: Any) -> Any:
     """Cosine and sine by Taylor series, to the last bit for angles of up to 45 degrees."""
     z = a * a
-    s = _SIN[6] + z * _SIN[7]
-    c = _COS[7] + z * _COS[8]
-    s = _SIN[5] + z * s
-    c = _COS[6] + z * c
-    s = _SIN[4] + z * s
-    c = _COS[5] + z * c
-    s = _SIN[3] + z * s
-    c = _COS[4] + z * c
-    s = _SIN[2] + z * s
-    c = _COS[3] + z * c
-    s = _SIN[1] + z * s
-    c = _COS[2] + z * c
+    s, c = _SIN[7], _COS[8]
+    for k in range(6, 0, -1):
+        s = _SIN[k] + z * s
+        c = _COS[k + 1] + z * c
     return 1.0 + z * (_COS[1] + z * c), a + a * z * s
 
 
@@ -65,15 +57,17 @@ def _lanes_turned(a: Any) -> Any:
     return choose(absolute(quarter + 0.5), 1.0, c, -c), choose(absolute(quarter - 0.5), 1.0, s, -s)
 
 
-def _cos_sin(a: Any) -> Any:
+def cos_sin(a: Any) -> Any:
+    """Cosine and sine of an angle, for compiled code only."""
     raise NotImplementedError
 
 
-def _reciprocal(a: Any) -> Any:
+def reciprocal(a: Any) -> Any:
+    """One over a number, for compiled code only."""
     raise NotImplementedError
 
 
-@overload(_cos_sin, inline="always")
+@overload(cos_sin, inline="always")
 def _cos_sin_of(a: Any) -> Any:
     if isinstance(a, types.Complex):
 
@@ -98,7 +92,7 @@ def _cos_sin_of(a: Any) -> Any:
     return real
 
 
-@overload(_reciprocal, inline="always")
+@overload(reciprocal, inline="always")
 def _reciprocal_of(a: Any) -> Any:
     if isinstance(a, types.Complex):
 
@@ -112,15 +106,3 @@ def _reciprocal_of(a: Any) -> Any:
         return 1.0 / a
 
     return real
-
-
-@fused_njit(inline="always")
-def cos_sin(a: Any) -> Any:
-    """Cosine and sine of a real or complex-step angle."""
-    return _cos_sin(a)
-
-
-@fused_njit(inline="always")
-def reciprocal(a: Any) -> Any:
-    """One over a real or complex-step number."""
-    return _reciprocal(a)

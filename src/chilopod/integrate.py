@@ -29,11 +29,7 @@ COMPLEX_STEP = 1e-40
 MAX_STEPS = 1_000_000
 """A single call gives up after this many steps (status ``False``)."""
 
-_A = np.ascontiguousarray(DOP853.A)
-_B = np.ascontiguousarray(DOP853.B)
-_C = np.ascontiguousarray(DOP853.C)
-_E3 = np.ascontiguousarray(DOP853.E3)
-_E5 = np.ascontiguousarray(DOP853.E5)
+_A, _B, _C, _E3, _E5 = map(np.ascontiguousarray, (DOP853.A, DOP853.B, DOP853.C, DOP853.E3, DOP853.E5))
 STAGES = 12
 """Slopes that a step needs."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
@@ -86,16 +82,11 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
 
     @(fused_njit if on_disk else numba.njit(fastmath={"contract"}))
     def integrate(args: Any, x: Any, t0: float, t1: float, h: float, tolerance: float, work: Any) -> tuple[float, bool]:
-        n = x.size
-        k = work[:13]
-        y = work[13]
-        fifth = work[14]
-        third = work[15]
-        t = t0
+        n, t = x.size, t0
+        k, y, fifth, third = work[:13], work[13], work[14], work[15]
         rhs(t, x, args, k[0])
         if h <= 0.0:
-            scale = 0.0
-            slope = 0.0
+            scale, slope = 0.0, 0.0
             for i in range(n):
                 scale = max(scale, _size(x[i]))
                 slope = max(slope, _size(k[0, i]))
@@ -116,9 +107,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
                 rhs(t + _C[s] * step, y, args, k[s])
             # y: the new state; third and fifth: the two error estimates.
             for i in range(n):
-                y[i] = x[i]
-                fifth[i] = 0.0
-                third[i] = 0.0
+                y[i], fifth[i], third[i] = x[i], 0.0, 0.0
             for s in range(STAGES):
                 b, e5, e3 = step * _B[s], _E5[s], _E3[s]
                 if b != 0.0 or e5 != 0.0 or e3 != 0.0:
@@ -129,9 +118,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
             t_new = t1 if last else t + step
             rhs(t_new, y, args, k[12])
             e5, e3 = _E5[STAGES], _E3[STAGES]
-            err5 = 0.0
-            err3 = 0.0
-            check = 0.0  # NaN survives a sum and gets lost in a comparison
+            err5, err3, check = 0.0, 0.0, 0.0  # NaN survives the sum `check` and gets lost in a comparison
             for i in range(n):
                 scale = tolerance * max(1.0, _size(x[i]), _size(y[i]))
                 err5 = max(err5, _size(fifth[i] + e5 * k[12, i]) / scale)
@@ -147,8 +134,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
             if not rejected:
                 t = t_new
                 for i in range(n):
-                    x[i] = y[i]
-                    k[0, i] = k[12, i]
+                    x[i], k[0, i] = y[i], k[12, i]
                 if not last or factor < 1.0:
                     h = step * factor
                 if last:
@@ -198,9 +184,7 @@ def lanes_step(rhs: Callable[..., None]) -> Callable[..., Any]:
         for i in range(wide.shape[1]):
             for which in range(_NEW, _THIRD + 1):
                 wide[which, i] = _sum_slopes(wide, which, i, zero)
-        err5 = step * 0.0
-        err3 = err5
-        check = err5  # NaN survives a sum and gets lost in a comparison
+        err5 = err3 = check = step * 0.0  # NaN survives the sum `check` and gets lost in a comparison
         for i in range(x.size):
             new[i] = x[i] + step * new[i]
             share = 1.0 / (tolerance * larger(1.0, larger(absolute(x[i]), absolute(new[i]))))

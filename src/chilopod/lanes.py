@@ -222,8 +222,11 @@ def as_lanes(typing: Any, array: Any, width: Any) -> Any:
 
 
 @njit
-def room(numbers: int) -> Any:
+def room(shape: Any) -> Any:
     """Array of zeros that begins at a cache line of the processor, as vector registers need it."""
+    numbers = 1
+    for length in shape:
+        numbers *= length
     more = np.zeros(numbers + _CACHE_LINE)
     skip = -(more.ctypes.data // 8) % _CACHE_LINE
-    return more[skip : skip + numbers]
+    return more[skip : skip + numbers].reshape(shape)

@@ -1,5 +1,4 @@
-"""Datasets as netCDF-4, built in memory because the library crashes when the disk is full, and checksums behind
-them."""
+"""Datasets as netCDF-4, built in memory because the library crashes on a full disk, and checksums behind them."""
 
 from __future__ import annotations
 
@@ -85,10 +84,6 @@ def unsealed(path: Path) -> bytes:
     with sealed_file(path) as file:
         content = file.read()
     data = content[:-_LENGTH]
-    if not _is_whole(data, content):
+    if sealed(data) != content:
         raise UnsoundError("is damaged or was edited, or chilopod did not write it")
     return data
-
-
-def _is_whole(data: bytes, content: bytes) -> bool:
-    return sealed(data) == content

@@ -25,7 +25,7 @@ from numba.core.typing import signature
 
 from chilopod import sources
 
-__all__ = ["COMPILING", "Conversion", "cgutils", "ir", "is_processor", "keep", "pointer_to", "signature"]
+__all__ = ["COMPILING", "Conversion", "cgutils", "ir", "is_processor", "keep", "signature"]
 
 ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "twin")
 """Subpackages without compiled code, which no compiled code reaches: their changes need no new compilation."""
@@ -64,11 +64,6 @@ def is_processor(name: str) -> bool:
             os.dup2(stderr, 2)
             os.close(stderr)
         return complaints.seek(0, os.SEEK_END) == 0
-
-
-def pointer_to(kind: Any, builder: Any, place: Any) -> Any:
-    """A pointer as one to values of some type of LLVM, as long as llvmlite tells pointers apart."""
-    return builder.bitcast(place, kind.as_pointer()) if hasattr(kind, "as_pointer") else place
 
 
 class _Locator:

@@ -23,31 +23,41 @@ Content = str | bytes | bytearray | IO[bytes]
 _COPIED = 2**24  # bytes at a time
 
 
+@contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    """Block in which errors of the system become OutputErrors about a path."""
+    try:
+        yield
+    except OutputError:
+        raise
+    except (OSError, ValueError) as error:
+        file = next((each for each in path.parents if each.is_file()), None)
+        if file:
+            raise OutputError("must be a folder, and is a file", source=str(file)) from None
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise OutputError(f"cannot be written ({reason or error})", source=str(path)) from None
+
+
 def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
     """Check, before any work is done for them, that files can be written; nothing is created or changed.
 
     With ``replace`` existing regular files may be replaced.
     """
-    files = [Path(path) for path in paths]
     folders: set[Path] = set()
-    for path in files:
-        try:
+    for path in map(Path, paths):
+        with _refusing(path):
             _check_names(path)
             _check_replaceable(path, replace)
             if path.parent not in folders:
                 _check_folder(path.parent)
-        except (OSError, ValueError) as error:
-            raise _refused(path, error) from None
         folders.add(path.parent)
 
 
 def check_folder(path: str | Path) -> Path:
     """Check that a folder can be written into, or can be created; nothing is created."""
     path = Path(path)
-    try:
+    with _refusing(path):
         _check_folder(path)
-    except (OSError, ValueError) as error:
-        raise _refused(path, error) from None
     return path
 
 
@@ -59,22 +69,15 @@ def _check_folder(path: Path) -> None:
 
 def check_room(path: Path, needed: float) -> None:
     """Check, before any work is done for it, that the disk has room (bytes) for a large file or a folder."""
-    try:
+    with _refusing(path):
         free = float(shutil.disk_usage(_nearest(path)).free)
-    except (OSError, ValueError) as error:
-        raise _refused(path, error) from None
     if needed > free:
         problem = f"takes {memory.in_words(needed)} or more, and there is room for {memory.in_words(free)}"
         raise OutputError(problem, source=str(path))
 
 
 def write_atomic(
-    path: str | Path,
-    content: Content,
-    *,
-    replace: bool = True,
-    durable: bool = False,
-    temporary: str = ".chilopod-",
+    path: str | Path, content: Content, *, replace: bool = True, durable: bool = False, temporary: str = ".chilopod-"
 ) -> Path:
     """Write a file so that it never exists half-written, and return its path; missing folders are made. Where it fails
     nothing is left behind.
@@ -91,7 +94,7 @@ def write_atomic(
         Prefix of the name while the file is incomplete; such a file remains if the process is killed.
     """
     path = Path(path)
-    try:
+    with _refusing(path):
         _check_replaceable(path, replace)
         with made_folder(path.parent):
             # In the same folder, because a rename is atomic only within one file system.
@@ -102,8 +105,6 @@ def write_atomic(
             except BaseException:
                 unfinished.unlink(missing_ok=True)
                 raise
-    except (OSError, ValueError) as error:
-        raise _refused(path, error) from None
     return path
 
 
@@ -133,15 +134,12 @@ def spool(path: Path, size: int = 0) -> IO[bytes]:
 
     Room is set aside for twice the size (bytes): for the file, and for the copy that :func:`write_atomic` makes of it.
     """
-    try:
-        with ExitStack() as unless_it_fails:
-            file = unless_it_fails.enter_context(tempfile.TemporaryFile(dir=_nearest(path.parent)))
-            if size and hasattr(os, "posix_fallocate"):
-                os.posix_fallocate(file.fileno(), 0, 2 * size)
-            unless_it_fails.pop_all()
-            return file
-    except (OSError, ValueError) as error:
-        raise _refused(path, error) from None
+    with _refusing(path), ExitStack() as unless_it_fails:
+        file = unless_it_fails.enter_context(tempfile.TemporaryFile(dir=_nearest(path.parent)))
+        if size and hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, 2 * size)
+        unless_it_fails.pop_all()
+    return file
 
 
 def sync_folder(path: Path) -> None:
@@ -236,13 +234,3 @@ def _free(path: Path) -> Path:
         number += 1
         free = path.with_stem(f"{path.stem}-{number}")
     return free
-
-
-def _refused(path: Path, error: Exception) -> OutputError:
-    if isinstance(error, OutputError):
-        return error
-    file = next((each for each in path.parents if each.is_file()), None)
-    if file:
-        return OutputError("must be a folder, and is a file", source=str(file))
-    reason = error.strerror if isinstance(error, OSError) else str(error)
-    return OutputError(f"cannot be written ({reason or error})", source=str(path))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 
-_ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # not all systems have all of them
+_ENDS = [each for each in signal.Signals if each.name in ("SIGINT", "SIGTERM", "SIGHUP")]  # not all systems have all
 
 _PATIENCE = 1.0  # s after Ctrl-C until a message that work is still being stopped
 _GRACE = 4.0  # s from then to the end of what was ended by another signal, which nobody repeats
@@ -95,7 +95,7 @@ def answer_interrupts() -> None:
     """
     # Ignored in the background of a script, or by nohup, they stay ignored.
     usual = (signal.default_int_handler, signal.SIG_DFL)
-    heard = [each for each in signal.Signals if each.name in _ENDS and signal.getsignal(each) in usual]
+    heard = [each for each in _ENDS if signal.getsignal(each) in usual]
     for each in heard:
         signal.signal(each, _interrupted)
     if not heard:
@@ -111,9 +111,8 @@ def answer_interrupts() -> None:
 
 def ignore_interrupts() -> None:
     """Ignore interrupts after the end of the work."""
-    for each in signal.Signals:
-        if each.name in _ENDS:
-            signal.signal(each, signal.SIG_IGN)
+    for each in _ENDS:
+        signal.signal(each, signal.SIG_IGN)
 
 
 @contextmanager
@@ -180,7 +179,7 @@ def _unraisable(found: Any) -> None:
 
 
 def _watch(pressed: int) -> None:
-    first = _next(pressed, *(each for each in signal.Signals if each.name in _ENDS))
+    first = _next(pressed, *_ENDS)
     time.sleep(_PATIENCE)
     with suppress(OSError):
         os.write(2, b"stopping ... (Ctrl-C once more ends at once)\n")

@@ -108,10 +108,10 @@ def in_range(name: str, value: object, most: float, unit: str = "") -> float:
     """A plain number that is positive and at most ``high``, both in this unit."""
     value = as_number(name, value)
     if not 0.0 < value <= most:
-        high = f"{most:g} {unit}".strip()
-        problem = "is out of range"
-        allowed = f"more than 0, at most {high}"
-        raise ParameterError(problem, field=name, value=f"{value:g} {unit}" if unit else value, allowed=allowed)
+        allowed = f"more than 0, at most {most:g} {unit}".strip()
+        raise ParameterError(
+            "is out of range", field=name, value=f"{value:g} {unit}" if unit else value, allowed=allowed
+        )
     return value
 
 
@@ -120,12 +120,8 @@ def check_size(record: Recording | None, until: float, numbers: int) -> None:
     if not (isinstance(until, Real) and until >= 0.0):
         raise ParameterError("must be a duration in s", field="expected", value=until, allowed="0 s or more")
     if record is not None and (until * record.rate + 1.0) * numbers > MOST_NUMBERS:
-        raise ParameterError(
-            "must be lower: the record would be too large",
-            field="rate",
-            value=record.rate,
-            allowed="fewer robots, samples or seconds",
-        )
+        problem, allowed = "must be lower: the record would be too large", "fewer robots, samples or seconds"
+        raise ParameterError(problem, field="rate", value=record.rate, allowed=allowed)
 
 
 def check_memory(needed: float) -> None:
@@ -230,19 +226,15 @@ def walk_record(
     import xarray as xr
 
     values = position, heading, velocity, heading_rate, joint_angle, joint_rate, leg_yaw
-    return xr.Dataset(
-        {
-            name: (over, each, {"units": unit})
-            for (name, (over, unit, _)), each in zip(MOTION.items(), values, strict=True)
-        },
-        coords={
-            "time": ("time", time, {"units": "s"}),
-            "robot": np.arange(heading.shape[1]),
-            "joint": np.arange(1, joint_angle.shape[2] + 1),
-            "side": ["left", "right"],
-            "axis": ["x", "y"],
-        },
-    )
+    named = zip(MOTION.items(), values, strict=True)
+    coords = {
+        "time": ("time", time, {"units": "s"}),
+        "robot": np.arange(heading.shape[1]),
+        "joint": np.arange(1, joint_angle.shape[2] + 1),
+        "side": ["left", "right"],
+        "axis": ["x", "y"],
+    }
+    return xr.Dataset({name: (over, each, {"units": unit}) for (name, (over, unit, _)), each in named}, coords=coords)
 
 
 def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None) -> None:

@@ -238,13 +238,12 @@ def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array,
     return True
 
 
-def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> None:
+def warn_of_jumps(slopes: Slopes, base: Array, edges: Array) -> None:
     """Warn of jumps of the right-hand side inside the intervals where it should be smooth.
 
     Its fourth differences at fixed states away from zero (a jump in a coefficient hides at x = 0) do not fall with the
     spacing at a jump: large ones are bisected down to 1e-12 of the period.
     """
-    base = np.zeros(n) if orbit is None else orbit
     states = np.array([state_beside(base, s) for s in range(2)]).T
     period = float(edges[-1])
 

@@ -72,7 +72,7 @@ def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
     times = (np.arange(RESOLUTION) + 0.5) * (period / RESOLUTION)
     x = state_beside(base)
     samples = slopes(np.asarray(times, dtype=np.float64), np.repeat(x[:, None], RESOLUTION, axis=1))
-    samples = np.asarray(np.where(np.isfinite(samples), samples, 0.0), dtype=np.float64)
+    samples = np.where(np.isfinite(samples), samples, 0.0)
     span = np.ptp(samples, axis=1, keepdims=True)
     change = np.abs(np.diff(samples, axis=1)) / np.where(span > 0.0, span, 1.0)
     # Round-off of a constant is not a change.

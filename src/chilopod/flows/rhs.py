@@ -75,8 +75,8 @@ def check_events(events: Sequence[Event], args: tuple[Any, ...], times: Array, o
     if not events:
         return
     base = np.zeros(n) if orbit is None else orbit
-    waves = [size * np.cos(3.0 * np.arange(n) + 1.0) for size in SIZES]
-    places = [(t, base + wave) for t in times.tolist() for wave in [np.zeros(n), *waves]]
+    wave = np.cos(3.0 * np.arange(n) + 1.0)
+    places = [(t, base + size * wave) for t in times.tolist() for size in (0.0, *SIZES)]
     known: dict[int, Array] = {}
     for i, event in enumerate(events):
         name = f"events[{i}].guard"
@@ -178,7 +178,7 @@ class RightHandSide:
         except Untraceable as reason:
             self._refuse_calls(rhs, args, reason)
             slopes = sampled(rhs, args, self.dimension)
-            warn_of_jumps(slopes, self.dimension, self.edges, self.start)
+            warn_of_jumps(slopes, self.base, self.edges)
             fast = fast_parts(slopes, self.base, self.edges)
             called = CalledFlow(rhs, args, self.edges, fast, self.times, str(reason), self.tolerance)
             return slopes, {name: getattr(called, name) for name in _FLOWS}
@@ -270,17 +270,14 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
         except AnalysisError as second:
             raise (first if ZERO_BY_ZERO in first.problem else second) from None
 
-    def either(name: str) -> Callable[..., Any]:
-        def flow(x: Array, t0: float, t1: float) -> Any:
-            nonlocal latest
-            try:
-                found = taylor[name](x, t0, t1)
-            except TooManySteps as first:
-                return instead(first, name, x, t0, t1)
-            latest = x.tobytes(), t0, t1
-            return found
-
-        return flow
+    def flow(name: str, x: Array, t0: float, t1: float) -> Any:
+        nonlocal latest
+        try:
+            found = taylor[name](x, t0, t1)
+        except TooManySteps as first:
+            return instead(first, name, x, t0, t1)
+        latest = x.tobytes(), t0, t1
+        return found
 
     def is_stiff(x: Array, t0: float, t1: float) -> bool:
         if latest != (x.tobytes(), t0, t1):
@@ -298,8 +295,7 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
             images = derivative @ along
         return state, images
 
-    own: Members = {name: either(name) for name in _FLOWS}
-    return own | {
+    return {name: functools.partial(flow, name) for name in _FLOWS} | {
         "flow_tangents": flow_tangents,
         "flow_volume": lambda *args: implicit().flow_volume(*args),
         "is_stiff": is_stiff,

@@ -30,13 +30,7 @@ MOMENTS = 8
 
 @njit
 def sum_moments(
-    contact: Any,
-    stroke: Any,
-    friction: Any,
-    forward_offset: float,
-    half_width: float,
-    yaw: Any,
-    out: Any,
+    contact: Any, stroke: Any, friction: Any, forward_offset: float, half_width: float, yaw: Any, out: Any
 ) -> None:
     """Contact moments of every module at one instant, into ``out``, shape (N, 8): N*s/m, N*s, N*s, N*m*s, N*s/m, N*s/m,
     N*s, N*s.
@@ -69,12 +63,8 @@ def sum_moments(
 
 
 def contact_moments(forward_offset: float, half_width: float, friction: float, schedule: Schedule) -> Array:
-    """Contact moments at the start of every interval of ``schedule``, all legs straight and all feet alike.
-
-    Returns
-    -------
-    Shape (intervals, modules, 8); units as in :func:`sum_moments`.
-    """
+    """Contact moments at the start of every interval of ``schedule``, all legs straight and all feet alike, shape
+    (intervals, modules, 8); units as in :func:`sum_moments`."""
     intervals, modules, _ = schedule.contact.shape
     out = np.empty((intervals, modules, MOMENTS))
     each, straight = np.full((modules, 2), friction), np.zeros(2)

@@ -71,20 +71,14 @@ def energy(model: PlanarModel, x: ArrayLike, stiffness: ArrayLike | None = None)
     x = np.asarray(x, dtype=np.float64)
     _, twist = module_motion(model, x)
     robot = model.robot
-    kinetic = (
-        0.5 * robot.module_mass * (twist[:, :2] ** 2).sum() + 0.5 * robot.module_yaw_inertia * (twist[:, 2] ** 2).sum()
-    )
+    kinetic = robot.module_mass * (twist[:, :2] ** 2).sum() + robot.module_yaw_inertia * (twist[:, 2] ** 2).sum()
     angles = x[3 : model.modules + 2]
     springs = model.stiffness if stiffness is None else np.asarray(stiffness, dtype=np.float64)
-    return float(kinetic + 0.5 * (springs * angles**2).sum())
+    return float(0.5 * (kinetic + (springs * angles**2).sum()))
 
 
 def powers(
-    model: PlanarModel,
-    x: ArrayLike,
-    t: float,
-    stiffness_rate: ArrayLike = 0.0,
-    joint_torque: ArrayLike = 0.0,
+    model: PlanarModel, x: ArrayLike, t: float, stiffness_rate: ArrayLike = 0.0, joint_torque: ArrayLike = 0.0
 ) -> Powers:
     """Powers at one moment, foot by foot and joint by joint.
 

@@ -22,12 +22,12 @@ from typing import Any
 import numba
 import numpy as np
 
-from chilopod.compiled import copy_into, njit, parallel_njit
+from chilopod.compiled import assign, copy_into, njit, parallel_njit
 from chilopod.errors import ParameterError
 from chilopod.flows import deadline
 from chilopod.frozen import Array
 from chilopod.planar.contact import C_PP
-from chilopod.planar.series import PANEL, ROWS, series_term
+from chilopod.planar.series import PANEL, ROWS, panels, series_term
 
 TRUNCATION = 1e-17
 """Relative size of the last Taylor term that is kept: an order of magnitude below round-off."""
@@ -94,19 +94,16 @@ def system_matrices(
     m, lateral = mass_matrix(n, length, mass, inertia, extended)
     mass, speed = extended(mass), extended(speed)
     c, c_x, c_y, c_xx = np.moveaxis(moments[..., : C_PP + 1].astype(extended), -1, 0)
-    zero = np.zeros_like(c)
-    # Contact moments as polynomials in time, shape (3, intervals, n).
-    c_t = np.stack([c, zero, zero])
-    cx_t = np.stack([c_x, -speed * c, zero])
-    cy_t = np.stack([c_y, zero, zero])
+    # Contact moments that change, as polynomials in time, shape (3, intervals, n).
+    cx_t = np.stack([c_x, -speed * c, np.zeros_like(c)])
     cxx_t = np.stack([c_xx, -2.0 * speed * c_x, speed**2 * c])
 
     # Power of the feet: sum over modules of (vx_i, vy_i, w_i)^T D_i (vx_i, vy_i, w_i), with vy_i = lateral[i] eta.
     drag = np.zeros((3, intervals, n + 2, n + 2), extended)
     drag[0] = (lateral.T * c[:, None]) @ lateral
-    drag[..., 0, 0] += c_t.sum(-1)
-    drag[..., 0, 2:] -= cy_t
-    drag[..., 2:, 0] -= cy_t
+    drag[0, :, 0, 0] += c.sum(-1)
+    drag[0, :, 0, 2:] -= c_y
+    drag[0, :, 2:, 0] -= c_y
     cross = np.einsum("psi,ia->psai", cx_t, lateral)
     drag[..., :, 2:] += cross
     drag[..., 2:, :] += np.swapaxes(cross, -1, -2)
@@ -186,12 +183,6 @@ def steps(widths: Array, decay: Array, frequency: Array | float) -> Array:
 
 
 @njit(inline="always")
-def _copy_rows(source: Any, target: Any, at: int, count: int) -> None:
-    for i in range(count):
-        copy_into(target[at + i], source[i])
-
-
-@njit(inline="always")
 def _fill(block: Any, upper: Any, t: float, h: float, shift: float) -> None:
     """h A0 + shift, h^2 A1, h^3 A2 side by side at a time in an interval; A2 acts on the velocities alone."""
     rows, velocities, n = block.shape[0], upper.shape[0], upper.shape[2]
@@ -231,16 +222,16 @@ def _round(block: Any, state: Any, reach: Any, shift: float, rounded: float, bit
 @njit(inline="always")
 def _add_series(block: Any, terms: Any, state: Any) -> tuple[float, int]:
     """Add the series of a step to the state, in place; its largest term, and the number of orders."""
-    rows = state.shape[0]
+    rows, vectors, total = state.shape[0], panels(terms), panels(state)
     at = (_KEPT - 3) * rows
-    _copy_rows(state, terms, at, rows)
+    assign(terms[at : at + rows], state)
     terms[at + rows :] = 0.0
     peak, orders = 0.0, 0
     for k in range(1, _MOST_ORDERS + 1):
         if at == 0:
             at = (_KEPT - 3) * rows
-            _copy_rows(terms, terms, at, 3 * rows)
-        series_term(block, terms, at, 1.0 / k, state)
+            assign(terms[at : at + 3 * rows], terms)
+        series_term(block, vectors, at, 1.0 / k, total)
         at -= rows
         orders += 1
         # The recurrence uses three orders, so three small terms in a row end it.
@@ -262,8 +253,7 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
     """
     velocities, n, rows = upper.shape[1], upper.shape[3], state.shape[0]
     block = np.zeros((rows, 2 * rows + velocities))
-    # Terms of the series, the newest on top, so that orders k, k-1, k-2 lie one below the other and one product serves
-    # all three.
+    # Terms of the series, the newest on top, so that orders k, k-1, k-2 lie one below the other, for one product.
     terms = np.empty((_KEPT * rows, PANEL))
     reach = np.empty(n)
     bits, largest, orders = 1, 0.0, 0
@@ -298,9 +288,7 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
 @njit
 def propagate_all(widths: Any, upper: Any, decay: Any, frequency: float, clock: float, matrix: Any, stop: Any) -> Any:
     """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel; see _propagate."""
-    n = matrix.shape[0]
-    error = 0.0
-    orders = 0
+    n, error, orders = matrix.shape[0], 0.0, 0
     state = np.empty(((n + ROWS - 1) // ROWS * ROWS, PANEL))
     for first in range(0, n, PANEL - 1):
         last = min(first + PANEL - 1, n)

@@ -29,13 +29,9 @@ _TERMS = 6  # of a module: c, v c, c x, v c x, c y, c (x^2 + y^2)
 
 
 def return_maps(robots: Sequence[Robot]) -> tuple[Array, Array]:
-    """Return maps of the straight walks of robots that share their :func:`shape`.
-
-    Returns
-    -------
-    Maps, shape (robots, 2N+1, 2N+1): of half a period, mirrored, where the gait has that symmetry, else of a period.
-    Bounds on the errors of their largest entries, shape (robots,). Both are NaN where the motion is too fast to follow.
-    """
+    """Return maps of the straight walks of robots that share their :func:`shape`, shape (robots, 2N+1, 2N+1): of half a
+    period, mirrored, where the gait has that symmetry, else of a period; and bounds on the errors of their largest
+    entries, shape (robots,). Both are NaN where the motion is too fast to follow."""
     first = robots[0]
     n, half = first.body.modules, first.gait.half_period_symmetric
     widths, upper, decay, frequency = _equations(robots, half)
@@ -74,12 +70,10 @@ def _equations(robots: Sequence[Robot], half: bool) -> tuple[Array, Array, Array
     contacts = [_contacts(robot.gait, n, half) for robot in robots]
     widths = np.stack([each[0] for each in contacts])
     count, moment, sides, square = (np.stack([each[1][k] for each in contacts]) for k in range(4))
-    offset, width, friction, mass, v = np.array(
-        [
-            (r.legs.forward_offset, r.legs.half_width, r.ground.friction, r.module_mass, r.gait.speed)
-            for r in robots
-        ]
-    ).T[..., None, None]  # fmt: skip
+    numbers = [
+        (r.legs.forward_offset, r.legs.half_width, r.ground.friction, r.module_mass, r.gait.speed) for r in robots
+    ]
+    offset, width, friction, mass, v = np.array(numbers).T[..., None, None]
     per_mass = friction / mass
     c, c_x, c_y = per_mass * count, per_mass * (offset * count + moment), per_mass * width * sides
     c_xx = per_mass * ((offset**2 + width**2) * count + 2.0 * offset * moment + square)
@@ -126,8 +120,7 @@ def _decay(widths: Array, upper: Array, speeds: Array) -> Array:
 @lru_cache(maxsize=512)
 def _contacts(gait: Gait, modules: int, half: bool) -> tuple[Array, Array]:
     """Widths of the intervals of a return, s, shape (intervals,); and over the standing feet of every module the sums
-    of 1, of the stroke (m), of 1 to the left and -1 to the right, and of the square of the stroke (m^2), shape
-    (4, intervals, N)."""
+    of 1, of the stroke (m), of 1 left and -1 right, and of the stroke's square (m^2), shape (4, intervals, N)."""
     _, widths, interval = pieces(gait, modules, 0.0, 0.5 * gait.period if half else gait.period)
     schedule = gait.schedule(modules)
     contact, stroke = schedule.contact[interval].astype(np.float64), schedule.stroke[interval]

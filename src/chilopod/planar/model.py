@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,8 +92,7 @@ class PlanarModel(ReadOnlyArrays):
 
     @cached_property
     def orbit(self) -> Array:
-        """The straight walk, shape (2N+1,): every stance foot rests on the floor, so the robot moves at
-        stride/stance."""
+        """The straight walk, shape (2N+1,): stance feet rest on the floor, so the robot moves at stride/stance."""
         state = np.zeros(self.dimension)
         state[0] = self.robot.gait.speed
         return read_only(state)
@@ -143,7 +142,7 @@ class PlanarModel(ReadOnlyArrays):
         if (x == self.orbit).all():
             to_joint, from_joint = joint_rates(self.modules)
             matrix = from_joint.copy()
-            error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
+            error, _ = linear.propagate(*self._linear_pieces(t0, t1), matrix)
             return x, to_joint @ matrix, _ROWS_DIFFER * error
         state, derivative = self._tangents(x, np.eye(self.dimension), t0, t1, self.tolerance)
         sizes = self.scale
@@ -196,8 +195,7 @@ class PlanarModel(ReadOnlyArrays):
         return read_only(np.array(sizes))
 
     def moments(self, interval: NDArray[np.intp]) -> Array:
-        """Contact moments (see :mod:`chilopod.planar.contact`) at the start of intervals of :attr:`schedule`, shape
-        (intervals, N, 8)."""
+        """Contact moments (see :mod:`chilopod.planar.contact`) at the start of intervals, shape (intervals, N, 8)."""
         legs = self.robot.legs
         moments = contact_moments(legs.forward_offset, legs.half_width, self.robot.ground.friction, self.schedule)
         return moments[interval]
@@ -218,12 +216,11 @@ class PlanarModel(ReadOnlyArrays):
         if not models or not all(models[0].can_flow_with(model) for model in models[1:]):
             raise ParameterError("must have the same gait and number of modules", field="models")
         parts = [model._linear_pieces(t0, t1) for model in models]
-        widths = parts[0][0]
+        widths, *_, clock = parts[0]
         upper, decay, frequency = (np.stack([each[part] for each in parts]) for part in (1, 2, 3))
         to_joint, from_joint = joint_rates(models[0].modules)
         matrices = np.tile(from_joint, (len(models), 1, 1))
         errors = np.empty(len(models))
-        clock = models[0]._clock(t0, t1)
         if len(models) <= _FEW:
             for i, matrix in enumerate(matrices):
                 errors[i], _ = linear.propagate(widths, upper[i], decay[i], frequency[i], clock, matrix)
@@ -233,8 +230,7 @@ class PlanarModel(ReadOnlyArrays):
         return to_joint @ matrices, _ROWS_DIFFER * errors
 
     def can_flow_with(self, other: PlanarModel) -> bool:
-        """True if :meth:`flow_many` accepts both robots in one call: they differ in no property but springs and
-        dampers."""
+        """True if :meth:`flow_many` accepts both robots in one call: their gait and number of modules are the same."""
         here, there = self.robot, other.robot
         return self.modules == other.modules and (here.gait is there.gait or here.gait == there.gait)
 
@@ -261,19 +257,11 @@ class PlanarModel(ReadOnlyArrays):
         robot = self.robot
         n, intervals = self.modules, len(self.schedule.times) - 1
         if 3 * intervals * (n + 2) * (2 * n + 1) > _MOST_NUMBERS:
-            problem = (
-                f"the periodic walk takes too many equations: a period has {intervals} intervals of constant contact"
-            )
+            said = f"the periodic walk takes too many equations: a period has {intervals} intervals of constant contact"
             allowed = "fewer modules, or phases with which many legs touch down at once"
-            raise AnalysisError(problem, field="body.modules", value=n, allowed=allowed)
-        passive, joint, rates, decay = _passive_matrices(
-            robot.gait,
-            self.modules,
-            *self.scalars[0, :3].tolist(),
-            robot.legs.forward_offset,
-            robot.legs.half_width,
-            robot.ground.friction,
-        )
+            raise AnalysisError(said, field="body.modules", value=n, allowed=allowed)
+        feet = robot.legs.forward_offset, robot.legs.half_width, robot.ground.friction
+        passive, joint, rates, decay = _passive_matrices(robot.gait, n, *self.scalars[0, :3].tolist(), *feet)
         compliance = rates @ joint
         return (
             passive,
@@ -283,9 +271,9 @@ class PlanarModel(ReadOnlyArrays):
             float(np.sqrt(linear.joint_bound(compliance, self.stiffness))),
         )
 
-    def _linear_pieces(self, t0: float, t1: float) -> tuple[Array, Array, Array, float]:
-        """Widths of the pieces, upper rows of A0, A1, A2 of every piece about its own start, its fastest decay, and the
-        frequency of the springs."""
+    def _linear_pieces(self, t0: float, t1: float) -> tuple[Array, Array, Array, float, float]:
+        """Arguments of :func:`linear.propagate`: widths of the pieces, upper rows of A0, A1, A2 of every piece about
+        its own start, its fastest decay, the frequency of the springs, and the largest time."""
         passive, springs, dampers, decay, frequency = self._linearised
         starts, widths, interval = self._pieces(t0, t1)
         upper = passive[interval]
@@ -303,11 +291,7 @@ class PlanarModel(ReadOnlyArrays):
             walked = f"from {t0:g} s to {t1:g} s: about {steps:.0e} steps of {self.dimension} states"
             allowed = "less stiffness, damping or friction, or more mass, or fewer modules"
             raise AnalysisError(f"motion is too fast to follow {walked}", field="springs, ground", allowed=allowed)
-        return widths, upper, decay, frequency
-
-    def _clock(self, t0: float, t1: float) -> float:
-        """Largest time from which the times between t0 and t1 are computed."""
-        return max(abs(t0), abs(t1), self.period)
+        return widths, upper, decay, frequency, max(abs(t0), abs(t1), self.period)
 
 
 def carry(
@@ -331,15 +315,10 @@ def carry(
     sample[:, :-1] = np.arange(widths.size * (parts.size - 1)).reshape(widths.size, parts.size - 1)
     record = np.empty((widths.size * (parts.size - 1), count, n + 3))
     if count and widths.size:
-        whole, status = np.zeros((count, n + 3)), np.full(count, stretch.WALKING)
+        whole = np.zeros((count, n + 3))
         whole[:, :size] = states
-        times = np.zeros(ends.size), (starts[:, None] + begins).ravel(), (ends - begins).ravel()
-        numbers = np.repeat(interval, parts.size), sample.ravel()
-        pieces = stretch.Pieces(*times, *numbers, first.schedule.contact, first.schedule.stroke)
-        stretch.carry(
-            np.arange(count), pieces, without_commands(models, count), tolerance, whole, np.zeros(count), status, record
-        )
-        if (status != stretch.WALKING).any():
+        times = (starts[:, None] + begins).ravel(), (ends - begins).ravel()
+        if not walk(models, whole, (*times, np.repeat(interval, parts.size), sample.ravel()), tolerance, record):
             raise _diverged(t0, t1)
         states[:] = whole[:, :size]
     return np.moveaxis(record[..., :n].reshape(widths.size, parts.size - 1, count, n), 2, 0)
@@ -362,20 +341,48 @@ def _numbers(model: PlanarModel, interval: NDArray[np.intp]) -> tuple[Array, Arr
     return model.scalars[0].copy(), model.stiffness.copy(), model.damping.copy(), model.moments(interval)
 
 
-def without_commands(models: Sequence[PlanarModel], count: int) -> stretch.Robots:
-    """The models' robots without commands, one for all states or one each."""
+def walk(
+    models: Sequence[PlanarModel], states: Array, pieces: tuple[Any, Any, Any, Any], tolerance: float, record: Array
+) -> bool:
+    """Carry states with poses, of one robot or one each, through pieces of time without commands, in place; False if a
+    motion diverges.
+
+    Pieces have starts, widths, contact intervals and numbers of samples, and the record those, as for
+    :func:`chilopod.planar.stretch.carry`.
+    """
+    count, schedule, robots = len(states), models[0].schedule, [model.robot for model in models]
 
     def each(values: Sequence[ArrayLike]) -> Array:
         return np.repeat(np.array(values), count // len(models), axis=0)
 
-    robots = [model.robot for model in models]
     feet = each([(robot.legs.forward_offset, robot.legs.half_width) for robot in robots])
     friction = each([np.full((models[0].modules, 2), robot.ground.friction) for robot in robots])
     damping = each([model.damping for model in models])
     profile = np.zeros((7, *damping.shape))
     profile[FROM] = profile[GOAL] = each([model.stiffness for model in models])
     none, scalars = np.zeros_like(damping), each([model.scalars[0] for model in models])
-    return stretch.Robots(scalars, feet, damping, friction, profile, none, none, np.zeros((count, 2)), np.inf)
+    alike = stretch.Robots(scalars, feet, damping, friction, profile, none, none, np.zeros((count, 2)), np.inf)
+    when = stretch.Pieces(np.zeros(len(pieces[0])), *pieces, schedule.contact, schedule.stroke)
+    step, status = np.zeros(count), np.full(count, stretch.WALKING)
+    stretch.carry(np.arange(count), when, alike, tolerance, states, step, status, record)
+    return bool((status == stretch.WALKING).all())
+
+
+def states_at(models: Sequence[PlanarModel], states: Array, begin: float, times: Array, tolerance: float) -> Array:
+    """States of walks without commands at rising times from their begin on (s), shape (times, walks, 2N+4), NaN after a
+    walk fails. Models of one gait and size start in ``states`` with poses, shape (walks, 2N+4); the tolerance is that
+    of a step, relative to max(1, |state|)."""
+    starts, widths, interval = models[0]._pieces(begin, float(times[-1]))
+    switches = begin + np.append(0.0, widths.cumsum()[:-1])
+    cuts = np.union1d(switches, times)
+    here, ends = cuts[:-1], cuts[1:]
+    at, sample = np.searchsorted(switches, here, side="right") - 1, np.searchsorted(times, ends)
+    sample[times[np.minimum(sample, times.size - 1)] != ends] = -1
+    record = np.full((times.size, *states.shape), np.nan)
+    record[times == begin] = states
+    parts = starts[at] + here - switches[at], ends - here, interval[at], sample
+    walk(models, states.copy(), parts, tolerance, record)
+    return record
 
 
 @lru_cache(maxsize=32)
@@ -385,16 +392,14 @@ def _passive_matrices(
     length: float,
     mass: float,
     inertia: float,
-    forward_offset: float,
+    offset: float,
     half_width: float,
     friction: float,
 ) -> tuple[Array, Array, Array, Array]:
     """:func:`linear.system_matrices` of one period; a sweep over springs computes them once."""
     schedule = gait.schedule(modules)
-    moments = contact_moments(forward_offset, half_width, friction, schedule)
-    passive, joint, rates, decay = linear.system_matrices(
-        length, mass, inertia, gait.speed, moments, np.diff(schedule.times)
-    )
+    moments, durations = contact_moments(offset, half_width, friction, schedule), np.diff(schedule.times)
+    passive, joint, rates, decay = linear.system_matrices(length, mass, inertia, gait.speed, moments, durations)
     return read_only(passive), read_only(joint), read_only(rates), read_only(decay)
 
 
@@ -402,9 +407,8 @@ def _passive_matrices(
 def joint_rates(modules: int) -> tuple[Array, Array]:
     """Change of coordinates from (vx, vy, w_0 .. w_{N-1}, theta) to (vx, vy, w_0, theta, theta'), and back."""
     n = modules
-    matrix = np.zeros((2 * n + 1, 2 * n + 1))
+    matrix, joints = np.zeros((2 * n + 1, 2 * n + 1)), np.arange(n - 1)
     matrix[:3, :3] = np.eye(3)
-    joints = np.arange(n - 1)
     matrix[3 + joints, n + 2 + joints] = 1.0
     matrix[n + 2 + joints, 3 + joints] = 1.0
     matrix[n + 2 + joints, 2 + joints] = -1.0

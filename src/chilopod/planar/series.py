@@ -1,97 +1,63 @@
 """One term of a matrix Taylor series in vector registers, the innermost loop of the linearised flow.
 
 For matrices of some ten rows a BLAS call costs more than its arithmetic, and the compiler does not keep sums in
-registers across an inner loop over columns. So the product is written out as compiler instructions: four rows times
-two vectors of eight columns stay in registers while the inner index runs; on processors with narrower vectors the
-compiler splits the operations. ``benchmarks/series_term.py`` compares it with plain loops and BLAS.
+registers across an inner loop over columns. So four rows times two vectors of eight columns are variables of their own,
+which stay in registers while the inner index runs; on processors with narrower vectors the compiler splits the
+operations. ``benchmarks/series_term.py`` compares it with plain loops and BLAS.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from numba import types
-from numba.extending import intrinsic
+from chilopod.compiled import njit
+from chilopod.lanes import LANES, as_lanes
 
-from chilopod.numba_internals import cgutils, ir, pointer_to
-
-PANEL = 16
+PANEL = 2 * LANES
 """Number of columns."""
 
 ROWS = 4
 """The number of rows of the matrix must be a multiple of this."""
 
-_LANES = 8
+
+@njit(inline="always")
+def panels(array: Any) -> Any:
+    """View of an array, shape (rows, PANEL), in lanes, shape (rows, 2)."""
+    return as_lanes(array.reshape((len(array), 2, LANES)), LANES)
 
 
-@intrinsic
-def series_term(typing_context: Any, matrix: Any, terms: Any, start: Any, scale: Any, total: Any) -> Any:
+@njit(inline="always")
+def _put(new: Any, total: Any, row: int, left: Any, right: Any) -> None:
+    new[row, 0], new[row, 1] = left, right
+    total[row, 0] += new[row, 0]  # of the rounded number: a product would be fused into the sum
+    total[row, 1] += new[row, 1]
+
+
+@njit(inline="always")
+def series_term(matrix: Any, terms: Any, start: int, scale: float, total: Any) -> None:
     """Compute the next term of a series from the last ones, and add it to the sum.
 
-    ``series_term(matrix, terms, start, scale, total)`` puts ``new = scale * matrix @ terms[start : start +
-    matrix.shape[1]]`` into the rows of ``terms`` just before ``start``, and adds it to ``total``. All arrays are
-    C-contiguous float64: ``matrix`` (r, k) with r a multiple of ROWS, ``terms`` (any number, PANEL), ``total`` (r,
-    PANEL); ``start`` is an int64 of at least r. Nothing is checked.
+    Puts ``new = scale * matrix @ terms[start : start + matrix.shape[1]]`` into the rows of ``terms`` just before
+    ``start``, at least r, and adds it to ``total``: ``matrix`` (r, k) with r a multiple of ROWS, and the
+    :func:`panels` of ``terms`` (any number, PANEL) and ``total`` (r, PANEL). Nothing is checked.
     """
-    signature = types.void(matrix, terms, start, scale, total)
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        a, b, c = (
-            cgutils.create_struct_proxy(kind)(context, builder, value)
-            for kind, value in zip((matrix, terms, total), (args[0], args[1], args[4]), strict=True)
-        )
-        integer, double = ir.IntType(64), ir.DoubleType()
-        vector = ir.VectorType(double, _LANES)
-        vectors = PANEL // _LANES
-        rows, inner = cgutils.unpack_tuple(builder, a.shape, 2)
-        # fmuladd: one instruction where the processor has it, a product and a sum where it has not.
-        fma = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(vector, [vector] * 3), f"llvm.fmuladd.v{_LANES}f64"
-        )
-
-        def constant(value: int) -> Any:
-            return ir.Constant(integer, value)
-
-        def spread(value: Any) -> Any:
-            undefined = ir.Constant(vector, ir.Undefined)
-            lane = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
-            return builder.shuffle_vector(
-                lane, undefined, ir.Constant(ir.VectorType(ir.IntType(32), _LANES), [0] * _LANES)
-            )
-
-        def element(base: Any, row: Any, column: int) -> Any:
-            at = builder.add(builder.mul(row, constant(vectors)), constant(column))
-            return builder.gep(base, [at], source_etype=vector)
-
-        def panel(data: Any, row: Any) -> Any:
-            start = builder.gep(data, [builder.mul(row, constant(PANEL))], source_etype=double)
-            return pointer_to(vector, builder, start)
-
-        def loaded(place: Any, **how: Any) -> Any:
-            return builder.load(place, typ=vector, **how)
-
-        source = panel(b.data, args[2])
-        target = panel(b.data, builder.sub(args[2], rows))
-        summed = panel(c.data, constant(0))
-        factor = spread(args[3])
-        sums = [[cgutils.alloca_once(builder, vector) for _ in range(vectors)] for _ in range(ROWS)]
-        with cgutils.for_range_slice(builder, constant(0), rows, constant(ROWS), inc=True) as (i, _):
-            for slot in (slot for row in sums for slot in row):
-                builder.store(ir.Constant(vector, [0.0] * _LANES), slot)
-            with cgutils.for_range(builder, inner) as loop:
-                columns = [loaded(element(source, loop.index, h), align=8) for h in range(vectors)]
-                for r in range(ROWS):
-                    at = builder.add(builder.mul(builder.add(i, constant(r)), inner), loop.index)
-                    entry = spread(builder.load(builder.gep(a.data, [at], source_etype=double), typ=double))
-                    for h in range(vectors):
-                        builder.store(builder.call(fma, [entry, columns[h], loaded(sums[r][h])]), sums[r][h])
-            for r in range(ROWS):
-                for h in range(vectors):
-                    row = builder.add(i, constant(r))
-                    new = builder.fmul(factor, loaded(sums[r][h]))
-                    builder.store(new, element(target, row, h), align=8)
-                    place = element(summed, row, h)
-                    builder.store(builder.fadd(loaded(place, align=8), new), place, align=8)
-        return context.get_dummy_value()
-
-    return signature, generate
+    rows, inner = matrix.shape
+    last, new = terms[start : start + inner], terms[start - rows : start]
+    for i in range(0, rows, ROWS):
+        a, b, c, d = matrix[i], matrix[i + 1], matrix[i + 2], matrix[i + 3]
+        a_left, b_left, c_left, d_left = 0.0, 0.0, 0.0, 0.0
+        a_right, b_right, c_right, d_right = 0.0, 0.0, 0.0, 0.0
+        for k in range(inner):
+            left, right = last[k, 0], last[k, 1]
+            a_left += a[k] * left
+            b_left += b[k] * left
+            c_left += c[k] * left
+            d_left += d[k] * left
+            a_right += a[k] * right
+            b_right += b[k] * right
+            c_right += c[k] * right
+            d_right += d[k] * right
+        _put(new, total, i, scale * a_left, scale * a_right)
+        _put(new, total, i + 1, scale * b_left, scale * b_right)
+        _put(new, total, i + 2, scale * c_left, scale * c_right)
+        _put(new, total, i + 3, scale * d_left, scale * d_right)

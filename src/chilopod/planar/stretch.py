@@ -1,8 +1,7 @@
 """Compiled loop of a simulation: many robots through one stretch of time without commands.
 
 Robots are integrated in parallel, each in a lane (see :mod:`chilopod.lanes`), with its own steps and its own piece of
-time; when one arrives or fails, the next waiting robot takes its lane. A single robot uses numbers of one lane and has
-the same bits.
+time; when one arrives or fails, the next waiting robot takes its lane. A single robot in one lane has the same bits.
 """
 
 from __future__ import annotations
@@ -111,33 +110,21 @@ def _fit(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: An
     (count, joints), size = robots.lag.shape, pieces.widths.size
     return bool(
         0 < rows.size <= count
-        and size > 0
-        and pieces.begins.size == size
-        and pieces.starts.size == size
-        and pieces.interval.size == size
-        and pieces.sample.size == size
-        and pieces.contact.shape == (len(pieces.contact), joints + 1, 2)
-        and pieces.stroke.shape == pieces.contact.shape
-        and states.shape == (count, 2 * joints + 6)
-        and record.shape[1:] == states.shape
-        and step.size == count
-        and status.size == count
+        and 0 < size == pieces.begins.size == pieces.starts.size == pieces.interval.size == pieces.sample.size
+        and pieces.contact.shape == pieces.stroke.shape == (len(pieces.contact), joints + 1, 2)
+        and record.shape[1:] == states.shape == (count, 2 * joints + 6)
+        and step.size == status.size == count
         and robots.scalars.shape == (count, 4)
-        and robots.feet.shape == (count, 2)
-        and robots.yaw.shape == (count, 2)
-        and robots.damping.shape == (count, joints)
-        and robots.torque.shape == (count, joints)
+        and robots.feet.shape == robots.yaw.shape == (count, 2)
+        and robots.damping.shape == robots.torque.shape == (count, joints)
         and robots.friction.shape == (count, joints + 1, 2)
         and robots.profile.shape == (7, count, joints)
     )
 
 
 def _carrier(width: int) -> Callable[..., bool]:
-    """Return the loop on one thread for a number of lanes.
-
-    It is called as ``carry(rows, pieces, robots, tolerance, states, step, status, record)``, see :func:`carry`, and
-    returns True if the shapes of arrays are consistent; otherwise it does nothing.
-    """
+    """The loop on one thread for a number of lanes, with the arguments of :func:`carry`; it returns True if the shapes
+    of arrays are consistent, otherwise it does nothing."""
 
     @njit
     def carry(
@@ -148,11 +135,11 @@ def _carrier(width: int) -> Callable[..., bool]:
         n, size = pieces.contact.shape[1], states.shape[1]
         joints = n - 1
         lanes = _Lanes(
-            room(size * width).reshape((size, width)),
-            room(4 * width).reshape((4, width)),
-            room(joints * SPRING * width).reshape((joints, SPRING, width)),
-            room(joints * width).reshape((joints, width)),
-            room(n * MOMENTS * width).reshape((n, MOMENTS, width)),
+            room((size, width)),
+            room((4, width)),
+            room((joints, SPRING, width)),
+            room((joints, width)),
+            room((n, MOMENTS, width)),
         )
         x = as_lanes(lanes.x, width)
         args = (
@@ -160,14 +147,14 @@ def _carrier(width: int) -> Callable[..., bool]:
             as_lanes(lanes.springs, width),
             as_lanes(lanes.damping, width),
             as_lanes(lanes.moments, width),
-            as_lanes(room(n * SCRATCH * width).reshape((n, SCRATCH, width)), width),
+            as_lanes(room((n, SCRATCH, width)), width),
         )
         # Rounded up to whole vectors, in which sums are taken whatever the number of lanes.
         vectors = -(-size * width // LANES)
-        wider = room(LANES_WORK * vectors * LANES).reshape((LANES_WORK, vectors, LANES))
+        wider = room((LANES_WORK, vectors, LANES))
         slope = wider.reshape((LANES_WORK, vectors * LANES // width, width))
         slopes, wide = as_lanes(slope, width), as_lanes(wider, LANES)
-        clock = room(3 * width).reshape((3, width))
+        clock = room((3, width))
         clocks = as_lanes(clock, width)
         at = _Places(
             np.full(width, _NOBODY),
@@ -252,16 +239,9 @@ def _begin(lane: int, s: int, begin: float, pieces: Any, robots: Any, lanes: Any
     at.tried[lane], at.rejected[lane] = 0, False
     clock[_TIME, lane], clock[_STEP, lane] = pieces.starts[s] + begin, 0.0
     if s == 0 or pieces.interval[s] != pieces.interval[s - 1]:
-        which = pieces.interval[s]
-        sum_moments(
-            pieces.contact[which],
-            pieces.stroke[which],
-            robots.friction[r],
-            robots.feet[r, 0],
-            robots.feet[r, 1],
-            robots.yaw[r],
-            lanes.moments[:, :, lane],
-        )
+        contact, stroke = pieces.contact[pieces.interval[s]], pieces.stroke[pieces.interval[s]]
+        offset, half_width = robots.feet[r, 0], robots.feet[r, 1]
+        sum_moments(contact, stroke, robots.friction[r], offset, half_width, robots.yaw[r], lanes.moments[:, :, lane])
     middle, zero = pieces.begins[s] + 0.5 * (begin + end), pieces.begins[s] - pieces.starts[s]
     _describe(robots.profile[:, r], robots.lag[r], robots.torque[r], middle, zero, lanes.springs[:, :, lane])
 
@@ -317,8 +297,7 @@ def _describe(profile: Any, lag: Any, torque: Any, now: float, zero: float, spri
         springs[j, ORIGIN] = (profile[SINCE, j] if ramping else profile[UNTIL, j]) - zero
         springs[j, LEVEL] = profile[FROM, j] - profile[RAMP, j] * lag[j] if ramping else profile[GOAL, j]
         springs[j, SLOPE] = profile[RAMP, j] if ramping else 0.0
-        springs[j, BEHIND] = 0.0
-        springs[j, DECAY] = 0.0
+        springs[j, BEHIND], springs[j, DECAY] = 0.0, 0.0
         if lag[j] > 0.0:
             springs[j, BEHIND] = profile[RAMPING, j] if ramping else profile[SETTLING, j]
             springs[j, DECAY] = 1.0 / lag[j]
@@ -334,15 +313,7 @@ walk_abreast = _carrier(LANES)
 
 @parallel_njit
 def walk(
-    groups: int,
-    rows: Any,
-    pieces: Any,
-    robots: Any,
-    tolerance: float,
-    states: Any,
-    step: Any,
-    status: Any,
-    record: Any,
+    groups: int, rows: Any, pieces: Any, robots: Any, tolerance: float, states: Any, step: Any, status: Any, record: Any
 ) -> bool:
     """Run :func:`carry` in groups of robots, one thread for each group; the results depend on neither."""
     if not _fit(rows, pieces, robots, states, step, status, record):

@@ -54,19 +54,16 @@ class Timeline:
         ``rest`` there follows the piece from the last cut to the time, without a sample, unless they are the same.
         """
         # Upper bound on the number of cuts: the switches and samples in between.
-        span = max(until - self.cut, 0.0)
-        intervals = len(self._times) - 1
+        span, intervals = max(until - self.cut, 0.0), len(self._times) - 1
         most = int((span / self._times[-1] + 2.0) * intervals + span * self._rate) + 4
-        pieces = np.empty((3, most))
-        numbers = np.empty((2, most), dtype=np.intp)
+        pieces, numbers = np.empty((3, most)), np.empty((2, most), dtype=np.intp)
         count = _whole_pieces(self._times, self._rate, until + self._moment, self.position, pieces, numbers)
         if rest and not self.is_at_cut(until):
             number, switch, _ = _interval_after(self._times, self.cut, int(self.position[1]))
             pieces[:, count] = self.cut, self.cut - switch, until - self.cut
             numbers[:, count] = number % intervals, -1
             count += 1
-        begins, starts, widths = pieces[:, :count]
-        return begins, starts, widths, numbers[0, :count], numbers[1, :count]
+        return *pieces[:, :count], *numbers[:, :count]
 
     def is_at_cut(self, time: float) -> bool:
         """True if a time to which :meth:`pieces` went is that of the last cut."""
@@ -101,19 +98,15 @@ def _interval_after(times: Any, cut: float, number: int) -> tuple[int, float, fl
 
 @njit
 def _whole_pieces(times: Any, rate: float, latest: float, position: Any, pieces: Any, numbers: Any) -> int:
-    cut, number, sample = position[0], int(position[1]), int(position[2])
-    count = 0
+    cut, number, sample, count = position[0], int(position[1]), int(position[2]), 0
     while True:
         number, switch, end = _interval_after(times, cut, number)
         at = sample / rate if rate > 0.0 else np.inf
         stop = at if at < end - _SAME_INSTANT else end
         if stop > latest:
             break
-        pieces[0, count] = cut
-        pieces[1, count] = cut - switch
-        pieces[2, count] = stop - cut
-        numbers[0, count] = number % (times.size - 1)
-        numbers[1, count] = -1
+        pieces[0, count], pieces[1, count], pieces[2, count] = cut, cut - switch, stop - cut
+        numbers[0, count], numbers[1, count] = number % (times.size - 1), -1
         cut = stop
         # A sample that falls on a switch is taken there.
         while at < cut + _SAME_INSTANT:

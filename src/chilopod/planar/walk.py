@@ -49,10 +49,7 @@ def common(robot: Robot) -> tuple[Any, ...]:
 
 
 def initial_states(
-    robot: Robot,
-    joint_angles: ArrayLike = 0.0,
-    heading: ArrayLike = 0.0,
-    position: ArrayLike = (0.0, 0.0),
+    robot: Robot, joint_angles: ArrayLike = 0.0, heading: ArrayLike = 0.0, position: ArrayLike = (0.0, 0.0)
 ) -> Array:
     """States of robots that are about to walk: at the speed of the straight walk, and at rest in their joints.
 
@@ -134,12 +131,12 @@ class PlanarWalk(BatchWalk):
         self._own_friction = np.array([robot.ground.friction for robot in robots])[:, None, None]
         self._friction = self._own_friction * self._factors
         schedule = self._models[0].schedule
-        self._feet = (schedule.contact, schedule.stroke)
+        self._feet = schedule.contact, schedule.stroke
         self._bodies = (
             np.concatenate([model.scalars for model in self._models]),
             np.array([(robot.legs.forward_offset, robot.legs.half_width) for robot in robots]),
+            np.array([robot.springs.damping for robot in robots]),
         )
-        self._damping = np.array([robot.springs.damping for robot in robots])
         self._timeline = Timeline(schedule, record.rate if record else 0.0)
         self._states, self._step = states, np.zeros(len(robots))
         self._status = np.full(len(robots), stretch.WALKING)
@@ -157,10 +154,8 @@ class PlanarWalk(BatchWalk):
 
     def observe(self) -> Observation:
         states, n = self._seen(), self._modules
-        bearing, distance = bearing_and_distance(
-            states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3], self._targets.present
-        )
-        return self._observation(bearing, distance, states[:, 3 : n + 2])
+        place, heading = states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3]
+        return self._observation(*bearing_and_distance(place, heading, self._targets.present), states[:, 3 : n + 2])
 
     def pose(self) -> Array:
         first, sample = 2 * self._modules + 1, self._sample_ahead()
@@ -195,10 +190,7 @@ class PlanarWalk(BatchWalk):
         friction: ArrayLike | None = None,
         seeds: Sequence[int] | None = None,
     ) -> None:
-        arguments = {
-            "initial": (initial, self._states.shape[1:]),
-            "friction": (friction, self._factors.shape[1:]),
-        }
+        arguments = {"initial": (initial, self._states.shape[1:]), "friction": (friction, self._factors.shape[1:])}
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
         # All robots are at the switch that begins the cycle, however time was rounded: a walk stops for good there.
         self._here = None
@@ -311,28 +303,13 @@ class PlanarWalk(BatchWalk):
         return np.where(gone[:, None], np.nan, states[:, first:])
 
     def _carry(
-        self,
-        pieces: tuple[Any, ...],
-        states: Array,
-        step: Array,
-        status: NDArray[np.intp],
+        self, pieces: tuple[Any, Any, Any, Any, Any], states: Array, step: Array, status: NDArray[np.intp]
     ) -> None:
         """Carry all robots through pieces of time, in place."""
         record, actuators = self._samples.grown(self._timeline.samples if self._record else 0), self._actuators
         rows = np.flatnonzero(status == stretch.WALKING)
         if not rows.size or not len(pieces[0]):
             return
-        scalars, feet = self._bodies
-        robots = stretch.Robots(
-            scalars,
-            feet,
-            self._damping,
-            self._friction,
-            actuators.profile,
-            actuators.lag,
-            actuators.joint_torque,
-            actuators.leg_yaw,
-        )
-        begins, starts, widths, interval, sample = pieces
-        when = stretch.Pieces(begins, starts, widths, interval, sample, *self._feet)
+        commands = actuators.profile, actuators.lag, actuators.joint_torque, actuators.leg_yaw
+        robots, when = stretch.Robots(*self._bodies, self._friction, *commands), stretch.Pieces(*pieces, *self._feet)
         stretch.carry(rows, when, robots, self._tolerance, states, step, status, record)

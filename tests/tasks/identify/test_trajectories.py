@@ -11,7 +11,7 @@ from chilopod.cli import main
 from chilopod.errors import ChilopodError
 from chilopod.netcdf import netcdf
 from chilopod.planar import PlanarModel, initial_states, simulate
-from chilopod.planar.sampled import states_at
+from chilopod.planar.model import states_at
 from chilopod.robot import Robot, load_robot
 from chilopod.tasks.identify import RecordedWalks, identify_recorded, trajectories
 from chilopod.tasks.identify.constants import Estimates, FreeConstants

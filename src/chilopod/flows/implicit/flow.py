@@ -54,30 +54,28 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""
-        return self._run(x, (t0, t1), _STAGES, self.tolerance)[:2]
+        return self._run(x, (t0, t1), _STAGES)[:2]
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         """The same with a bound on the error of every entry of the derivative: a multiple of the larger difference from
         two other computations, of lower order and of smaller steps, from disturbed starts, and round-off."""
-        state, derivative, _ = self._run(x, (t0, t1), _STAGES, self.tolerance)
+        state, derivative, _ = self._run(x, (t0, t1), _STAGES)
         shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
-        lower = self._run(x * (1.0 + shake), (t0, t1), _OTHER_STAGES, self.tolerance)[1]
-        finer = self._run(x * (1.0 - shake), (t0, t1), _STAGES, _FINER * self.tolerance)[1]
+        lower = self._run(x * (1.0 + shake), (t0, t1), _OTHER_STAGES)[1]
+        finer = self._run(x * (1.0 - shake), (t0, t1), _STAGES, _FINER)[1]
         difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
         size = np.abs(derivative)
         return state, derivative, REPEATED * difference + _ROUNDING * (size + size @ size)
 
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""
-        return np.array([self._run(x, (t0, t1), _STAGES, self.tolerance, derived=False)[0] for x in states])
+        return np.array([self._run(x, (t0, t1), _STAGES, derived=False)[0] for x in states])
 
     def flow_volume(self, x: Array, t0: float, t1: float) -> tuple[float, float]:
         """Logarithm of the growth of volume, by Liouville's formula, and a bound on its error."""
         # The step control does not see the divergence of f.
         longest = (t1 - t0) / _VOLUME_STEPS
-        volume, other = (
-            self._run(x, (t0, t1), stages, self.tolerance, longest=longest)[2] for stages in (_STAGES, _OTHER_STAGES)
-        )
+        volume, other = (self._run(x, (t0, t1), each, longest=longest)[2] for each in (_STAGES, _OTHER_STAGES))
         # Equal steps add up their round-off, of every stage.
         return volume, REPEATED * abs(volume - other) + _STAGES * _ROUNDING * abs(volume)
 
@@ -86,11 +84,11 @@ class ImplicitFlow(ReadOnlyArrays):
         x: Array,
         span: tuple[float, float],
         stages: int,
-        tolerance: float,
+        finer: float = 1.0,
         derived: bool = True,
         longest: float = np.inf,
     ) -> tuple[Array, Array, float]:
-        """State and derivative at t1, and the logarithm of the growth of volume."""
+        """State and derivative at t1, and the logarithm of the growth of volume, by a part of the tolerance."""
         from chilopod.flows.implicit import collocation as kernels  # numba takes half a second to import
 
         n, stop = self.tape.dimension, deadline.stop()
@@ -102,18 +100,16 @@ class ImplicitFlow(ReadOnlyArrays):
         if not np.isfinite(x).all():
             raise AnalysisError("the state is not finite", field="rhs")
         units, near = self._coupling(x, 0.5 * sum(span))
-        x = x / units
-        size = n if derived else 0
+        x, size, method = x / units, n if derived else 0, _method(stages)
         derivative, report = np.eye(size), np.zeros(3)
-        method = _method(stages)
         result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), report)
         # Rounding may make steps of the finer computation short.
-        smallest = _SMALL if tolerance >= self.tolerance else 1
+        smallest = _SMALL if finer == 1.0 else 1
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / max(n * stages, smallest) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
             branches = _branches(self.tape, params, np.array([0.5 * (a + b)]))[:, 0].copy()
             limit = min(longest, longest_step(self.fast, float(self.edges[-1]), a, b))
-            control = kernels.Control(a, b, limit, branches, tolerance, budget, units, near, stop)
+            control = kernels.Control(a, b, limit, branches, finer * self.tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, control, result)
             if status:
                 raise failure(status, report[1], _MANY if status == BUDGET else "")
@@ -124,8 +120,7 @@ class ImplicitFlow(ReadOnlyArrays):
         """Units of the states, shape (n,), that balance the jacobian, and the pairs of near states."""
         jacobian = np.abs(evaluate_jacobian(self.tape, t, x, self.params)[1])
         jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)
-        n = x.size
-        links = (jacobian > 0.0) | np.eye(n, dtype=bool)
+        links = (jacobian > 0.0) | np.eye(x.size, dtype=bool)
         return numerical_balance(jacobian), np.linalg.matrix_power(links.astype(np.int64), _NEAREST) > 0
 
 

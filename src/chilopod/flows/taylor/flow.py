@@ -91,14 +91,12 @@ class TaylorFlow:
         the motion does not reach t1: it diverges, slides, chatters, grazes, or takes too many steps.
         """
         n = self.tape.dimension
-        # Copies, because numba would compile again for read-only arrays.
-        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
-        derivative, bound, start = np.eye(n), np.zeros((n, n)) if bounded else _NOTHING, x.copy()
-        steps, _ = self._run(x, (t0, t1), params, derivative, bound)
+        derivative, bound = np.eye(n), np.zeros((n, n)) if bounded else _NOTHING
+        state, steps, _ = self._run(x, (t0, t1), params, derivative, bound)
         if not bounded:
-            return Passage(x, derivative, bound, steps)
+            return Passage(state, derivative, bound, steps)
         other = np.eye(n)
-        self._run(start * self._shaken, (t0, t1), params, other, other=True)
+        self._run(x * self._shaken, (t0, t1), params, other, other=True)
         difference = np.abs(other - derivative)
         # An entry that is zero within round-off gives no information on the others' differences.
         beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))
@@ -106,25 +104,20 @@ class TaylorFlow:
         ratios = np.sort(difference[known] / bound[known])
         usual = float(ratios[ratios.size // 2]) if ratios.size else 0.0
         bound = bound * (1.0 + _COMMON * usual) + REPEATED * difference
-        return Passage(x, derivative, bound, steps)
+        return Passage(state, derivative, bound, steps)
 
     def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
         """State at t1, and the derivative by ``x`` times ``directions``, shape (n, any number), without a matrix."""
-        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         images = np.array(directions, dtype=np.float64, order="C")
-        self._run(x, (t0, t1), params, images, stepwise=False)
-        return x, images
+        return self._run(x, (t0, t1), params, images, stepwise=False)[0], images
 
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
         """Carry many states, shape (states, n)."""
-        states, params = np.array(states, dtype=np.float64, order="C"), np.array(params, dtype=np.float64)
-        self._run(states, (t0, t1), params, np.empty((self.tape.dimension, 0)))
-        return states
+        return self._run(states, (t0, t1), params, np.empty((self.tape.dimension, 0)))[0]
 
     def events(self, x: Array, t0: float, t1: float, params: Array) -> Array:
         """Numbers of passages of the switches and events that depend on states, on the way of a state."""
-        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
-        met = self._run(x, (t0, t1), params, np.empty((self.tape.dimension, 0)))[1]
+        met = self._run(x, (t0, t1), params, np.empty((self.tape.dimension, 0)))[2]
         return np.asarray(met[self.tape.program[4, self.tape.switches[1]] != 0])
 
     def _run(
@@ -137,11 +130,13 @@ class TaylorFlow:
         *,
         other: bool = False,
         stepwise: bool = True,
-    ) -> tuple[int, Array]:
-        """Carry states in place, several without derivatives, by the second way if ``other``; steps and passages."""
+    ) -> tuple[Array, int, Array]:
+        """States at the end, several without derivatives, by the second way if ``other``; steps and passages."""
         from chilopod.flows.taylor import stepping as kernels  # numba takes half a second to import
 
         n, stop = self.tape.dimension, deadline.stop()
+        # Copies, because numba would compile again for read-only arrays.
+        x, params = np.array(x, dtype=np.float64, order="C"), np.array(params, dtype=np.float64)
         several = x.ndim == 2 and derivative.shape == (n, 0)
         fits = x.shape[several:] == derivative.shape[:1] == (n,)
         if not (fits and params.shape == (self.tape.parameters,)):
@@ -168,7 +163,7 @@ class TaylorFlow:
                 for each, first in begin:
                     each[...] = first
             steps += taken
-        return steps, outcome.met
+        return x, steps, outcome.met
 
     def _cause(self, t: float, states: Array, params: Array, span: tuple[float, float]) -> str:
         """The function without a finite series in one of some states; empty if none stands out."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from chilopod.compiled import fused_njit
+from chilopod.compiled import assign, fused_njit
 
 BLOCK = 64
 """Number of steps in a block."""
@@ -71,11 +71,3 @@ def absorb(product: Product, count: int) -> None:
         after = after @ product.factors[s]
     assign(bound, np.abs(before[count]) @ bound + fresh @ np.abs(total))
     assign(total, before[count] @ total)
-
-
-@fused_njit(error_model="numpy")
-def assign(matrix: Any, values: Any) -> None:
-    """Write values into a matrix: ``matrix[:] = values`` takes seconds to compile."""
-    for i in range(matrix.shape[0]):
-        for j in range(matrix.shape[1]):
-            matrix[i, j] = values[i, j]

@@ -23,10 +23,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from chilopod.compiled import fused_njit
+from chilopod.compiled import assign, fused_njit
 from chilopod.flows.carrying import BUDGET, CHATTERS, DONE, GRAZES, NOT_FINITE, SHORT, STALLED, TIME_OVER
 from chilopod.flows.taylor.crossing import first_crossing
-from chilopod.flows.taylor.product import BLOCK, ROUNDING, Product, absorb, assign, bound_error, multiply
+from chilopod.flows.taylor.product import BLOCK, ROUNDING, Product, absorb, bound_error, multiply
 from chilopod.flows.taylor.step_length import agrees, step_size
 from chilopod.flows.taylor.switching import Motion, await_events, cross, enlarge_scales, settle, start
 from chilopod.flows.tracing.series import expand, loaded

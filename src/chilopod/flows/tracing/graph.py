@@ -77,6 +77,14 @@ class Graph:
             self.depends.append(LEAVES[code] if code in LEAVES else max(self.depends[i] for i in operands))
         return self._known[node]
 
+    def _weighted(self, code: int, operands: tuple[int, ...], weight: Callable[[int], int]) -> int:
+        """The node of a function, and its w."""
+        node = self._new(code, operands)
+        if node not in self.weights:
+            self.weights[node] = -1  # w may depend on the node itself
+            self.weights[node] = weight(node)
+        return node
+
     def number(self, value: float) -> int:
         """The node of a number."""
         # The bits, because NaN does not equal itself and 0.0 equals -0.0.
@@ -171,10 +179,10 @@ class Graph:
         """The derivative of some order of u / (exp(u) - 1)."""
         if (value := self.value(a)) is not None:
             return self.number(bernoulli(value, order))
-        node = self._new(ops.BERNOULLI, (a, self.number(float(order))))
-        if node not in self.weights:
-            self.weights[node] = self.number(0.0) if order == HIGHEST else self.bernoulli(a, order + 1)
-        return node
+        operands = a, self.number(float(order))
+        if order == HIGHEST:
+            return self._weighted(ops.BERNOULLI, operands, lambda _: self.number(0.0))
+        return self._weighted(ops.BERNOULLI, operands, lambda _: self.bernoulli(a, order + 1))
 
     def _smooth_quotient(self, a: int, b: int) -> int | None:
         """a / b as a multiple of the Bernoulli function, if b is c (exp(u) - 1) and a a multiple of u; else None."""
@@ -276,11 +284,7 @@ class Graph:
         va, ve = self.value(a), self.value(exponent)
         if va is not None and ve is not None and va > 0:
             return self.number(va**ve)
-        node = self._new(ops.POWER, (a, exponent))
-        if node not in self.weights:
-            self.weights[node] = -1
-            self.weights[node] = self.multiply(exponent, self.divide(node, a))
-        return node
+        return self._weighted(ops.POWER, (a, exponent), lambda node: self.multiply(exponent, self.divide(node, a)))
 
     def function(self, code: int, a: int) -> int:
         """A function of one node."""
@@ -290,11 +294,7 @@ class Graph:
                 return self.number(FUNCTIONS[code].value(value))
             except (ValueError, OverflowError):
                 return self.number(math.nan)
-        node = self._new(code, (a,))
-        if node not in self.weights:
-            self.weights[node] = -1  # w may depend on the node itself
-            self.weights[node] = FUNCTIONS[code].weight(self, a, node)
-        return node
+        return self._weighted(code, (a,), lambda node: FUNCTIONS[code].weight(self, a, node))
 
     def step(self, a: int) -> int:
         """The sign of a node: 1 or -1."""

@@ -54,8 +54,7 @@ class Tape(NamedTuple):
     # function, and for guards the number of the event, else the node of the switch
     switches: Integers
     resets: Integers  # nodes of the resets, shape (events, n)
-    # functions of time alone beyond polynomials in t, cos(a t), sin(a t): these may have pulses that a Taylor series
-    # misses
+    # functions of time alone beyond polynomials in t, cos(a t), sin(a t): these may have pulses that a series misses
     clocks: Integers
 
     @property

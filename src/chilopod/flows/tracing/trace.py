@@ -29,7 +29,7 @@ from chilopod.flows.arguments import as_real
 from chilopod.flows.tracing.graph import Graph, NeedsValues
 from chilopod.flows.tracing.ordering import ordered
 from chilopod.flows.tracing.tape import FLOOR, GUARD, Integers, Tape
-from chilopod.flows.tracing.traced import Traced, Untraceable, as_traced, node_of, stand_in, states
+from chilopod.flows.tracing.traced import Traced, Untraceable, as_traced, node_of, stand_in
 from chilopod.frozen import Array
 
 _MOST_NODES = 200_000
@@ -138,8 +138,9 @@ def _recorded(
 
 def _results(graph: Graph, args: tuple[Any, ...], function: Any, count: int | None) -> list[int]:
     """Nodes of the results of a rebuilt function; a ``count`` of None means one number."""
+    states = as_traced([Traced(graph, node) for node in graph.states])
     with np.errstate(all="ignore"):
-        array = as_traced(function(Traced(graph, graph.time), states(graph), *args))
+        array = as_traced(function(Traced(graph, graph.time), states, *args))
     if count is not None and array.shape != (count,):
         raise Untraceable(f"returns the shape {array.shape}")
     if count is None and array.size != 1:
@@ -177,7 +178,7 @@ def _compare(
     tape: Tape, params: Array, function: Callable[..., Array], nodes: Integers, places: list[tuple[float, Array]]
 ) -> None:
     """Untraceable if nodes have other values than a function of time and state."""
-    pairs, defined = [], []
+    found = []
     for t, x in places:
         try:
             with np.errstate(all="ignore"):
@@ -187,22 +188,21 @@ def _compare(
         own = evaluate(tape, nodes, t, x, params)
         beside = x * (1 + _NEAR * np.cos(np.arange(x.size)))
         near = evaluate(tape, nodes, t * (1 + _NEAR), beside, params * (1 - _NEAR))
-        pairs.append((real, own, np.abs(near - own)))
-        defined.append((t, x))
-    if not pairs:
+        found.append((t, x, real, own, np.abs(near - own)))
+    if not found:
         raise Untraceable("it could not be evaluated at any state that was tried")
-    real, own, rounding = (np.array(part) for part in zip(*pairs, strict=True))
+    times, states, *values = zip(*found, strict=True)
+    real, own, rounding = map(np.array, values)
     if real.shape != own.shape:
         raise Untraceable(f"returns the shape {real.shape[1:]}")
     both = np.isfinite(real) & np.isfinite(own)
     size_of = np.abs(np.where(both, real, 0.0)).max(axis=0)
     # The order of sums differs, which matters where the function is sensitive to it, as sin of large numbers.
     allowed = _AGREES * size_of + np.where(both, rounding, 0.0)
-    if (np.abs(np.where(both, real - own, 0.0)) > allowed).any() or (
-        np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
-    ).any():
+    lost = np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
+    if lost.any() or (np.abs(np.where(both, real - own, 0.0)) > allowed).any():
         with np.errstate(all="ignore"):
-            again = np.array([function(t, x) for t, x in defined])
+            again = np.array([*map(function, times, states)])
         if np.array_equal(again, real, equal_nan=True):
             raise Untraceable("it uses an operation that is recorded with other values than numpy's")
         raise Untraceable("it gives other values when called again: it has memory or random numbers")

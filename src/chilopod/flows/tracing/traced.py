@@ -1,11 +1,11 @@
 """Numbers and arrays that record operations, and versions of numpy, math and builtins for them.
 
 A function that is called with a :class:`Traced` number, or a :class:`TracedArray` of these and plain numbers, records
-its operations in a :class:`chilopod.flows.tracing.graph.Graph`. Numpy hands its ufuncs to ``_apply``, which applies
-those of ``SCALAR`` entry by entry, and its other functions to ``_call``, which uses the version in ``REPLACED``, or
-else the function itself on an array of objects. Functions that never ask their arguments, as ``np.array`` and those of
-math, have stand-ins (:func:`stand_in`), to be put into the globals of the function. A use of the value of a traced
-number (a branch, an index, a foreign library) raises :class:`Untraceable`.
+its operations in a :class:`chilopod.flows.tracing.graph.Graph`: numpy asks both for its functions, of which the ufuncs
+of ``SCALAR`` are applied entry by entry, those in ``REPLACED`` have their own version, and the others work on arrays of
+objects. Functions that never ask their arguments, as ``np.array`` and those of math, have stand-ins (:func:`stand_in`),
+to be put into the globals of the function. A use of the value of a traced number (a branch, an index, a foreign
+library) raises :class:`Untraceable`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.graph import BUILDS, Graph
@@ -31,10 +30,37 @@ class _Recording:
     __slots__ = ()
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        return _apply(ufunc, method, inputs, options)
+        out = options.pop("out", None)
+        options = {key: value for key, value in options.items() if key not in ("dtype", "casting", "subok", "order")}
+        if options.pop("where", True) is not True:
+            raise Untraceable(f"it calls numpy.{ufunc.__name__} with where=")
+        if out is not None and isinstance(out[0], Traced):
+            out = None  # as in x += 1: the name now refers to another number
+        operands = [plain(value if isinstance(value, np.ndarray) else as_traced(value)) for value in inputs]
+        if ufunc is np.matmul and method == "__call__":
+            result = np.matmul(*operands)
+        elif ufunc.__name__ not in SCALAR:
+            raise Untraceable(f"it calls numpy.{ufunc.__name__}")
+        else:
+            result = getattr(_ENTRY_BY_ENTRY[ufunc.__name__], method)(*operands, **options)
+        if out is not None:
+            if not isinstance(out[0], TracedArray):
+                raise Untraceable("it writes into an array of plain numbers")
+            plain(out[0])[...] = result
+            return out[0]
+        return wrapped(result)
 
     def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
-        return _call(function, args, options)
+        if function in REPLACED:
+            return REPLACED[function](*args, **options)
+
+        def bare(value: Any) -> Any:
+            if isinstance(value, tuple | list):
+                return type(value)(bare(part) for part in value)
+            return plain(as_traced(value)) if isinstance(value, Traced) else plain(value)
+
+        result = function(*bare(args), **{key: bare(value) for key, value in options.items()})
+        return type(result)(wrapped(part) for part in result) if isinstance(result, tuple | list) else wrapped(result)
 
 
 class Traced(_Recording, np.lib.mixins.NDArrayOperatorsMixin):
@@ -122,10 +148,7 @@ class TracedArray(_Recording, np.ndarray[Any, np.dtype[Any]]):
     def astype(self, *_: Any, **__: Any) -> Any:
         return self.copy()
 
-    max = _replaced("max")
-    min = _replaced("min")
-    mean = _replaced("mean")
-    clip = _replaced("clip")
+    max, min, mean, clip = map(_replaced, ("max", "min", "mean", "clip"))
 
 
 def as_traced(value: Any) -> Any:
@@ -145,47 +168,6 @@ def wrapped(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype == object:
         return value.view(TracedArray) if value.ndim else value[()]
     return value
-
-
-def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[str, Any]) -> Any:
-    out = options.pop("out", None)
-    options = {key: value for key, value in options.items() if key not in ("dtype", "casting", "subok", "order")}
-    if options.pop("where", True) is not True:
-        raise Untraceable(f"it calls numpy.{ufunc.__name__} with where=")
-    if out is not None and isinstance(out[0], Traced):
-        out = None  # as in x += 1: the name now refers to another number
-    operands = [plain(value if isinstance(value, np.ndarray) else as_traced(value)) for value in inputs]
-    if ufunc is np.matmul and method == "__call__":
-        result = np.matmul(*operands)
-    elif ufunc.__name__ not in SCALAR:
-        raise Untraceable(f"it calls numpy.{ufunc.__name__}")
-    else:
-        result = getattr(_ENTRY_BY_ENTRY[ufunc.__name__], method)(*operands, **options)
-    if out is not None:
-        if not isinstance(out[0], TracedArray):
-            raise Untraceable("it writes into an array of plain numbers")
-        plain(out[0])[...] = result
-        return out[0]
-    return wrapped(result)
-
-
-def _call(function: Any, args: tuple[Any, ...], options: dict[str, Any]) -> Any:
-    own = REPLACED.get(function)
-    if own is not None:
-        return own(*args, **options)
-
-    def bare(value: Any) -> Any:
-        if isinstance(value, tuple | list):
-            return type(value)(bare(part) for part in value)
-        return plain(as_traced(value)) if isinstance(value, Traced) else plain(value)
-
-    result = function(*bare(args), **{key: bare(value) for key, value in options.items()})
-    return type(result)(wrapped(part) for part in result) if isinstance(result, tuple | list) else wrapped(result)
-
-
-def states(graph: Graph) -> NDArray[Any]:
-    """The states of a graph as an array."""
-    return as_traced([Traced(graph, node) for node in graph.states])
 
 
 def _where(condition: Any, above: Any, below: Any) -> Any:
@@ -329,14 +311,10 @@ REPLACED: dict[Any, Callable[..., Any]] = {
     np.real: lambda value: value,
     np.imag: lambda value: np.zeros(np.shape(value)),
     np.mean: _mean,
-    np.max: _extreme(np.maximum),
-    np.amax: _extreme(np.maximum),
-    np.min: _extreme(np.minimum),
-    np.amin: _extreme(np.minimum),
-    np.zeros_like: _blank(np.zeros_like),
-    np.ones_like: _blank(np.ones_like),
+    **dict.fromkeys((np.max, np.amax), _extreme(np.maximum)),
+    **dict.fromkeys((np.min, np.amin), _extreme(np.minimum)),
+    **{each: _blank(each) for each in (np.zeros_like, np.ones_like, np.full_like)},
     np.empty_like: _blank(np.zeros_like),
-    np.full_like: _blank(np.full_like),
     np.iscomplexobj: lambda value: False,
     np.isrealobj: lambda value: True,
     np.dot: lambda a, b: wrapped(np.dot(plain(as_traced(a)), plain(as_traced(b)))),
@@ -344,34 +322,10 @@ REPLACED: dict[Any, Callable[..., Any]] = {
 """Functions of numpy with a separate version for traced arrays."""
 
 _SAME_NAME = (
-    *("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "expm1", "log1p", "log2", "log10", "exp2"),
-    *("asin", "acos", "atan", "atan2", "pow", "fabs", "cbrt", "floor", "ceil", "trunc", "hypot", "copysign"),
-    *("radians", "degrees"),
+    "sin cos tan sinh cosh tanh exp log sqrt expm1 log1p log2 log10 exp2 asin acos atan atan2 pow fabs cbrt floor ceil "
+    "trunc hypot copysign radians degrees"
 )
 """Functions with the same name in math and numpy."""
-
-
-def _instead() -> dict[int, Any]:
-    """Stand-ins, by identity, for functions that do not accept traced numbers."""
-    pairs: list[tuple[Any, Any]] = [
-        (np.array, _array),
-        (np.asarray, lambda value, *a, **o: value if isinstance(value, TracedArray) else _array(value, *a, **o)),
-        (np.ascontiguousarray, lambda value, *a, **o: _array(value)),
-        (np.zeros, _blank(np.zeros)),
-        (np.empty, _blank(np.zeros)),
-        (np.ones, _blank(np.ones)),
-        (np.full, _blank(np.full)),
-        (np.eye, lambda *a, **o: as_traced(np.eye(*a, **o))),
-        (np.identity, lambda *a, **o: as_traced(np.identity(*a, **o))),
-        (np.float64, _float64),
-        (builtins.float, _float),
-        (builtins.max, _most(builtins.max, np.maximum)),
-        (builtins.min, _most(builtins.min, np.minimum)),
-        (math.fsum, lambda values: sum(values)),
-        (math.fmod, lambda a, b: a - b * np.trunc(a / b)),
-    ]
-    pairs += [(getattr(math, name), getattr(np, name)) for name in _SAME_NAME]
-    return {id(real): own for real, own in [*REPLACED.items(), *pairs]}
 
 
 def _most(plain: Callable[..., Any], ufunc: np.ufunc) -> Callable[..., Any]:
@@ -382,6 +336,31 @@ def _most(plain: Callable[..., Any], ufunc: np.ufunc) -> Callable[..., Any]:
     return most
 
 
+_INSTEAD: dict[int, Any] = {
+    id(real): own
+    for real, own in [
+        *REPLACED.items(),
+        (np.array, _array),
+        (np.asarray, lambda value, *a, **o: value if isinstance(value, TracedArray) else _array(value, *a, **o)),
+        (np.ascontiguousarray, lambda value, *a, **o: _array(value)),
+        *((each, _blank(each)) for each in (np.zeros, np.ones, np.full)),
+        (np.empty, _blank(np.zeros)),
+        (np.eye, lambda *a, **o: as_traced(np.eye(*a, **o))),
+        (np.identity, lambda *a, **o: as_traced(np.identity(*a, **o))),
+        (np.float64, _float64),
+        (builtins.float, _float),
+        (builtins.max, _most(builtins.max, np.maximum)),
+        (builtins.min, _most(builtins.min, np.minimum)),
+        (math.fsum, lambda values: sum(values)),
+        (math.fmod, lambda a, b: a - b * np.trunc(a / b)),
+        *((getattr(math, name), getattr(np, name)) for name in _SAME_NAME.split()),
+    ]
+}
+"""Stand-ins, by identity, for functions that do not accept traced numbers."""
+
+_MODULES = {"numpy", "math", "numpy.linalg"}
+
+
 class Module:
     """A module with functions for traced numbers."""
 
@@ -390,10 +369,6 @@ class Module:
 
     def __getattr__(self, name: str) -> Any:
         return stand_in(getattr(self._module, name))
-
-
-_INSTEAD = _instead()
-_MODULES = {"numpy", "math", "numpy.linalg"}
 
 
 def stand_in(value: Any) -> Any:

@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 from chilopod.frozen import Array
 from chilopod.notebook import axes_for
 from chilopod.planar import PlanarModel, initial_states
-from chilopod.planar.sampled import states_at
+from chilopod.planar.model import states_at
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.constants import CONFIDENCE, Estimates, FreeConstants, Identified
