@@ -71,8 +71,6 @@ def curved_walks(
         the curve, over orbit (SI units) and parameter (over the width of the interval).
     side
         +1: positive joint angles, a right turn; -1: the mirror image.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
 
     Returns
     -------
@@ -87,12 +85,7 @@ def curved_walks(
 
     Attributes hold the state for :func:`resumed`, and for the pitchfork its ``criticality`` by the normal form, its
     ``coefficient`` (1/rad^2), the ``direction`` in which the branch leaves it, and ``direction_confirms``, True if that
-    agrees with the verdict.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no pitchfork in the interval.
+    agrees with the verdict. AnalysisError if there is no pitchfork in the interval.
     """
     found = bifurcations(robot, parameter, between)
     forks = [each for each in found if each.point.kind is Kind.PITCHFORK]
@@ -128,7 +121,8 @@ def resumed(
     side: int | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Continue a branch from its end.
+    """Continue a branch from its end; the new points are equal to those of a single run. ParameterError if the branch
+    belongs to another robot, parameter or side, or has left the interval.
 
     Parameters
     ----------
@@ -139,15 +133,6 @@ def resumed(
         does not matter.
     between, points, longest, progress
         As for :func:`curved_walks`; the interval is by default that of the branch.
-
-    Returns
-    -------
-    Dataset with the new points at its end, equal to those of a single run.
-
-    Raises
-    ------
-    ParameterError
-        If the branch belongs to another robot, parameter or side, or has left the interval.
     """
     saved = Robot(**tomllib.loads(data.attrs["robot_toml"]))
     if data.attrs["varied"] != parameter:
@@ -178,13 +163,8 @@ def resumed(
 
 
 def read_walks(path: str | Path) -> xr.Dataset:
-    """Read a branch from its netCDF file.
-
-    Raises
-    ------
-    ParameterError
-        If the file is missing, damaged or edited, or written by another version.
-    """
+    """Read a branch from its netCDF file; ParameterError if that is missing, damaged or edited, or written by another
+    version."""
     path = Path(path)
     try:
         data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")

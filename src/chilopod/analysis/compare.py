@@ -162,8 +162,6 @@ def compare(
         Seed of the 64 orders that are sampled for ten or more differences.
     remark
         Function that receives a sentence if a quantity will take long.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
     """
     for robot in (first, second):
         try:

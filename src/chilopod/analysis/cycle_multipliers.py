@@ -64,12 +64,8 @@ def walk_multipliers(
     straight walk has given way if, at the end, a yaw joint bends in the mean over a cycle by more than ``amplitude``
     and by more than any of them swings within the cycle; the multipliers are then those of the walk that follows.
 
-    Raises
-    ------
-    ParameterError
-        If the engine has no cycle map, or that has none of this robot, see :func:`chilopod.twin.walk_cycle`.
-    AnalysisError
-        If the walk falls.
+    ParameterError if the engine has no cycle map, or that has none of this robot, see
+    :func:`chilopod.twin.walk_cycle`; AnalysisError if the walk falls.
     """
     known: Any = engine_named(engine) if isinstance(engine, str) else engine
     if not hasattr(known, "walk_cycle"):
@@ -85,6 +81,9 @@ def cycle_multipliers(
 ) -> CycleMultipliers:
     """Leading multipliers of any periodic gait in MuJoCo, near the motion that settles from a start.
 
+    ParameterError if an argument is none of these; AnalysisError if the walk falls before multipliers of smallest bends
+    are known, moves on in a coordinate in every cycle, or depends on its place.
+
     Parameters
     ----------
     name, cycle, start
@@ -92,14 +91,6 @@ def cycle_multipliers(
     bends, amplitude, cycles
         Names of the coordinates by which modes are scaled and named, size of finite bends in their unit, and the
         number of cycles that they are followed, at least 12.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is none of these.
-    AnalysisError
-        If the walk falls before multipliers of smallest bends are known, moves on in a coordinate in every cycle, or
-        depends on its place.
     """
     return _found(name, cycle, start, bends, amplitude, cycles, straight=False)
 

@@ -71,15 +71,8 @@ class Growth(ReadOnlyArrays):
 
 
 def growth_rates(robots: Iterable[Robot | ChilopodError], count: int, progress: Progress = silent) -> Growth:
-    """Growth of the leading disturbance of every robot, in batches on all cores.
-
-    Parameters
-    ----------
-    robots, count
-        Robots, or the error that says why there is none; and their number. They are taken as they are needed.
-    progress
-        Function that receives the progress.
-    """
+    """Growth of the leading disturbance of every robot, in batches on all cores. Robots, or the error that says why
+    there is none, are taken as they are needed; ``count`` is their number."""
     found: list[Array] = []
     given, waiting = iter(robots), deque[Future[Array]]()
     batches = iter(lambda: list(itertools.islice(given, _BATCH)), [])

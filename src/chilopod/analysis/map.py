@@ -61,12 +61,12 @@ def map(
 
     A coarse grid of growth rates is refined where neighbours differ in what becomes of a disturbance. Where they differ
     in the number of unstable multipliers, the bifurcation between them is located, and continued as a curve through the
-    plane; cells on curves are refined, and the search repeats until every difference is on a curve.
+    plane; cells on curves are refined, and the search repeats until every difference is on a curve. ParameterError if
+    an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if the map
+    would take too long.
 
     Parameters
     ----------
-    robot
-        Robot.
     x, y
         Path of a number, such as ``legs.forward_offset``, ``springs.stiffness[0]`` or, for a group,
         ``springs.stiffness[1:]``; or ``speed``, at the same stride and duty factor, or ``modules``, of the same length
@@ -83,14 +83,6 @@ def map(
         True if that file may be replaced although it is damaged or belongs to another map.
     remark
         Function that receives a sentence if the map will take long.
-    progress
-        Function that receives the progress.
-
-    Raises
-    ------
-    ParameterError
-        If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if the
-        map would take too long.
     """
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:

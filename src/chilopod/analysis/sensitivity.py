@@ -154,7 +154,8 @@ def sensitivity(
     paths: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> Sensitivity:
-    """Derivatives of quantities with respect to numbers of a robot.
+    """Derivatives of quantities with respect to numbers of a robot. AnalysisError if a quantity does not exist, as the
+    radius of a robot that walks straight; ParameterError if a quantity or a number is not known.
 
     Parameters
     ----------
@@ -165,15 +166,6 @@ def sensitivity(
         radius a branch of curved walks.
     paths
         Numbers, by default all that the planar model reads.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
-
-    Raises
-    ------
-    AnalysisError
-        If a quantity does not exist, as the radius of a robot that walks straight.
-    ParameterError
-        If a quantity or a number is not known.
     """
     wanted = known_names(quantities, QUANTITIES, "quantities")
     robot = onset.there(robot)

@@ -183,13 +183,8 @@ class WalkBifurcation(Summary, ReadOnlyArrays):
 
 
 def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
-    """Floquet analysis of the straight walk in the planar model.
-
-    Raises
-    ------
-    AnalysisError
-        If the expected time exceeds ``longest`` (s), as for a hundred modules or very light ones.
-    """
+    """Floquet analysis of the straight walk in the planar model; AnalysisError if the expected time exceeds ``longest``
+    (s), as for a hundred modules or very light ones."""
     model = PlanarModel(robot)
     # The period is cut into parts that contract by a factor of 1e6 at most, and matrices of this size are split along
     # them: this estimates the time within a factor of two on a present desktop.
@@ -217,13 +212,8 @@ def _duration(seconds: float) -> str:
 
 
 def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
-    """The planar model as a function of one parameter in SI units.
-
-    Raises
-    ------
-    ParameterError
-        If the parameter does not vary continuously, or the planar model does not read it.
-    """
+    """The planar model as a function of one parameter in SI units; ParameterError if that does not vary continuously,
+    or the planar model does not read it."""
     check_parameter(robot, parameter)
     # Where the symmetry of the gait itself changes, only the full period means the same on both sides.
     symmetric = parameter != "gait.side_phase"
@@ -238,7 +228,8 @@ def bifurcations(
     remark: Callable[[str], None] = lambda sentence: None,
     seconds: float = math.inf,
 ) -> list[WalkBifurcation]:
-    """Every bifurcation of the straight walk in an interval of a parameter.
+    """Every bifurcation of the straight walk in an interval of a parameter, by rising parameter; none if stability does
+    not change.
 
     Parameters
     ----------
@@ -253,10 +244,6 @@ def bifurcations(
     seconds
         Time after which the search ends with the points found so far; motion far from a robot's scales may be slow to
         follow.
-
-    Returns
-    -------
-    Points by rising parameter; empty if stability does not change.
     """
     make = family(robot, parameter)
     unit = robot.unit_of(parameter)
@@ -285,11 +272,8 @@ def first_loss(
     """Bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down; None is
     the interval of :func:`chilopod.analysis.parameters.searched_springs`.
 
-    Raises
-    ------
-    AnalysisError
-        If there is no bifurcation, it is of another kind (None is any kind), or the straight walk at ``between[1]`` is
-        not known to be stable.
+    AnalysisError if there is no bifurcation, it is of another kind (None is any kind), or the straight walk at
+    ``between[1]`` is not known to be stable.
     """
     what, between = "loss of stability" if kind is None else kind.label, between or searched_springs(robot)
     spaced = np.geomspace if between[0] > 0.0 else np.linspace

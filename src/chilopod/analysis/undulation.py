@@ -41,12 +41,13 @@ _LONGEST = 100_000  # periods until all have settled
 def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progress: Progress = silent) -> xr.Dataset:
     """Amplitude and frequency of the settled undulation below the Neimark-Sacker point of uniform springs.
 
+    AnalysisError if there is no Neimark-Sacker point, if it is not supercritical, so that no small undulation exists,
+    or if a motion diverges; ParameterError if a distance is not between 0 and 1.
+
     Parameters
     ----------
     robot, distances
         Robot, whose springs do not matter; 1 - k/k* of the springs, each above 0 and below 1.
-    progress
-        Function that receives the progress.
 
     Returns
     -------
@@ -55,14 +56,6 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     ``predicted_amplitude`` and ``predicted_frequency``; ``linear_frequency``, that of a small undulation;
     ``largest_angle`` of any joint (rad); and ``swing`` over (distance, joint), the measured share of every joint at
     the second frequency (rad). ``component`` over joint has unit norm. The point is in the attributes.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no Neimark-Sacker point, if it is not supercritical, so that no small undulation exists, or if a
-        motion diverges.
-    ParameterError
-        If a distance is not between 0 and 1.
     """
     for distance in distances:
         if not 0.0 < distance < 1.0:

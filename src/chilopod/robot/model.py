@@ -63,7 +63,8 @@ def _provenance(table: object) -> Table:
 
 
 class Robot(Description):
-    """A many-legged robot with a flexible body axis, its gait and its floor.
+    """A many-legged robot with a flexible body axis, its gait and its floor; UnitError or ParameterError names the
+    first field that is wrong.
 
     Attributes
     ----------
@@ -75,11 +76,6 @@ class Robot(Description):
         Constants that only the three-dimensional model reads; None for a robot of the planar model alone.
     provenance
         Origin of the numbers: text by dotted path.
-
-    Raises
-    ------
-    UnitError, ParameterError
-        On construction, naming the first field that is wrong.
     """
 
     name: Annotated[str, PlainValidator(_name)]

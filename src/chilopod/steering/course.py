@@ -34,6 +34,7 @@ _DIGITS = 9  # decimal places of a distance, so that rounding does not exclude 0
 @dataclass(frozen=True)
 class Goal:
     """Target of a course: a position on the floor, or relative to the robot at the time the target is set.
+    ParameterError if it is too far, or is relative and within the arrival radius.
 
     Attributes
     ----------
@@ -42,11 +43,6 @@ class Goal:
         left.
     relative
         True if the position is relative to module 1 at the end of the goal before.
-
-    Raises
-    ------
-    ParameterError
-        If the target is too far, or is relative and within the arrival radius.
     """
 
     x: float
@@ -69,12 +65,8 @@ class Goal:
     def parse(cls, text: str) -> Goal:
         """Read ``"45 deg, 1.3 m"``: direction and distance from module 1, or ``"1.2 m, 0.5 m"``: x and y on the floor.
 
-        A direction is relative to the heading, left positive, -180 to 180 deg.
-
-        Raises
-        ------
-        ParameterError, UnitError
-            For any other text, or a position out of range.
+        A direction is relative to the heading, left positive, -180 to 180 deg. ParameterError or UnitError for any
+        other text, or a position out of range.
         """
         first, comma, second = (part.strip() for part in text.partition(","))
         fits = [unit for unit in ("rad", "m") if _is_quantity(first, unit)]
@@ -112,7 +104,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Course:
-    """Targets one after another.
+    """Targets one after another; ParameterError if they are no course.
 
     Attributes
     ----------
@@ -125,11 +117,6 @@ class Course:
         Radius of the circles of the shortest path to a target, m; 0 for a robot that turns on the spot. The radius of a
         radius law is the paper's measure of the body axis: module 1 itself follows smaller circles, so that a walk may
         be shorter than this path.
-
-    Raises
-    ------
-    ParameterError
-        If that is no course.
     """
 
     goals: tuple[Goal, ...]
@@ -197,17 +184,10 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
 def course_named(text: str, patience: float) -> Course:
     """Read a course with a patience for each target, s.
 
-    Parameters
-    ----------
-    text
-        Targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or the
-        path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or ``random:SEED``.
-        Write ``./name`` for a file with the name of a course.
-
-    Raises
-    ------
-    ParameterError, UnitError
-        For any other text; the message names the wrong target.
+    The text has targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``;
+    or is the path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or
+    ``random:SEED``. Write ``./name`` for a file with the name of a course. ParameterError or UnitError for any other
+    text; the message names the wrong target.
     """
     if text in COURSES:
         return Course(COURSES[text], patience)

@@ -21,7 +21,8 @@ _HAIR = 1e-12
 
 
 def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) -> Array:
-    """Length of the shortest path to within the arrival radius of a position.
+    """Length of the shortest path to within the arrival radius of a position, m, shape (...); 0 within it, NaN for a
+    position that is not finite. ParameterError if one of the radii is negative, not a number, or too large.
 
     Parameters
     ----------
@@ -29,15 +30,6 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
         Distances ahead and to the left, m, shape (..., 2).
     radius, arrival
         Radius of the tightest circle, m, 0 for a robot that turns on the spot; distance that counts as arrived, m.
-
-    Returns
-    -------
-    Length, m, shape (...); 0 within the arrival radius, NaN for a position that is not finite.
-
-    Raises
-    ------
-    ParameterError
-        If one of the radii is negative, not a number, or too large.
     """
     for name, value in (("turning radius", radius), ("arrival radius", arrival)):
         if not 0.0 <= value <= FARTHEST:

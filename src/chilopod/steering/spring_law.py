@@ -77,12 +77,7 @@ class SpringLaw(ReadOnlyArrays):
         """Build the law of a robot from its size, its springs, the actuator of the first one, and its radius law.
 
         The range of the spring goes from that of the tightest walk of the radius law to the stiffest of the axis,
-        within the limits of the actuator.
-
-        Raises
-        ------
-        ParameterError
-            If the actuator leaves no range.
+        within the limits of the actuator. ParameterError if the actuator leaves no range.
         """
         own = robot.springs
         softest = max(float(law.values[0]), own.softest[0] if own.softest else 0.0)

@@ -50,13 +50,8 @@ class Strategy:
     """True if the controller commands torques of the joints."""
 
     def check(self, spring: float | None) -> None:
-        """Refuse a spring that the strategy does not choose, and a missing spring that it needs.
-
-        Raises
-        ------
-        ParameterError
-            If the strategy does not accept the spring, or needs one.
-        """
+        """Refuse, with a ParameterError, a spring that the strategy does not choose, and a missing one that it
+        needs."""
         if self.springs is not None and spring is None:
             raise ParameterError(f"strategy {self.name} needs one stiffness, such as 15 N*mm/deg", field="k1")
         if self.springs is None and spring is not None:
@@ -80,7 +75,7 @@ class Strategy:
         spring: float | None = None,
         controller: Controller | None = None,
     ) -> Prepared:
-        """Prepare a robot for a walk.
+        """Prepare a robot for a walk; ParameterError if the strategy does not accept spring, law or actuators.
 
         Parameters
         ----------
@@ -90,11 +85,6 @@ class Strategy:
             Stiffness for strategies with ``springs``, N*m/rad.
         controller
             Controller in place of the strategy's, which then needs no law.
-
-        Raises
-        ------
-        ParameterError
-            If the strategy does not accept spring, law or actuators.
         """
         walker, remarks = self.fitted(robot, spring)
         if controller is not None:
@@ -179,13 +169,8 @@ def check_strategy(strategy: object) -> None:
 
 
 def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
-    """Return a strategy of :data:`STRATEGIES`, or of other strategies, by its name.
-
-    Raises
-    ------
-    ParameterError
-        For an unknown name.
-    """
+    """Return a strategy of :data:`STRATEGIES`, or of other strategies, by its name; ParameterError for an unknown
+    one."""
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
         others = [task for task, own in (("turn", STRATEGIES), ("course", ON_COURSES)) if name in own]

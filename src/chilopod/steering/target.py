@@ -22,7 +22,8 @@ _FORM = 'a direction and a distance, such as "45 deg, 1.3 m"'
 
 @dataclass(frozen=True)
 class Target:
-    """Target relative to module 1 before the walk.
+    """Target relative to module 1 before the walk; ParameterError for one within the arrival radius, behind the robot,
+    or too far.
 
     Attributes
     ----------
@@ -30,11 +31,6 @@ class Target:
         Direction relative to the heading, left positive, rad, within a right angle.
     distance
         Distance from the centre of module 1, m, more than :data:`ARRIVAL_RADIUS`.
-
-    Raises
-    ------
-    ParameterError
-        For a target within the arrival radius, behind the robot, or too far.
     """
 
     bearing: float
@@ -51,13 +47,7 @@ class Target:
 
     @classmethod
     def parse(cls, text: str) -> Target:
-        """Read ``"45 deg, 1.3 m"``.
-
-        Raises
-        ------
-        ParameterError, UnitError
-            For any other text, or a target out of range.
-        """
+        """Read ``"45 deg, 1.3 m"``; ParameterError or UnitError for any other text, or a target out of range."""
         bearing, comma, distance = text.partition(",")
         if not comma:
             raise ParameterError("must be a target", field="target", value=text, allowed=_FORM)

@@ -205,6 +205,9 @@ def driver(
 ) -> Driver:
     """Prepare a robot for courses.
 
+    ParameterError or AnalysisError if the strategy needs a spring and has none, or has one and needs none; if the
+    spring has no actuator; if the strategy needs the pitchfork and the robot has none.
+
     Parameters
     ----------
     robot, strategy
@@ -215,12 +218,6 @@ def driver(
         As for :func:`chilopod.tasks.radius_law`.
     controller, law
         Controller in place of the strategy's, and radius law if already computed.
-
-    Raises
-    ------
-    ParameterError, AnalysisError
-        If the strategy needs a spring and has none, or has one and needs none; if the spring has no actuator; if the
-        strategy needs the pitchfork and the robot has none.
     """
     check_strategy(strategy)
     strategy.fitted(robot, spring)  # refuses wrong arguments before the slow law

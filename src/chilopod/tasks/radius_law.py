@@ -51,19 +51,11 @@ def radius_law(
 
     An engine whose walks are those of the planar theory has the law of the exact branch, from the softest spring on
     that a robot with a straight start withstands (:func:`that_holds`). The law of any other engine is measured in
-    undisturbed walks that start bent; springs at which these fail are left out.
+    undisturbed walks that start bent; springs at which these fail are left out. The robot's own first spring does not
+    matter; folder and progress are those of :class:`chilopod.tasks.RunOptions`.
 
-    Parameters
-    ----------
-    robot, engine
-        Robot, whose first spring does not matter, and name of an engine.
-    folder, progress
-        As for :class:`chilopod.tasks.RunOptions`.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no such branch, fewer than three springs curve, or softer springs do not curve more tightly.
+    AnalysisError if there is no such branch, fewer than three springs curve, or softer springs do not curve more
+    tightly.
     """
     if engine_named(engine).traits.exact:
         return that_holds(radius_laws(robot, progress).axis, robot, engine)

@@ -124,7 +124,7 @@ def turn(
     controller: Controller | None = None,
     **options: Unpack[RunOptions],
 ) -> Turn:
-    """Walk to a target.
+    """Walk to a target; AnalysisError if no spring turns tightly enough.
 
     Parameters
     ----------
@@ -141,11 +141,6 @@ def turn(
         As for :class:`chilopod.trials.Trial`; the controller replaces that of the strategy.
     **options
         See :class:`chilopod.tasks.RunOptions`; the folder has the trials of the radius law and of the search too.
-
-    Raises
-    ------
-    AnalysisError
-        If no spring turns tightly enough.
     """
     check_strategy(strategy)
     if spring not in ("auto", "law") and isinstance(spring, str):

@@ -219,20 +219,9 @@ def walk(
     controller: Controller | None = None,
     **options: Unpack[RunOptions],
 ) -> Walks:
-    """Simulate one walk of a robot, or several.
-
-    Parameters
-    ----------
-    robot, duration, joint_angles, rate, forces, engine, controller
-        As for :class:`chilopod.trials.Trial`.
-    **options
-        See :class:`chilopod.tasks.RunOptions`.
-
-    Raises
-    ------
-    ParameterError
-        If a value is out of range, or memory cannot hold the record, which :func:`ends` does not need.
-    """
+    """Simulate one walk of a robot, or several, with the arguments of :class:`chilopod.trials.Trial` and
+    :class:`chilopod.tasks.RunOptions`. ParameterError if a value is out of range, or memory cannot hold the record,
+    which :func:`ends` does not need."""
     bends = tuple(joint_angles)
     one = Trial(robot, duration, 0, bends, controller=controller, rate=rate, forces=forces, engine=engine)
     trials, records = runs(one, **options)

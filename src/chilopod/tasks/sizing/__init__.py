@@ -43,6 +43,9 @@ def size(
 ) -> Sizing:
     """Find the values of free numbers at which a robot does what is wished, and let it walk.
 
+    ParameterError if a wish or a range is not one, or two of the ranges change the same number; AnalysisError if a
+    curved walk is wished, and none leaves the straight one with this gait.
+
     Parameters
     ----------
     robot, onset
@@ -57,15 +60,6 @@ def size(
     budget, seed
         Most evaluations of robots, some 20 ms each, one half in the search and one to say what stands in the way; a
         branch of curved walks counts as 20. Seed of the scattered starts.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
-
-    Raises
-    ------
-    ParameterError
-        If a wish or a range is not one, or two of the ranges change the same number.
-    AnalysisError
-        If a curved walk is wished, and none leaves the straight one with this gait.
     """
     names = known_names([*wishes], QUANTITIES, "wishes")
     given = tuple(parsed_wish(robot, onset, name, wishes[name]) for name in names)
