@@ -19,7 +19,7 @@ import numpy as np
 from chilopod import units
 from chilopod.analysis.parameters import numbers_read
 from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, unit_of
-from chilopod.errors import ChilopodError, ParameterError, known_names
+from chilopod.errors import ChilopodError, ParameterError, concerning, known_names
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, finite, tornado
 from chilopod.planar.step_count import steps
@@ -164,11 +164,8 @@ def compare(
         Function that receives a sentence if a quantity will take long.
     """
     for robot in (first, second):
-        try:
+        with concerning(source=robot.name):
             robot.unit_of(onset.parameter)
-        except ParameterError as error:
-            error.source = robot.name
-            raise
     names, measured = known_names(quantities, QUANTITIES, "quantities"), Measured(onset)
     one, other = _comparable(first, second)
     paths, others = differences(one, other, onset)

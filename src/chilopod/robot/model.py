@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import PlainValidator, model_validator
 
 from chilopod import units
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ChilopodError, ParameterError, concerning
 from chilopod.gait import Gait
 from chilopod.ground import GRAVITY, Ground
 from chilopod.robot.files import Table, described, parsed, read_table, to_toml
@@ -54,11 +54,8 @@ def _provenance(table: object) -> Table:
         if isinstance(text, Mapping):
             pending.extendleft((f"{path}.{key}", item) for key, item in reversed([*text.items()]))
             continue
-        try:
+        with concerning(path):
             flat[path] = _printable(text, _LONGEST)
-        except ParameterError as error:
-            error.field = path
-            raise
     return Table(flat)
 
 
@@ -123,12 +120,9 @@ class Robot(Description):
                     f"must have one value for each joint, not {len(values)}", field=f"springs.{key}", allowed=allowed
                 )
         for path in self.provenance:
-            try:
+            with concerning(f"provenance.{path}"):
                 if isinstance(self._locate(path).index, slice):
                     raise ParameterError("must be the path of one spring or of all")
-            except ParameterError as error:
-                error.field = f"provenance.{path}"
-                raise
         return self
 
     @property

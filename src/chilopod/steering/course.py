@@ -11,7 +11,7 @@ import numpy as np
 
 from chilopod import units
 from chilopod.engine.arguments import as_number
-from chilopod.errors import ParameterError, UnitError, nearest_name
+from chilopod.errors import ParameterError, UnitError, concerning, nearest_name
 from chilopod.frozen import Array
 from chilopod.record import in_range
 from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
@@ -75,11 +75,8 @@ class Goal:
             problem = "must have a unit behind its first number" if comma and fits else "must be a target"
             raise ParameterError(problem, field="target", value=text.strip(), allowed=_FORM)
         value = units.parse(first, fits[0])
-        try:
+        with concerning("target"):
             other = units.parse(second, "m")
-        except UnitError as error:
-            error.field = "target"
-            raise
         if fits == ["m"]:
             return cls(value, other, relative=False)
         if not abs(value) <= math.pi or other < 0.0:
@@ -208,25 +205,18 @@ def course_named(text: str, patience: float) -> Course:
 
 def _goals_in(path: str) -> tuple[Goal, ...]:
     lines = (line.partition("#")[0].strip() for line in read_text(path, "course", ParameterError).splitlines())
-    try:
+    with concerning(source=path):
         return _goals([line for line in lines if line])
-    except (ParameterError, UnitError) as error:
-        error.source = path
-        raise
 
 
 def _goals(texts: list[str]) -> tuple[Goal, ...]:
     if not 1 <= len(texts) <= MOST_GOALS:
         raise _wrong_count(len(texts))
-    return tuple(_goal(number, text) for number, text in enumerate(texts, 1))
-
-
-def _goal(number: int, text: str) -> Goal:
-    try:
-        return Goal.parse(text)
-    except (ParameterError, UnitError) as error:
-        error.field = f"target {number}"
-        raise
+    goals = []
+    for number, text in enumerate(texts, 1):
+        with concerning(f"target {number}"):
+            goals.append(Goal.parse(text))
+    return tuple(goals)
 
 
 def _seed(text: str) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import units
-from chilopod.errors import ParameterError, UnitError
+from chilopod.errors import ParameterError, concerning
 
 ARRIVAL_RADIUS = 0.15
 """Distance within which the paper counts the target as reached, m."""
@@ -51,11 +51,9 @@ class Target:
         bearing, comma, distance = text.partition(",")
         if not comma:
             raise ParameterError("must be a target", field="target", value=text, allowed=_FORM)
-        try:
-            return cls(units.parse(bearing, "rad"), units.parse(distance, "m"))
-        except UnitError as error:
-            error.field = "target"
-            raise
+        with concerning("target"):
+            numbers = units.parse(bearing, "rad"), units.parse(distance, "m")
+        return cls(*numbers)
 
     @property
     def radius(self) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from chilopod import units
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ParameterError, concerning
 from chilopod.frozen import Array
 from chilopod.notebook import Summary
 from chilopod.robot import Robot
@@ -64,11 +64,8 @@ class FreeConstants:
             raise ParameterError("must be a table of paths of a robot's numbers, each with a range", value=given)
         found: list[Constant] = []
         for name, ends in given.items():
-            try:
+            with concerning(f"[{name}]"):
                 found.append(_constant(str(name), ends, [each.path for each in found]))
-            except ChilopodError as error:
-                error.field = f"[{name}]"
-                raise
         return cls(tuple(found))
 
     @property

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import units
-from chilopod.errors import ChilopodError, ParameterError, RobotFileError
+from chilopod.errors import ChilopodError, ParameterError, RobotFileError, concerning
 from chilopod.frozen import Array
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
@@ -67,7 +67,7 @@ def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Rec
 
 
 def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Recording:
-    try:
+    with concerning(source=str(path)):
         if path.suffix.lower() in (".nc", ".nc4"):
             data = _netcdf(path)
             _check_settings(robot, data, free)
@@ -91,9 +91,6 @@ def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Record
             said = f"too short for this robot, which forgets the rates at its start within {forgotten:.3g} s only"
             raise ParameterError(said, value=f"{times[-1]:.4g} s", allowed=f"{2.0 * forgotten:.3g} s or more")
         return Recording(given.file, given.settings, forgotten, times, angles)
-    except ChilopodError as error:
-        error.source = str(path)
-        raise
 
 
 def _forgotten(model: PlanarModel) -> float:

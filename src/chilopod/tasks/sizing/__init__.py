@@ -16,7 +16,7 @@ import xarray as xr
 from chilopod import units
 from chilopod.analysis.map_axes import Axis, Given, axis
 from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mode, unit_of
-from chilopod.errors import ChilopodError, ParameterError, known_names
+from chilopod.errors import ChilopodError, ParameterError, concerning, known_names
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import CYCLES, PERIOD, bent, end_of_walk, is_curved
@@ -107,11 +107,8 @@ def _axes(robot: Robot, free: Sequence[Given]) -> tuple[Axis, ...]:
             raise ParameterError(said, field=f"free {each.path}", value=each.path)
         taken |= each.numbers(robot)
         for end in (each.low, each.high):
-            try:
+            with concerning(f"free {each.path}"):
                 each.change(robot, end)
-            except ChilopodError as error:
-                error.field = f"free {each.path}"
-                raise
     if not axes:
         raise ParameterError("must name a number with its range", field="free", value="nothing")
     return axes

@@ -30,7 +30,7 @@ from chilopod import units
 from chilopod.analysis.branch import NO_PAIR
 from chilopod.analysis.map_axes import Axis
 from chilopod.analysis.quantities import QUANTITIES, TOO_BENT, Measured, Onset, leading_mode
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError, concerning
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.planar import PlanarModel
@@ -114,15 +114,12 @@ class Wish:
 
 def parsed_wish(robot: Robot, onset: Onset, name: str, given: float | str) -> Wish:
     """A wish from its value, SI or text; ParameterError names the fault."""
-    try:
+    with concerning(name):
         sense = {"<": -1, ">": 1}.get(given[:1], 0) if isinstance(given, str) else 0
         unit = robot.si_unit_of(onset.parameter) if name == "onset" else QUANTITIES[name]
         value = units.parse(given[abs(sense) :].removeprefix("="), unit) if isinstance(given, str) else float(given)
         if not np.isfinite(value) or (name in ("radius", "speed", "settling") and value <= 0.0):
             raise ParameterError("must be finite, and positive for a radius, a speed or a time", value=given)
-    except ChilopodError as error:
-        error.field = name
-        raise
     return Wish(name, value, sense)
 
 
