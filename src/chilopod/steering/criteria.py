@@ -62,15 +62,11 @@ def arrivals(record: xr.Dataset) -> Array:
     never. The record has ``distance`` over (time, robot)."""
     distance, time = record.distance.transpose("time", "robot").values, record.time.values
     inside = distance < ARRIVAL_RADIUS
-    first = inside.argmax(0)
-    found = np.full(distance.shape[1], np.nan)
-    for robot in np.flatnonzero(inside.any(0)):
-        i = first[robot]
-        if i == 0:
-            found[robot] = time[0]
-            continue
-        before, after = distance[i - 1, robot], distance[i, robot]
-        found[robot] = time[i - 1] + (before - ARRIVAL_RADIUS) / (before - after) * (time[i] - time[i - 1])
+    found = np.where(inside[0], time[0], np.nan)
+    later = np.flatnonzero(inside.any(0) & ~inside[0])
+    i = inside.argmax(0)[later]
+    before, after = distance[i - 1, later], distance[i, later]
+    found[later] = time[i - 1] + (before - ARRIVAL_RADIUS) / (before - after) * (time[i] - time[i - 1])
     return found
 
 
