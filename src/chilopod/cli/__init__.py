@@ -22,15 +22,13 @@ from chilopod.cli import (
     identify,
     live,
     map,
-    play,
     reproduce,
     robot,
     sensitivity,
     size,
     stability,
-    targets,
     trials,
-    walk,
+    walks,
 )
 from chilopod.cli.commands import new_app
 from chilopod.errors import ChilopodError, ParameterError, briefly, one_line
@@ -50,11 +48,11 @@ app.command("sensitivity", short_help="What each number of a robot does to where
 app.command("compare", short_help="Differing numbers of two robots, and the part of each.")(sensitivity.compare)
 app.command("size", short_help="Numbers of a robot at which it does what is wished.")(size.size)
 app.command("map", short_help="Map over two numbers: where it holds, bends or undulates.")(map.stability_map)
-app.command("walk", short_help="Let a robot walk, and report where it gets to.")(walk.walk)
-app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(targets.turn)
-app.command("course", short_help="Walk from target to target, and report on each.")(targets.course)
+app.command("walk", short_help="Let a robot walk, and report where it gets to.")(walks.walk)
+app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(walks.turn)
+app.command("course", short_help="Walk from target to target, and report on each.")(walks.course)
 app.command("live", short_help="Watch a robot walk in the browser, and change it.")(live.live)
-app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(play.play)
+app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(live.play)
 app.add_typer(identify.app, name="identify")
 app.add_typer(trials.app, name="trials")
 app.command("doctor", short_help="Check the installation, and print what mends it.")(doctor.doctor)

@@ -96,6 +96,14 @@ def reading(option: str, *words: str) -> Iterator[None]:
         raise
 
 
+def quantity(option: str, text: str, unit: str) -> float:
+    """Read the value of an option, in SI units."""
+    from chilopod import units
+
+    with reading(option):
+        return units.parse(text, unit)
+
+
 def read_robot(robot: str | Robot, overrides: Sequence[str] | None) -> Robot:
     """Load a robot, unless it is one, and apply the overrides of ``--set``."""
     from chilopod.robot import Robot, load_robot

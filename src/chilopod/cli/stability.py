@@ -15,7 +15,7 @@ from chilopod.cli.options import (
     RobotOptions,
     interval,
     onset_of,
-    reading,
+    quantity,
     with_options,
 )
 from chilopod.cli.progress import progress_bar
@@ -59,10 +59,7 @@ def stability(
     """
     described = options.described
     files = options.free_in(out, "stability.json")
-    from chilopod import units
-
-    with reading("amplitude"):
-        size = units.parse(amplitude, "rad")
+    size = quantity("amplitude", amplitude, "rad")
     if engine == "planar" and onset:
         raise ParameterError("must be 'twin' for --onset", field="engine", value=engine, allowed="chilopod bifurcation")
     if engine == "planar" and amplitude != _AMPLITUDE:
