@@ -169,9 +169,8 @@ def share(reached: ArrayLike) -> Interval:
     """
     table = np.asarray(reached, dtype=np.float64)
     if (wrong := table[(table != 0.0) & (table != 1.0)]).size:
-        raise ParameterError(
-            "must be True or False", field="reached", value=float(wrong[0]), allowed="True, False, 1, 0"
-        )
+        allowed = "True, False, 1, 0"
+        raise ParameterError("must be True or False", field="reached", value=float(wrong[0]), allowed=allowed)
     if table.size == 0:
         return Interval(math.nan, math.nan, math.nan)
     table = table.reshape(len(table), -1)
@@ -226,11 +225,9 @@ def propagated(of: Callable[[Array], ArrayLike], trials: Array, *, reciprocal: b
             move = step * (np.arange(len(steps)) == row)[:, None]
             above, below = (np.atleast_1d(of(trials + each)) for each in (move, -move))
             effects[row] = (1.0 / below - 1.0 / above if reciprocal else above - below) / (2.0 * step)
-    scales = values**2 if reciprocal else np.ones(values.size)
-    return [
-        weighted(float(value), scale * effect, trials, reciprocal=reciprocal)
-        for value, scale, effect in zip(values, scales, effects.T, strict=True)
-    ]
+    effects *= values**2 if reciprocal else 1.0
+    pairs = zip(values, effects.T, strict=True)
+    return [weighted(float(value), effect, trials, reciprocal=reciprocal) for value, effect in pairs]
 
 
 def weighted(value: float, effects: Array, trials: Array, *, reciprocal: bool = False) -> Estimate:

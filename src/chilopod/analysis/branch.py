@@ -292,6 +292,8 @@ def _walked(
     ]
     radius = [float(model.robot.axis_radius(angles)) for model, angles in zip(models, means.mean_angle, strict=True)]
 
+    special = [point.special.label if point.special else "" for point in points]
+
     def column(values: Any, what: str | None = None) -> tuple[Any, ...]:
         return (("point",), np.asarray(values), {} if what is None else {"units": what})
 
@@ -300,9 +302,7 @@ def _walked(
             "parameter": column([units.from_si(point.value, unit) for point in points], unit),
             "verdict": column(np.array(verdicts, dtype=object)),
             "stable": column([verdict == VERDICTS[True] for verdict in verdicts]),
-            "special": column(
-                np.array([point.special.label if point.special else "" for point in points], dtype=object)
-            ),
+            "special": column(np.array(special, dtype=object)),
             "multiplier": column(np.abs(multipliers[:, 0])),
             "mean_angle": (("point", "joint"), means.mean_angle, {"units": "rad"}),
             "most_bent": column(means.most_bent, "rad"),

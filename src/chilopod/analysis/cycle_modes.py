@@ -104,9 +104,8 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         """Verdict in words, without a derivative on bends of finite size."""
         if self.given_way:
             joint, mean = self.given_way
-            return (
-                f"{self.name}: the straight walk has given way: it bends ({joint} = {self._shown(mean, 2)} in the mean)"
-            )
+            bend = f"{joint} = {self._shown(mean, 2)} in the mean"
+            return f"{self.name}: the straight walk has given way: it bends ({bend})"
         if self.exact:
             return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
         size = self._shown(self.amplitude, 3)

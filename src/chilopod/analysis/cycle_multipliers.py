@@ -366,10 +366,8 @@ def bend_onset(
 
     (a, b), (at_a, at_b) = between, [excess(end)[0] for end in between]
     if at_a * at_b > 0.0:
-        ends = [
-            f"the multiplier {1.0 + at:.4f}" if math.isfinite(at) else "a walk that has given way"
-            for at in (at_a, at_b)
-        ]
+        gone = "a walk that has given way"
+        ends = [f"the multiplier {1.0 + at:.4f}" if math.isfinite(at) else gone for at in (at_a, at_b)]
         said = f"must hold an onset; its ends have {ends[0]} and {ends[1]}"
         given = f"{shown(a)} to {shown(b)}"
         raise ParameterError(said, field="onset", value=given, allowed="values on both sides of 1")

@@ -215,9 +215,8 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
         apart[at] = _ALONE if alone and seeds[at] is None else np.inf  # it is tried again beside a known one
     missing = np.flatnonzero(np.isnan(found[*nodes.T]))
     why = [next((each for each in (TOO_BENT, NO_PAIR) if each in reasons[at]), "") for at in missing]
-    said = [
-        f"at {why.count(each)} of {len(nodes)} values {each}: no radius" for each in (TOO_BENT, NO_PAIR) if each in why
-    ]
+    known = [each for each in (TOO_BENT, NO_PAIR) if each in why]
+    said = [f"at {why.count(each)} of {len(nodes)} values {each}: no radius" for each in known]
     return found, [*said, *[f"{why.count('')} of {len(nodes)} radii are not found"] * ("" in why)]
 
 

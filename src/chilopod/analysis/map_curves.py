@@ -254,9 +254,8 @@ class Search:
                 for fold in self._fold(edge, middle, p, q, len(subcritical)):
                     self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
-            self.remarks.append(
-                f"a curve that begins at a {point.kind.label} is not followed to its end: {error.problem}"
-            )
+            begun = f"a curve that begins at a {point.kind.label}"
+            self.remarks.append(f"{begun} is not followed to its end: {error.problem}")
 
     def _add(self, curve: Curve2, edge: Edge, *begin: Any) -> None:
         """Keep a curve in the order of the map's axes, from where it begins, and say where it ends before it should."""

@@ -71,12 +71,9 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     measured = [_measured(row) for row in projected]
     joints = slice(3, robot.body.modules + 2)
     share = np.array([np.linalg.norm(each.mode[joints]) for each in expected])
-    swing = np.array(
-        [
-            2.0 * np.abs(_average(state[:, joints] * np.exp(-1j * turn * np.arange(_MEASURED))[:, None]))
-            for state, (_, turn) in zip(states, measured, strict=True)
-        ]
-    )
+    turned = (np.exp(-1j * turn * np.arange(_MEASURED))[:, None] for _, turn in measured)
+    pairs = zip(states, turned, strict=True)
+    swing = np.array([2.0 * np.abs(_average(state[:, joints] * each)) for state, each in pairs])
     period = robot.gait.period
     component = np.abs(point.mode[joints])
 
@@ -155,10 +152,8 @@ def _settled(models: list[FollowedModel], expected: list[_Expected], progress: P
         states = FollowedModel.flow_each(models, states, 0.0, period)
         if count % 100 == 0:
             progress((count + settling) / (settling + _MEASURED), "until the undulation has settled")
-    projected = np.array(
-        [(rows - each.orbit) @ each.left.conj() for rows, each in zip(recorded, expected, strict=True)]
-    )
-    return projected, recorded
+    pairs = zip(recorded, expected, strict=True)
+    return np.array([(rows - each.orbit) @ each.left.conj() for rows, each in pairs]), recorded
 
 
 def _measured(projected: ComplexArray) -> tuple[float, float]:

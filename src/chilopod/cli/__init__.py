@@ -115,16 +115,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             named = ChilopodError(error.strerror or str(error), source=str(error.filename or ""))
             return _fail(str(named), USAGE_ERROR)
         if isinstance(error, MemoryError):
-            return _fail(
-                f"there is too little memory ({str(error) or 'how much more it takes is not known'})", USAGE_ERROR
-            )
+            lacking = str(error) or "how much more it takes is not known"
+            return _fail(f"there is too little memory ({lacking})", USAGE_ERROR)
         package = _not_imported(error)
         if package:
             return _fail(f"{package} cannot be imported: {briefly(error)} ({_mend(package)})", USAGE_ERROR)
-        return _fail(
-            f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
-            INTERNAL_ERROR,
-        )
+        said = f"{type(error).__name__}: {error} (--debug shows more)"
+        return _fail(f"this is a fault of chilopod, please report it: {said}", INTERNAL_ERROR)
     finally:
         trials_log.removeFilter(is_new)
     if code == INTERRUPTED:  # recent versions of typer make this of a KeyboardInterrupt

@@ -174,18 +174,14 @@ class OnsetOptions(RobotOptions):
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
     """Decorator that shows typer the fields of a command's first argument, a dataclass, beside its other arguments."""
-    first, *own = (
-        each.replace(kind=Parameter.KEYWORD_ONLY) for each in signature(command, eval_str=True).parameters.values()
-    )
+    arguments = signature(command, eval_str=True).parameters.values()
+    first, *own = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in arguments)
     hints = get_type_hints(first.annotation, include_extras=True)
+    named = (
+        (each.name, Parameter.empty if each.default is MISSING else each.default) for each in fields(first.annotation)
+    )
     robot, *shared = (
-        Parameter(
-            each.name,
-            Parameter.KEYWORD_ONLY,
-            default=Parameter.empty if each.default is MISSING else each.default,
-            annotation=hints[each.name],
-        )
-        for each in fields(first.annotation)
+        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[name]) for name, default in named
     )
     common = {each.name for each in fields(RobotOptions)}
 
@@ -272,10 +268,8 @@ def note_si(robot: Robot, path: str, option: str, ends: Sequence[str]) -> None:
     with suppress(ChilopodError):
         unit, shown = robot.si_unit_of(path), robot.unit_of(path)
         if shown != unit and any(map(_bare, ends)):
-            low, high = (units.parse(end, unit) for end in ends)
-            taken, own = (
-                f"{units.format(low, u, digits=4)} to {units.format(high, u, digits=4)}" for u in (unit, shown)
-            )
+            values = [units.parse(end, unit) for end in ends]
+            taken, own = (" to ".join(units.format(value, u, digits=4) for value in values) for u in (unit, shown))
             typer.echo(f"note: a number without a unit is SI: {option} is {taken}, that is {own}", err=True)
 
 

@@ -56,16 +56,15 @@ def sensitivity(
     described = options.described
     onset = options.number(at)
     tolerances = _tolerances(described, options.parameter, uncertain or [])
-    for option, given in (("show", show), ("at", at)):
-        if tolerances and given:
-            raise ParameterError("goes without --uncertain only", field=option, value=given, allowed="the onset alone")
+    for option, text in (("show", show), ("at", at)):
+        if tolerances and text:
+            raise ParameterError("goes without --uncertain only", field=option, value=text, allowed="the onset alone")
     from chilopod import analysis
     from chilopod.analysis.sensitivity import DEFAULT
 
     if tolerances:
-        options.study(
-            "uncertainty", lambda progress: analysis.uncertainty(described, tolerances, onset, samples, seed, progress)
-        )
+        given = described, tolerances, onset, samples, seed
+        options.study("uncertainty", lambda progress: analysis.uncertainty(*given, progress))
     else:
         names = show.split(",") if show else DEFAULT
         options.study("sensitivity", lambda progress: analysis.sensitivity(described, onset, names, progress=progress))

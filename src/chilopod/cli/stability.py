@@ -65,9 +65,8 @@ def stability(
     if engine == "planar" and amplitude != _AMPLITUDE:
         raise ParameterError("must be 'twin' for --amplitude", field="engine", value=engine)
     if not 0.0 < size < 1.0:
-        raise ParameterError(
-            "must be a small angle", field="amplitude", value=amplitude, allowed="above 0, below 1 rad"
-        )
+        allowed = "above 0, below 1 rad"
+        raise ParameterError("must be a small angle", field="amplitude", value=amplitude, allowed=allowed)
     with progress_bar("stability") as show:
         if engine == "planar":
             from chilopod.analysis import straight_walk

@@ -169,7 +169,5 @@ def own_code(show: Callable[[str, float, str], None]) -> Iterator[None]:
         if added:
             sys.path.remove(here)
     if spent.share > _SLOW and spent.controller > _NOTICED:
-        typer.echo(
-            f"the controller took {100.0 * spent.share:.0f} % of the time of all walks, {spent.controller:.1f} s",
-            err=True,
-        )
+        share, seconds = f"{100.0 * spent.share:.0f} %", f"{spent.controller:.1f} s"
+        typer.echo(f"the controller took {share} of the time of all walks, {seconds}", err=True)

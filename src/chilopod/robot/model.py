@@ -115,10 +115,9 @@ class Robot(Description):
         for key in quantities(Springs):
             values = getattr(self.springs, key)
             if values is not None and len(values) != joints:
+                problem = f"must have one value for each joint, not {len(values)}"
                 allowed = f"{joints}, one fewer than body.modules, or a single value for all"
-                raise ParameterError(
-                    f"must have one value for each joint, not {len(values)}", field=f"springs.{key}", allowed=allowed
-                )
+                raise ParameterError(problem, field=f"springs.{key}", allowed=allowed)
         for path in self.provenance:
             with concerning(f"provenance.{path}"):
                 if isinstance(self._locate(path).index, slice):
@@ -327,9 +326,8 @@ class Robot(Description):
         if place.quantity.each:
             if old is None:
                 if place.index is not None and not isinstance(place.quantity, Flag):
-                    raise ParameterError(
-                        "must be a parameter that this robot has", allowed=f"{path.partition('[')[0]} for all of them"
-                    )
+                    allowed = f"{path.partition('[')[0]} for all of them"
+                    raise ParameterError("must be a parameter that this robot has", allowed=allowed)
                 old = (False,) * (self.body.modules - 1)
             chosen = place.joints(len(old))
             new = tuple(value if index in chosen else item for index, item in enumerate(old))
@@ -343,9 +341,8 @@ class Robot(Description):
         joints = 0 if place.quantity.each and place.index is None else self.body.modules - 1
         if place.quantity is MODULES:
             joints = int(value) - 1
-            changes["springs"] = self.springs.model_copy(
-                update={key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
-            )
+            resized = {key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
+            changes["springs"] = self.springs.model_copy(update=resized)
         texts = dict(self.provenance)
         if joints != self.body.modules - 1:
             texts = {name: text for name, text in texts.items() if spring_index(name, path) < joints}

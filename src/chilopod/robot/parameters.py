@@ -66,9 +66,8 @@ def place_of(path: str) -> Place:
         if nearest is None:
             raise ParameterError("must be the path of a parameter", field=path, allowed=", ".join(known))
         meant = _INDEX.fullmatch(rest) if known[nearest].each else None
-        raise ParameterError(
-            "must be the path of a parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest
-        )
+        nearest = f"{nearest}[{meant[1]}]" if meant else nearest
+        raise ParameterError("must be the path of a parameter", field=path, nearest=nearest)
     quantity = known[stem]
     if (index is not None or group) and not quantity.each:
         raise ParameterError("must be written without an index", field=path, allowed=stem)

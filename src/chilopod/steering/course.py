@@ -56,10 +56,8 @@ class Goal:
         distance = round(math.hypot(self.x, self.y), _DIGITS)
         if not (ARRIVAL_RADIUS if self.relative else -1.0) < distance <= FARTHEST:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
-            allowed = f"{near}at most {FARTHEST:g} m"
-            raise ParameterError(
-                "must be a distance to walk", field="target distance", value=f"{distance:g} m", allowed=allowed
-            )
+            value, allowed = f"{distance:g} m", f"{near}at most {FARTHEST:g} m"
+            raise ParameterError("must be a distance to walk", field="target distance", value=value, allowed=allowed)
 
     @classmethod
     def parse(cls, text: str) -> Goal:

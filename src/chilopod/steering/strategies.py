@@ -55,9 +55,8 @@ class Strategy:
         if self.springs is not None and spring is None:
             raise ParameterError(f"strategy {self.name} needs one stiffness, such as 15 N*mm/deg", field="k1")
         if self.springs is None and spring is not None:
-            raise ParameterError(
-                f"must not be given: strategy {self.name} sets its own springs", field="k1", value=spring
-            )
+            problem = f"must not be given: strategy {self.name} sets its own springs"
+            raise ParameterError(problem, field="k1", value=spring)
 
     def fitted(self, robot: Robot, spring: float | None = None) -> tuple[Robot, tuple[str, ...]]:
         """Robot with the strategy's springs and actuators, and remarks on it."""

@@ -136,9 +136,8 @@ class Driven(Pathed):
 
 
 def _of_targets(goals: list[dict[str, Any]]) -> list[Sequence[str]]:
-    rows: list[Sequence[str]] = [
-        ("target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)")
-    ]
+    head = "target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)"
+    rows: list[Sequence[str]] = [head]
     for number, goal in enumerate(goals, 1):
         cells = ["-"] * 5  # of a target that was never set
         if goal["path_m"]:
@@ -150,9 +149,8 @@ def _of_targets(goals: list[dict[str, Any]]) -> list[Sequence[str]]:
 
 
 def _of_walks(walks: list[dict[str, Any]], goals: int) -> list[Sequence[str]]:
-    rows: list[Sequence[str]] = [
-        ("seed", "targets", "time (s)", "springs (J)", "drives (J)", "cost of transport", "status")
-    ]
+    head = "seed", "targets", "time (s)", "springs (J)", "drives (J)", "cost of transport", "status"
+    rows: list[Sequence[str]] = [head]
     for walk in walks:
         seed = "-" if walk["seed"] is None else str(walk["seed"])
         works = [f"{walk[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]

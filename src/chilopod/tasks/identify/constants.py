@@ -79,10 +79,8 @@ class FreeConstants:
 
     def values_at(self, parts: Sequence[float] | Array) -> Array:
         """Values at parts of the ranges."""
-        pairs = zip(self.each, parts, strict=True)
-        values = np.array(
-            [c.low * (c.high / c.low) ** x if c.logarithmic else c.low + x * (c.high - c.low) for c, x in pairs]
-        )
+        ends = ((c.low, c.high, c.logarithmic, x) for c, x in zip(self.each, parts, strict=True))
+        values = np.array([a * (b / a) ** x if even else a + x * (b - a) for a, b, even, x in ends])
         for index, other in self._ratios():
             values[index] *= values[other]
         return values
@@ -215,10 +213,9 @@ class Estimates:
             squares, directions = np.linalg.eigh(self.spread / np.outer(scale, scale))
             signs = np.where(directions.sum(axis=0) < 0.0, -1.0, 1.0)
             for change in (signs * np.sqrt(np.abs(squares)) * directions).T:
+                changes = dict(zip(paths, change.tolist(), strict=True))
                 is_open = bool((np.abs(change) * scale > _OPEN * widths).any())
-                found["combinations"].append(
-                    {"changes": dict(zip(paths, change.tolist(), strict=True)), "open": is_open}
-                )
+                found["combinations"].append({"changes": changes, "open": is_open})
         return found
 
     def _constant(self, at: int, ends: Array) -> dict[str, Any]:

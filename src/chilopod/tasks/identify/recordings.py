@@ -134,10 +134,7 @@ def _check_settings(robot: Robot, data: xr.Dataset, free: set[str]) -> None:
         own = Robot.from_toml(data.attrs["robot"])
         recorded = {path: np.array(own.get(path)) for path in own.parameters() if path.startswith("gait.")}
         springs = np.moveaxis(data["stiffness"].values, data["stiffness"].get_axis_num("joint"), 0)
-        recorded |= {
-            f"springs.stiffness[{at}]": values
-            for at, values in zip(range(robot.body.modules - 1), springs, strict=False)
-        }
+        recorded |= {f"springs.stiffness[{at}]": each for at, each in enumerate(springs[: robot.body.modules - 1])}
     for path, values in recorded.items():
         if path.partition("[")[0] not in free and not np.allclose(values, robot.get(path), rtol=1e-6, atol=0.0):
             ends, unit = np.unique([values.min(), values.max()]).tolist(), robot.unit_of(path)

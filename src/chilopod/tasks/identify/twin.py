@@ -206,26 +206,17 @@ def known(free: FreeConstants = FITTED) -> list[Fit]:
     """Sets of constants included in chilopod, with the residuals of the paper's series and their weights; those of
     ``FITTED`` begin with the preset's. The others are of ``WITH_FRICTION``."""
     name = "twin" if free is FITTED else "friction"
-    shipped = json.loads(files("chilopod.tasks.identify").joinpath(f"{name}_fits.json").read_text(encoding="utf-8"))
-    return [
-        Fit(free.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in shipped["fits"]
-    ]
+    shipped = files("chilopod.tasks.identify").joinpath(f"{name}_fits.json").read_text(encoding="utf-8")
+    fits = json.loads(shipped)["fits"]
+    return [Fit(free.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in fits]
 
 
 def confirmed(robot: Robot, data: BaseSeries) -> bool:
     """True if walks from a straight start agree with the data: at the stiffest curved spring most of them curve, to
     both sides, and at the softest straight spring most of them stay straight."""
-    trials = [
-        Trial(
-            robot.with_value(K1, spring),
-            CYCLES * robot.gait.period,
-            seed,
-            rate=SAMPLES / robot.gait.period,
-            engine="twin",
-        )
-        for spring in (max(data.curved), min(data.straight))
-        for seed in range(_TRIALS)
-    ]
+    period, robots = robot.gait.period, [robot.with_value(K1, k) for k in (max(data.curved), min(data.straight))]
+    how: dict[str, Any] = {"rate": SAMPLES / period, "engine": "twin"}
+    trials = [Trial(each, CYCLES * period, seed, **how) for each in robots for seed in range(_TRIALS)]
     ends = xr.concat([end_of_walk(record, robot) for record in run(trials)], "trial")
     sides = ends.direction.values.reshape(2, _TRIALS)
     bent = np.isin(sides, ("left", "right")).sum(axis=1)

@@ -69,9 +69,8 @@ class _Process:
         likely = np.r_[_SCALES, np.full(parts.shape[1], _LENGTH)]
         bounds = [(-5.0, 4.0), (-5.0, 2.0), *[(-2.5, 4.0)] * parts.shape[1]]
         # Logarithms of deviation, noise and lengths that the values make most likely, with a weak prior.
-        self.scales = np.asarray(
-            minimize(self._unlikely, likely, (likely,), jac=True, bounds=bounds, options={"maxiter": _MOST_STEPS}).x
-        )
+        how = {"bounds": bounds, "options": {"maxiter": _MOST_STEPS}}
+        self.scales = np.asarray(minimize(self._unlikely, likely, (likely,), jac=True, **how).x)
         lower = cho_factor(self._covariance(parts, self.scales) + self._noise(self.scales), lower=True)[0]
         self._inverse = np.asarray(solve_triangular(lower, np.eye(len(parts)), lower=True))
         self._solved = self._inverse.T @ (self._inverse @ values)

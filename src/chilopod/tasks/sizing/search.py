@@ -169,10 +169,8 @@ class Search:
 
     def numbers(self, place: Array) -> Array:
         """Free numbers at a place in the unit cube, SI, evenly by their logarithm where they are positive."""
-        parts = zip(self.axes, np.round(place, 15).tolist(), strict=True)
-        return np.array(
-            [a.low * (a.high / a.low) ** p if a.low > 0.0 else a.low + (a.high - a.low) * p for a, p in parts]
-        )
+        parts = ((a.low, a.high, part) for a, part in zip(self.axes, np.round(place, 15).tolist(), strict=True))
+        return np.array([a * (b / a) ** part if a > 0.0 else a + (b - a) * part for a, b, part in parts])
 
     def at(self, place: Array) -> Robot:
         """Robot at a place in the unit cube."""
