@@ -187,9 +187,8 @@ def share(reached: ArrayLike) -> Interval:
 def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Estimate:
     """Mean of some trials minus that of others, shapes (n,) and (m,), by Welch's test; only finite numbers count.
 
-    Paired trials have equal indices, as those of one seed, and the error is that of their differences. ParameterError
-    if their numbers differ.
-    """
+    Paired trials have equal indices, as those of one seed, and the error of their differences; ParameterError if their
+    numbers differ."""
     if paired:
         if np.shape(one) != np.shape(other):
             raise ParameterError(f"has the wrong shape {np.shape(other)}", field="other", allowed=str(np.shape(one)))
@@ -213,11 +212,9 @@ def spread_difference(one: ArrayLike, other: ArrayLike) -> Estimate:
 
 
 def propagated(of: Callable[[Array], ArrayLike], trials: Array, *, reciprocal: bool = False) -> list[Estimate]:
-    """Numbers from the means of conditions, with the errors that their scatter gives them, to first order.
-
-    ``of`` gives the numbers of a table of trials, shape (conditions, trials), NaN where there is none. The trials of
-    every condition are moved by their standard error to both sides.
-    """
+    """Numbers from the means of conditions, with the errors that their scatter gives them, to first order. ``of`` gives
+    the numbers of a table of trials, shape (conditions, trials), NaN where there is none. The trials of every condition
+    are moved by their standard error to both sides."""
     values, steps = np.atleast_1d(of(trials)), np.sqrt(_row_variances(trials)[0])
     effects = np.zeros((len(steps), values.size))
     for row, step in enumerate(np.nan_to_num(steps)):
@@ -231,11 +228,9 @@ def propagated(of: Callable[[Array], ArrayLike], trials: Array, *, reciprocal: b
 
 
 def weighted(value: float, effects: Array, trials: Array, *, reciprocal: bool = False) -> Estimate:
-    """A number and its error by the scatter of trials, shape (conditions, trials), NaN where there is none.
-
-    ``effects`` are derivatives of the number with respect to the mean of every condition. A single trial is taken to
-    scatter as those of the other conditions do.
-    """
+    """A number and its error by the scatter of trials, shape (conditions, trials), NaN where there is none. ``effects``
+    are derivatives of the number with respect to the mean of every condition. A single trial is taken to scatter as
+    those of the other conditions do."""
     variances, freedoms = _row_variances(trials)
     error, freedom = _together(effects**2 * variances, freedoms)
     count = int(np.median(np.isfinite(trials).sum(axis=1)))

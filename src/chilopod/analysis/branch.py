@@ -163,8 +163,7 @@ def resumed(
 
 
 def read_walks(path: str | Path) -> xr.Dataset:
-    """Read a branch from its netCDF file; ParameterError if that is missing, damaged or edited, or written by another
-    version."""
+    """Read a branch from its netCDF file; ParameterError if that is missing, damaged, edited or of another version."""
     path = Path(path)
     try:
         data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")

@@ -177,8 +177,7 @@ def compare(
 
 
 def differences(first: Robot, second: Robot, onset: Onset) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Paths of differing numbers that the planar model reads, and those of others; without that of the onset where
-    walks are studied at one value of it."""
+    """Paths of differing numbers that the planar model reads, and of others; without that of an onset with a value."""
     resized = first.body.modules != second.body.modules
     alike = first.with_value("body.modules", second.body.modules) if resized else first
     shared = [path for path in second.parameters() if path in alike.parameters() and path != "body.modules"]

@@ -45,9 +45,7 @@ class RadiusLaws(Short):
 
 def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     """Compute the laws from the branch of curved walks, from the pitchfork down to a bend of a right angle in a joint.
-
-    AnalysisError if the straight walk has no pitchfork in the first spring, or the curved walks beside it give no law.
-    """
+    AnalysisError if the straight walk has no pitchfork in the first spring, or walks beside it give no law."""
     stiffest = max(robot.springs.stiffness)
     low, high = (part * stiffest for part in _BETWEEN)
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress)

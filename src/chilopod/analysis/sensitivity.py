@@ -67,8 +67,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
         return dict(zip(self.paths, self.derivatives[self._row(quantity)].tolist(), strict=True))
 
     def percent(self, quantity: str) -> dict[str, float]:
-        """Change of one quantity by 1 % of each number, by its path: in % of onset and radius, else in the unit of the
-        quantity; 0 for a number that is zero."""
+        """Change of one quantity by 1 % of each number, by path: in % of onset and radius, else in its unit."""
         return dict(zip(self.paths, self._percent(self._row(quantity)).tolist(), strict=True))
 
     def _percent(self, row: int) -> Array:

@@ -270,11 +270,8 @@ def first_loss(
     robot: Robot, parameter: str, between: tuple[float, float] | None, kind: Kind | None, normal_form: bool = True
 ) -> WalkBifurcation:
     """Bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down; None is
-    the interval of :func:`chilopod.analysis.parameters.searched_springs`.
-
-    AnalysisError if there is no bifurcation, it is of another kind (None is any kind), or the straight walk at
-    ``between[1]`` is not known to be stable.
-    """
+    the interval of :func:`chilopod.analysis.parameters.searched_springs`. AnalysisError if there is none, it is of
+    another kind (None is any kind), or the straight walk at ``between[1]`` is not known to be stable."""
     what, between = "loss of stability" if kind is None else kind.label, between or searched_springs(robot)
     spaced = np.geomspace if between[0] > 0.0 else np.linspace
     for low in spaced(between[1], between[0], 5)[1:]:
@@ -302,17 +299,12 @@ def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) ->
 
 
 def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:
-    """Pitchfork at which the straight walk loses stability as k1 is softened, see :func:`first_loss`; searched at all
-    springs that may be critical."""
+    """Pitchfork at which the straight walk ends as k1 is softened, of all possible springs, see :func:`first_loss`."""
     return first_loss(robot, K1, None, Kind.PITCHFORK, normal_form)
 
 
 def joint_components(mode: ComplexArray, modules: int) -> ComplexArray:
-    """Joint angles of a mode, of unit norm.
-
-    The phase is free: the largest component is made real and positive, except that where all components of a real mode
-    have one sign, that is positive.
-    """
+    """Joint angles of a mode, of unit norm; the phase is free, and the largest component is made real and positive."""
     part = mode[_joints(modules)]
     peak = part[np.abs(part).argmax()]
     norm = np.linalg.norm(part)

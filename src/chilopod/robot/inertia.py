@@ -65,9 +65,7 @@ def legs_yaw_inertia(legs: Legs, twin: Twin) -> float:
 
 
 def link_inertia(twin: Twin, length: float) -> tuple[float, float]:
-    """Inertia of a link across and about its own axis, kg*m^2: a uniform rod.
-
-    About its axis it is as thick as a foot, but never more than across: nothing is singular.
-    """
+    """Inertia of a link across and about its own axis, kg*m^2: a uniform rod. About its axis it is as thick as a foot,
+    but never more than across: nothing is singular."""
     across = twin.link_mass * length**2 / 12.0
     return across, min(across, 0.5 * twin.link_mass * twin.foot_radius**2)

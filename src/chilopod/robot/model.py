@@ -86,8 +86,7 @@ class Robot(Description):
 
     @classmethod
     def load(cls, robot: str | Path) -> Self:
-        """Read a robot file, or a preset by its name; RobotFileError names the place and the fault of an invalid
-        one."""
+        """Read a robot file, or a preset by its name; RobotFileError names place and fault of an invalid one."""
         return described(cls, *read_table(robot))
 
     @classmethod
@@ -206,17 +205,14 @@ class Robot(Description):
         """Return this robot with one parameter changed to `value` in SI units; about 20 us, for sweeps.
 
         `path` is as for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring
-        and damper for new joints, and drops those of removed ones. Length and mass are those of the whole robot and
-        stay. The provenance of a changed parameter becomes a note that it was overridden. ParameterError if `value` is
-        out of range.
+        and damper for new joints, and drops those of removed ones; length and mass of the whole robot stay. The
+        provenance of a changed parameter says that it was overridden. ParameterError if `value` is out of range.
         """
         return self._changed(path, lambda quantity: quantity.check(value))
 
     def override(self, path: str, value: object) -> Self:
-        """Return this robot with one parameter changed: a number in SI units or text with its unit.
-
-        Like `with_value`; also raises `UnitError` if the text is not a quantity or has another dimension.
-        """
+        """Return this robot with one parameter changed: a number in SI units or text with its unit. Like `with_value`;
+        also raises `UnitError` if the text is not a quantity or has another dimension."""
         return self._changed(path, lambda quantity: quantity.read(value))
 
     def set_from_text(self, assignments: Iterable[str]) -> Self:
@@ -239,8 +235,7 @@ class Robot(Description):
         return self.with_(twin=other.twin, provenance={**self.provenance, **texts})
 
     def copied(self) -> Self:
-        """Return this robot with provenance that names it as what numbers were copied from, but for those that were
-        overridden, or copied before."""
+        """Return this robot with provenance that names it as the origin of all but overridden and copied numbers."""
         before = f"{_COPIED}{self.name}"
         texts = {
             path: text if text == _OVERRIDDEN or text.startswith(_COPIED) else f"{before}: {text}"[:_LONGEST]

@@ -20,8 +20,7 @@ _INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # tolerates spaces and 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Place of a parameter: section, key, index among the springs, slice of a group of them, or None for all, and
-    allowed values."""
+    """Place of a parameter: section, key, index among the springs, slice of a group or None for all; and its values."""
 
     section: str
     key: str

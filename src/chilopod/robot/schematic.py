@@ -17,10 +17,8 @@ _UNIT = "N*mm/deg"
 
 
 def schematic(body: Body, springs: Springs, legs: Legs, gait: Gait, name: str) -> str:
-    """SVG of modules, joints with their springs, and feet at time 0, filled where they stand.
-
-    The robot walks to the right. Only the front modules of a very long robot are drawn.
-    """
+    """SVG of modules, joints with their springs, and feet at time 0, filled where they stand. The robot walks to the
+    right. Only the front modules of a very long robot are drawn."""
     count = min(body.modules, _MOST)
     length = body.length / body.modules
     phases = gait.leg_phases(body.modules)[:count]

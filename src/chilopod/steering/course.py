@@ -181,8 +181,7 @@ def course_named(text: str, patience: float) -> Course:
 
     The text has targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``;
     or is the path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or
-    ``random:SEED``. Write ``./name`` for a file with the name of a course. ParameterError or UnitError for any other
-    text; the message names the wrong target.
+    ``random:SEED``. Write ``./name`` for a file with the name of a course. ParameterError or UnitError names a fault.
     """
     if text in COURSES:
         return Course(COURSES[text], patience)

@@ -70,8 +70,7 @@ class RadiusLaw(ReadOnlyArrays):
         return float(self.radii[0])
 
     def radius(self, value: float) -> float:
-        """Radius at a value of the parameter (SI units), m; infinite from the pitchfork on, ParameterError below the
-        range of the law."""
+        """Radius at a value of the parameter (SI), m; infinite from the pitchfork on, ParameterError below the law."""
         if value >= self.pitchfork:
             return float("inf")
         if not value >= self.values[0]:
@@ -82,8 +81,7 @@ class RadiusLaw(ReadOnlyArrays):
         return float(1.0 / np.sqrt(self._squared_curvature(value)))
 
     def value(self, radius: float) -> float:
-        """Value of the parameter (SI units) that gives a radius (m): the paper's k1-hat. AnalysisError if no value
-        within the law gives the radius."""
+        """Value of the parameter (SI) that gives a radius (m), the paper's k1-hat; AnalysisError if none does."""
         from scipy.optimize import brentq
 
         if not radius >= self.tightest:

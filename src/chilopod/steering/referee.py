@@ -154,8 +154,7 @@ class CourseReferee:
         return self._aims.copy()
 
     def time_left(self, now: float) -> Array:
-        """Time to the end of the last target's patience if no target is reached, s, shape (robots,); 0 for finished
-        robots."""
+        """Time to the end of the last patience if no target is reached, s, shape (robots,); 0 for finished robots."""
         begin = np.where(np.isnan(self._since), now, self._since)
         until = begin + self._common.patience * (self._counts - np.maximum(self._number, 0))
         return np.where(self.busy, until - now, 0.0)

@@ -52,8 +52,7 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
 
 def _to_disc(x: Array, y: Array, radius: float, arrival: float) -> Array:
     """Length to a disc that is not outside of the circle on its side: arcs that run into it, the straight line to its
-    centre where it is outside, and the best point of its rim.
-    """
+    centre where it is outside, and the best point of its rim."""
 
     def to_rim(directions: Array) -> Array:
         return _to_point(x[:, None] + arrival * np.cos(directions), y[:, None] + arrival * np.sin(directions), radius)

@@ -16,8 +16,7 @@ from chilopod.steering.spring_law import SpringLaw
 
 
 class Prepared(NamedTuple):
-    """Robot with a strategy's springs and actuators, controller of its walk, None without one, and remarks on both, a
-    sentence each."""
+    """Robot with a strategy's springs and actuators, controller of its walk or None, and sentences about both."""
 
     robot: Robot
     controller: Controller | None
@@ -50,8 +49,7 @@ class Strategy:
     """True if the controller commands torques of the joints."""
 
     def check(self, spring: float | None) -> None:
-        """Refuse, with a ParameterError, a spring that the strategy does not choose, and a missing one that it
-        needs."""
+        """Refuse, with a ParameterError, a spring that the strategy does not choose, and lack of one that it needs."""
         if self.springs is not None and spring is None:
             raise ParameterError(f"strategy {self.name} needs one stiffness, such as 15 N*mm/deg", field="k1")
         if self.springs is None and spring is not None:
@@ -168,8 +166,7 @@ def check_strategy(strategy: object) -> None:
 
 
 def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
-    """Return a strategy of :data:`STRATEGIES`, or of other strategies, by its name; ParameterError for an unknown
-    one."""
+    """Return a strategy of :data:`STRATEGIES`, or of others, by its name; ParameterError for an unknown one."""
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
         others = [task for task, own in (("turn", STRATEGIES), ("course", ON_COURSES)) if name in own]

@@ -57,8 +57,7 @@ class Target:
 
     @property
     def radius(self) -> float:
-        """Radius of the circle that starts along the heading and ends at the target, R / (2 |sin psi|), m; infinite
-        for a target straight ahead."""
+        """Radius of the circle along the heading to the target, R / (2 |sin psi|), m; infinite straight ahead."""
         sine = abs(math.sin(self.bearing))
         return self.distance / (2.0 * sine) if sine > 0.0 else math.inf
 

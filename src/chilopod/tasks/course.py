@@ -59,8 +59,7 @@ class Driver(Short):
     remarks: tuple[str, ...] = ()
 
     def trial(self, course: Course, seed: int = 0, *, poses: bool = False, brief: bool = False) -> Trial:
-        """Trial of a course, with the disturbance of all studies; the robot's tightest circle replaces that of the
-        course if it is known."""
+        """Trial of a course, with the disturbance of all studies, and with the robot's tightest circle if known."""
         if not isinstance(course, Course):
             allowed = 'a Course, such as chilopod.steering.course_named("slalom", 40.0)'
             raise ParameterError("must be a course", field="course", value=course, allowed=allowed)

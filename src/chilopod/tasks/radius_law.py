@@ -54,8 +54,7 @@ def radius_law(
     undisturbed walks that start bent; springs at which these fail are left out. The robot's own first spring does not
     matter; folder and progress are those of :class:`chilopod.tasks.RunOptions`.
 
-    AnalysisError if there is no such branch, fewer than three springs curve, or softer springs do not curve more
-    tightly.
+    AnalysisError if there is no such branch, fewer than three springs curve, or softer ones do not curve more tightly.
     """
     if engine_named(engine).traits.exact:
         return that_holds(radius_laws(robot, progress).axis, robot, engine)
@@ -96,11 +95,8 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
 
 
 def end_of_walk(record: xr.Dataset, robot: Robot, earlier: float = 10.0) -> xr.Dataset:
-    """Measures at the end of one trial's record. Times are those of the paper's robot; in others they are as many gait
-    cycles.
+    """Measures at the end of one trial's record. Times are those of the paper's robot; others take as many gait cycles.
 
-    Returns
-    -------
     Dataset over joint: ``mean_angle``, ``axis_radius`` (m) and ``status`` of :class:`chilopod.trials.WalkSummary`;
     ``bend``, the sum of the sizes of the mean angles (rad); ``direction`` (left, right, straight; empty where the walk
     failed, or has no mean angles); ``moved``, the difference of the bend from that of the ``earlier`` s before (rad),

@@ -179,8 +179,7 @@ def _with_spring(trial: Trial, strategy: Strategy, stiffness: float | None) -> T
 
 
 def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float], folder: str | Path | None) -> float:
-    """Spring of a strategy that comes nearest to the target, by undisturbed trials on successively finer grids,
-    N*m/rad."""
+    """Spring of a strategy that comes nearest to the target, N*m/rad, by undisturbed trials on ever finer grids."""
     low, high = between
     tried = engine_named(trial.engine).traits.walks_per_round
     trial = replace(trial, disturbance=NONE, rate=20.0, poses=False)

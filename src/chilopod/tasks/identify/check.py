@@ -34,8 +34,8 @@ class SelfTest(Shown):
     intervals: Array
 
     def as_json(self) -> dict[str, Any]:
-        """Number of robots whose constant is covered, and the share that this number allows (Clopper and Pearson), by
-        the kind of numbers and the constant."""
+        """Number of robots whose constant is covered, and shares that it allows (Clopper and Pearson), by kind and
+        constant."""
         found: dict[str, Any] = {"robots": len(self.true), "rounded": {}, "scattered": {}}
         for kind, ends in (("rounded", self.ranges), ("scattered", self.intervals)):
             covered = (ends[..., 0] <= self.true) & (self.true <= ends[..., 1])
@@ -62,8 +62,7 @@ def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progr
 
     Length, mass and springs differ by factors of a third to three, and constants in units of the robot by factors of
     0.8 to 1.25. Each is identified from its critical spring and mode rounded to twice the tolerances of the data, and
-    once more from ones that scatter normally with the tolerances as standard errors. AnalysisError if no such robot has
-    a pitchfork.
+    once more from ones with these as standard errors of normal scatter. AnalysisError if none has a pitchfork.
     """
     true, ranges, intervals = [], [], []
     for number in range(count):

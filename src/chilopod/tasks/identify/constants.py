@@ -46,10 +46,8 @@ class Constant:
 
 @dataclass(frozen=True)
 class FreeConstants:
-    """The constants that are fitted, in an order, with their ranges.
-
-    Parts of the ranges are numbers from 0 to 1, shape (constants,); values are in SI units.
-    """
+    """The constants that are fitted, in an order, with their ranges. Parts of the ranges are numbers from 0 to 1, shape
+    (constants,); values are in SI units."""
 
     each: tuple[Constant, ...]
 
@@ -115,8 +113,7 @@ class FreeConstants:
         return np.array([robot.get(path) for path in self.paths])
 
     def check(self, robot: Robot) -> None:
-        """ParameterError if two constants change one number, or the robot cannot have them at the ends of their
-        ranges."""
+        """ParameterError if two constants change one number, or the robot cannot have the ends of their ranges."""
         taken: set[str] = set()
         for path in self.paths:
             if both := taken & (numbers := {*robot.numbers(path)}):

@@ -195,8 +195,7 @@ class BaseSeries(Description):
 
 
 def load_data(path: str | Path, *kinds: type[Description]) -> Any:
-    """Read a TOML file of data of one of some kinds, see :data:`TEMPLATES`; RobotFileError, in one line,
-    names the fault."""
+    """Read a TOML file of data of one of some kinds, see :data:`TEMPLATES`; RobotFileError names the fault."""
     table, source = parsed(read_text(path, "file of data", RobotFileError), str(path)), str(path)
     known: list[type[Description]] = [*kinds, CriticalMode, RecordedWalks, BaseSeries]  # of kinds alike, the first
     kind = max(known, key=lambda kind: len({*kind.model_fields} & {*table}))

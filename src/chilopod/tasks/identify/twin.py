@@ -62,8 +62,7 @@ _MOST_CONFIRMED = 20
 
 @dataclass(frozen=True)
 class Fit:
-    """One set of constants, in parts of their ranges, its residuals, and its weight in the valley, 0 if it is no sample
-    of it."""
+    """One set of constants, in parts of their ranges, its residuals, and its weight in the valley, 0 if not in it."""
 
     parts: Array
     residuals: Array
@@ -76,8 +75,7 @@ class Fit:
 
     @property
     def objective(self) -> float:
-        """Sum of the squared residuals and of the squared distances of the constants from the middle of their ranges,
-        over a quarter of the ranges."""
+        """Sum of squared residuals and squared distances of the constants from mid-range, over a quarter of ranges."""
         return float(np.sum(self.residuals**2) + np.sum(((self.parts - 0.5) / PRIOR) ** 2))
 
 
@@ -238,8 +236,7 @@ def search(
     ``starts`` are evaluated first, in parts of the ranges, and some that are spread evenly if there are few; ``counts``
     are the numbers of evaluations, these among them, and of samples. Evaluations are kept in ``folder``; a stopped
     search resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the
-    surrogate at the samples over that which it expected. AnalysisError if the robot walks with none of the first
-    constants.
+    surrogate at the samples over that which it expected. AnalysisError if none of the first constants walks.
     """
     rng = np.random.default_rng(seed)
     trained = counts[0]

@@ -42,8 +42,7 @@ class Samples:
         return float(1.0 / np.sum(self.weights**2)) if len(self.weights) else 0.0
 
     def interval(self, values: Array) -> tuple[float, float]:
-        """Ends of the central interval that holds one more draw of a number with 90 %, from its values at the samples,
-        shape (samples,).
+        """Ends of the central interval that holds one more draw of a number with 90 %, from its values at the samples.
 
         The order statistics r and s of n draws hold one more with probability (s - r)/(n + 1), here with n the
         effective number (Wilks 1941); below n = 19 the interval ends at the smallest and largest value.

@@ -285,8 +285,7 @@ class Search:
         return place, self.deviations(place)
 
     def bound(self) -> float:
-        """Bound on the error of a root, SI: by its deviation in another computation, and the slope there; NaN if the
-        number does not change the wish."""
+        """Bound on the error of a root, SI, by its deviation computed anew; NaN if the number changes nothing."""
         if not self._changed:
             return np.nan
         (wish,), step, robot, again = self.wishes, 1e-5, self.at(self.best), self.again
@@ -357,8 +356,8 @@ class Search:
         return min(tried, key=lambda found: float(norm(weights * found[1])))
 
     def _front(self, pair: Sequence[int], ends: Sequence[tuple[Array, Array]], start: Array) -> list[Array]:
-        """Places that no other found one surpasses in a wish of a pair and equals in the other: the best place, those
-        with either wish left out, and between."""
+        """Places, from the best and those with a wish of a pair left out, that none surpasses in one and equals in the
+        other."""
         found = [start, *(ends[i][0] for i in pair)]
         # Each deviation counts relative to that where its own wish is left out.
         largest = [max(abs(ends[i][1][i]), _MET) for i in pair]
