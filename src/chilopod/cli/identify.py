@@ -19,16 +19,10 @@ from chilopod.errors import AnalysisError, ParameterError, UnitError
 if TYPE_CHECKING:
     from chilopod.output import Content
     from chilopod.progress import Progress
-    from chilopod.tasks.identify import (
-        Identification,
-        NextMeasurements,
-        RecordedIdentification,
-        SelfTest,
-        TwinIdentification,
-    )
+    from chilopod.tasks import identify
 
-    Found = Identification | RecordedIdentification | TwinIdentification
-    More = dict[str, NextMeasurements | SelfTest]
+    Found = identify.Identification | identify.RecordedIdentification | identify.TwinIdentification
+    More = dict[str, identify.NextMeasurements | identify.SelfTest]
 
 app = new_app("Find constants of a model from measured or printed numbers.")
 

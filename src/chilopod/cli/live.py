@@ -12,18 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    EngineOption,
-    ForceOption,
-    JsonOption,
-    SetOption,
-    choices,
-    free,
-    read_robot,
-    reading,
-    save,
-    with_options,
-)
+from chilopod.cli import options as shared
+from chilopod.cli.options import EngineOption, ForceOption, JsonOption, SetOption, choices, with_options
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import OutputError, ParameterError
 from chilopod.live.ports import check_port
@@ -92,8 +82,8 @@ def live(options: LiveOptions) -> None:
     check_port(options.port)
     if out is not None:
         earlier = out.glob("chilopod-live-*") if out.is_dir() else ()
-        free([*_files(out, "chilopod-live-1"), *earlier], options.force)
-    described = read_robot(options.robot, options.overrides)
+        shared.free([*_files(out, "chilopod-live-1"), *earlier], options.force)
+    described = shared.read_robot(options.robot, options.overrides)
     from chilopod.live import Live
 
     named = {name: getattr(options, name) for name in ("engine", "seed", "strategy", "host", "port", "token")}
@@ -110,7 +100,7 @@ def live(options: LiveOptions) -> None:
 def _duration(typed: str | None) -> float:
     from chilopod import units
 
-    with reading("duration"):
+    with shared.reading("duration"):
         seconds = math.inf if typed is None else units.parse(typed, "s")
         if not seconds > 0.0:
             raise ParameterError("must be a time to walk", value=seconds, allowed="more than 0 s")
@@ -161,10 +151,10 @@ def play(
     """
     from chilopod.show.play import play as page
 
-    described = read_robot(robot, overrides)
-    free([out], force, ".html")
+    described = shared.read_robot(robot, overrides)
+    shared.free([out], force, ".html")
     with progress_bar("play") as show:
         html = page(described, lambda done, words: show("branch of curved walks", done, words))
-    save(out, html, described, force=force, as_json=as_json)
+    shared.save(out, html, described, force=force, as_json=as_json)
     if browser:
         webbrowser.open(out.resolve().as_uri())

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chilopod.cli import options as shared
 from chilopod.cli.options import (
     EngineOption,
     OnsetBetweenOption,
     OutOption,
     ParameterOption,
     RobotOptions,
-    interval,
-    onset_of,
-    quantity,
     with_options,
 )
 from chilopod.cli.progress import progress_bar
@@ -59,7 +57,7 @@ def stability(
     """
     described = options.described
     files = options.free_in(out, "stability.json")
-    size = quantity("amplitude", amplitude, "rad")
+    size = shared.quantity("amplitude", amplitude, "rad")
     if engine == "planar" and onset:
         raise ParameterError("must be 'twin' for --onset", field="engine", value=engine, allowed="chilopod bifurcation")
     if engine == "planar" and amplitude != _AMPLITUDE:
@@ -92,7 +90,7 @@ def _of_bends(
 
     path, unit = onset[0], robot.unit_of(onset[0])
     try:
-        point = bend_onset(multipliers, robot, path, interval(robot, path, onset[1:]))
+        point = bend_onset(multipliers, robot, path, shared.interval(robot, path, onset[1:]))
     except ParameterError as error:
         error.field = "onset" if error.field in ("between", "parameter") else error.field
         raise
@@ -120,7 +118,7 @@ def bifurcation(
     Example: chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]"
     """
     described = options.described
-    limits = onset_of(described, parameter, between).interval(described)
+    limits = shared.onset_of(described, parameter, between).interval(described)
     files = options.free_in(out, "bifurcation.json")
     from chilopod import units
     from chilopod.analysis import bifurcations

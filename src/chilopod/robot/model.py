@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
@@ -25,10 +26,6 @@ _OVERRIDDEN: Final = "set by override"
 _COPIED: Final = "copied from "
 _LONGEST: Final = 1000  # characters of a provenance
 _DERIVED: Final = "body.yaw_inertia"  # the one optional number that has a value where none is given
-
-
-def _name(text: object) -> str:
-    return _printable(text, longest=100)
 
 
 def _printable(text: object, longest: int) -> str:
@@ -75,7 +72,7 @@ class Robot(Description):
         Origin of the numbers: text by dotted path.
     """
 
-    name: Annotated[str, PlainValidator(_name)]
+    name: Annotated[str, PlainValidator(partial(_printable, longest=100))]
     body: Body
     springs: Springs
     legs: Legs
