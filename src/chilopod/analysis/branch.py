@@ -254,10 +254,8 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
     numbers = data.parameter_si.values.tolist(), data.orbit.values, multipliers, data.tangent.values
     scale = np.append(sizes, float(data.attrs["scale"]))
-    points = tuple(
-        BranchPoint(value, orbit, row, tangent, scale, kinds.get(str(special)))
-        for value, orbit, row, tangent, special in zip(*numbers, data.special.values, strict=True)
-    )
+    rows = zip(*numbers, data.special.values, strict=True)
+    points = tuple(BranchPoint(*own, scale, kinds.get(str(special))) for *own, special in rows)
     (ending,) = (each for each in Ending if each.label == data.attrs["ending"])
     return Branch(points, ending, float(data.attrs["step"]))
 
@@ -285,10 +283,8 @@ def _walked(
     weight = np.array([model.robot.weight for model in models])
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
-    verdicts = [
-        Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[stable]
-        for most, stable in zip(means.most_bent, _stability(branch), strict=True)
-    ]
+    pairs = zip(means.most_bent, _stability(branch), strict=True)
+    verdicts = [Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[stable] for most, stable in pairs]
     radius = [float(model.robot.axis_radius(angles)) for model, angles in zip(models, means.mean_angle, strict=True)]
 
     special = [point.special.label if point.special else "" for point in points]

@@ -49,8 +49,6 @@ def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     stiffest = max(robot.springs.stiffness)
     low, high = (part * stiffest for part in _BETWEEN)
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress)
-    axis, path = (
-        RadiusLaw.of_branch(walks.parameter_si.values, walks[name].values, walks.stable.values, robot.unit_of(K1))
-        for name in ("axis_radius", "path_radius")
-    )
+    springs, stable, radii = walks.parameter_si.values, walks.stable.values, (walks.axis_radius, walks.path_radius)
+    axis, path = (RadiusLaw.of_branch(springs, each.values, stable, robot.unit_of(K1)) for each in radii)
     return RadiusLaws(axis, path, walks)

@@ -193,10 +193,8 @@ _Row = tuple[float, list[float], list[float]]
 
 def size_of(robot: Robot, path: str) -> float:
     """Size of a number for steps, SI: its own, or a typical one if it is zero."""
-    typical = {
-        "springs.damping": max(robot.springs.stiffness) * robot.gait.period,
-        "legs.forward_offset": robot.module_length,
-    }
+    damping = max(robot.springs.stiffness) * robot.gait.period
+    typical = {"springs.damping": damping, "legs.forward_offset": robot.module_length}
     return abs(robot.get(path)) or typical.get(path.partition("[")[0], 1.0)
 
 
@@ -262,10 +260,9 @@ def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) ->
     mode: Mode = of.mode(True)
     slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, _keeps_symmetry(path)))
     turns = mode.frequency > 0.0
-    return {
-        "growth": (mode.growth, [slope.real for slope in slopes], errors),
-        "frequency": (mode.frequency, [turns * slope.imag for slope in slopes], [turns * error for error in errors]),
-    }
+    turning = [turns * slope.imag for slope in slopes], [turns * error for error in errors]
+    growth = mode.growth, [slope.real for slope in slopes], errors
+    return {"growth": growth, "frequency": (mode.frequency, *turning)}
 
 
 def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:

@@ -79,12 +79,8 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
     best = int(_lost(basis, y[:, None])[:, 0].argmin())
     if best in (0, len(grid) - 1):
         raise AnalysisError("must fall to zero as a square root of the distance to the pitchfork", field="angle")
-    found = minimize_scalar(
-        lambda at: _lost(_root(x, at)[None], y[:, None])[0, 0],
-        bounds=(grid[best + 1], grid[best - 1]),
-        method="bounded",
-        options={"xatol": 1e-13 * grid[best]},
-    )
+    how = {"bounds": (grid[best + 1], grid[best - 1]), "options": {"xatol": 1e-13 * grid[best]}}
+    found = minimize_scalar(lambda at: _lost(_root(x, at)[None], y[:, None])[0, 0], method="bounded", **how)
     at = float(found.x)
     root = _root(x, at)
     amplitude = float(root @ y / (root @ root))
@@ -96,14 +92,8 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
     inverted = np.linalg.inv(slopes.T @ slopes)
     effects = np.zeros(x.size)  # of every trial on 1/kc
     effects[beyond] = inverted[1] @ slopes.T
-    return SquareRootFit(
-        critical=1.0 / at,
-        error=float(np.sqrt(spread * inverted[1, 1])) / at**2,
-        estimate=_estimate(x, y, at, effects),
-        amplitude=amplitude,
-        residual=float(np.sqrt(np.mean(residuals**2))),
-        trials=x.size,
-    )
+    error, residual = float(np.sqrt(spread * inverted[1, 1])) / at**2, float(np.sqrt(np.mean(residuals**2)))
+    return SquareRootFit(1.0 / at, error, _estimate(x, y, at, effects), amplitude, residual, trials=x.size)
 
 
 def _root(inverse: Array, critical: ArrayLike) -> Array:

@@ -66,6 +66,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
         """The result as plain numbers; complex ones as [real, imaginary]."""
         multipliers = self.exponents.multipliers
         half = multipliers.half_period
+        modes = zip(_pairs(self.exponents.values), self.joint_components, strict=True)
         return {
             "robot": self.robot.name,
             "period_s": self.robot.gait.period,
@@ -75,10 +76,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
             "multipliers": _pairs(multipliers.values),
             "half_period_multipliers": None if half is None else _pairs(half),
             "error_estimate": multipliers.error_bound,
-            "modes": [
-                {"exponent": exponent, "joint_components": _numbers(components)}
-                for exponent, components in zip(_pairs(self.exponents.values), self.joint_components, strict=True)
-            ],
+            "modes": [{"exponent": exponent, "joint_components": _numbers(each)} for exponent, each in modes],
         }
 
     @property
@@ -89,9 +87,8 @@ class StraightWalk(Summary, ReadOnlyArrays):
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         rows: list[Sequence[str]] = [("|multiplier|", "exponent (1/s)", "joint angles of the mode, front to rear")]
-        for modulus, exponent, components in zip(
-            self.moduli, self.exponents.values, self.joint_components, strict=True
-        ):
+        modes = zip(self.moduli, self.exponents.values, self.joint_components, strict=True)
+        for modulus, exponent, components in modes:
             rows.append((f"{modulus:.6g}", _in_words(exponent, 6), "  ".join(map(_in_words, components))))
         nearer = "; the largest is nearer to 1 than that" if self.stable is None else ""
         said = [f"multipliers are within {self.exponents.multipliers.error_bound:.1e}{nearer}"]
@@ -194,10 +191,8 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
     parts = max(_FEWEST_PARTS, 0.5 * contraction / math.log(1e6))
     seconds = _A_PART * parts * model.dimension**2.5
     if seconds > longest:
-        problem = (
-            f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
-            f"out {contraction:.3g} e-folds a period or more"
-        )
+        fastest = f"the fastest of which dies out {contraction:.3g} e-folds a period or more"
+        problem = f"the exponents would take about {_duration(seconds)}: {model.dimension} states, {fastest}"
         allowed = f"about {_duration(longest)}: fewer modules, or longer and heavier ones"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules, allowed=allowed)
     found = stability.exponents(model, resolved=True)

@@ -16,11 +16,8 @@ from chilopod.cli.options import JsonOption, print_result
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import OutputError, briefly
 
-_PACKAGES = {
-    **{name: name for name in ("numpy", "scipy", "numba")},
-    "mujoco": "mujoco-core",
-    **{name: name for name in ("xarray", "matplotlib", "av")},
-}
+_IMPORTED = ("numpy", "scipy", "numba", "mujoco", "xarray", "matplotlib", "av")
+_PACKAGES = {name: "mujoco-core" if name == "mujoco" else name for name in _IMPORTED}
 """Names of packages in imports, and in package registries."""
 
 BROKEN = 3

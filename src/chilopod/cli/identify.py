@@ -109,9 +109,8 @@ def planar(options: _PlanarOptions) -> None:
     from chilopod.paper.printed import critical_mode_data, variant_settings
 
     robot, given, variants = options.described, options.data, variant_settings() if options.data is None else {}
-    data: identify.CriticalMode | identify.RecordedWalks = (
-        identify.load_data(given, identify.CriticalMode, identify.RecordedWalks) if given else critical_mode_data()
-    )
+    kinds = identify.CriticalMode, identify.RecordedWalks
+    data = identify.load_data(given, *kinds) if given else critical_mode_data()
     others = {"--next": options.measure, "--check": options.check, "--points": options.points != _POINTS}
     field = next((name for name, on in others.items() if on), "")
     if field and isinstance(data, identify.RecordedWalks):

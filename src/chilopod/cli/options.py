@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -177,11 +177,9 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     arguments = signature(command, eval_str=True).parameters.values()
     first, *own = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in arguments)
     hints = get_type_hints(first.annotation, include_extras=True)
-    named = (
-        (each.name, Parameter.empty if each.default is MISSING else each.default) for each in fields(first.annotation)
-    )
     robot, *shared = (
-        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[name]) for name, default in named
+        each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name])
+        for each in signature(first.annotation).parameters.values()
     )
     common = {each.name for each in fields(RobotOptions)}
 

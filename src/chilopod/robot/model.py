@@ -248,10 +248,8 @@ class Robot(Description):
 
     def listed(self) -> list[tuple[str, str, str]]:
         """Return path, quantity with its unit, and origin (or nothing) of every number of this robot."""
-        return [
-            (path, units.format(self.get(path), self.unit_of(path), digits=6), self.provenance_of(path) or "")
-            for path in self.parameters()
-        ]
+        numbers = ((path, self.get(path), self.unit_of(path)) for path in self.parameters())
+        return [(path, units.format(x, unit, digits=6), self.provenance_of(path) or "") for path, x, unit in numbers]
 
     def _repr_svg_(self) -> str:
         # Only notebooks draw, so the drawing is imported here.

@@ -34,14 +34,8 @@ class Place:
         return range(count)[self.index or slice(None)]
 
 
-SECTIONS: Final[dict[str, type[Description]]] = {
-    "body": Body,
-    "springs": Springs,
-    "legs": Legs,
-    "gait": Gait,
-    "ground": Ground,
-    "twin": Twin,
-}
+_PARTS: Final[tuple[type[Description], ...]] = (Body, Springs, Legs, Gait, Ground, Twin)
+SECTIONS: Final = {part.__name__.lower(): part for part in _PARTS}
 QUANTITIES: Final = {
     f"{section}.{key}": quantity for section, model in SECTIONS.items() for key, quantity in quantities(model).items()
 }

@@ -122,11 +122,9 @@ class Driven(Pathed):
         below = [f"{verdict}: {words}" for verdict, words in missed.items() if verdict != Verdict.ARRIVED.label]
         if len(walks) == 1:
             (walk,) = walks
-            below.append(
-                f"{walk['arrived']} of {goals} targets in {walk['time_s']:.1f} s; work {walk['spring_work_J']:.3g} J "
-                f"on springs, {walk['drive_work_J']:.3g} J by drives; steering's part of the cost of transport "
-                f"{_shown(walk['steering_cost_of_transport'])}"
-            )
+            work = f"work {walk['spring_work_J']:.3g} J on springs, {walk['drive_work_J']:.3g} J by drives"
+            part = f"steering's part of the cost of transport {_shown(walk['steering_cost_of_transport'])}"
+            below.append(f"{walk['arrived']} of {goals} targets in {walk['time_s']:.1f} s; {work}; {part}")
             return above, _of_targets(walk["targets"]), below
         reached = [walk["arrived"] for walk in walks]
         whole = f"{reached.count(goals)} of {len(walks)} courses whole"

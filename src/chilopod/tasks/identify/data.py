@@ -93,12 +93,8 @@ class _Measured(Quantity):
 
 
 # Without an effect on walks of the twin that nothing steers.
-_UNREAD = (
-    "ground.",
-    "twin.scanner",
-    "twin.pole",
-    *(f"springs.{each}" for each in ("softest", "stiffest", "rate", "lag")),
-)
+_ACTUATED = ("springs.softest", "springs.stiffest", "springs.rate", "springs.lag")
+_UNREAD = ("ground.", "twin.scanner", "twin.pole", *_ACTUATED)
 _Free = Annotated[FreeConstants, BeforeValidator(FreeConstants.read)]
 
 
