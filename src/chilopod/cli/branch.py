@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chilopod.cli import options as shared
-from chilopod.cli.options import OutOption, ParameterOption, RobotOptions, print_result, reading, with_options
+from chilopod.cli.options import OutOption, ParameterOption, RobotOptions, print_result, with_options
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import ParameterError
+from chilopod.errors import ParameterError, concerning
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,7 +76,7 @@ def branch(
     from chilopod.analysis.branch import as_json as plain
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
 
-    with reading("resume"):
+    with concerning("resume"):
         saved = None if resume is None else read_walks(resume / "branch.nc")
     if left and saved is not None and saved.attrs["side"] > 0:
         raise ParameterError("must be left out: the saved branch turns right", field="--left")

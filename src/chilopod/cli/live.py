@@ -15,7 +15,7 @@ import typer
 from chilopod.cli import options as shared
 from chilopod.cli.options import EngineOption, ForceOption, JsonOption, SetOption, choices, with_options
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import OutputError, ParameterError
+from chilopod.errors import OutputError, ParameterError, concerning
 from chilopod.live.ports import check_port
 from chilopod.live.wishes import LARGEST_SEED
 
@@ -100,7 +100,7 @@ def live(options: LiveOptions) -> None:
 def _duration(typed: str | None) -> float:
     from chilopod import units
 
-    with shared.reading("duration"):
+    with concerning("duration"):
         seconds = math.inf if typed is None else units.parse(typed, "s")
         if not seconds > 0.0:
             raise ParameterError("must be a time to walk", value=seconds, allowed="more than 0 s")

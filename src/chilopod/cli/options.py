@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from inspect import Parameter, Signature, signature
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import ChilopodError, OutputError, ParameterError, nearest_name
+from chilopod.errors import ChilopodError, OutputError, ParameterError, concerning
 
 if TYPE_CHECKING:
     from chilopod.analysis import Onset
@@ -85,22 +85,11 @@ EngineOption = Annotated[
 ]
 
 
-@contextmanager
-def reading(option: str, *words: str) -> Iterator[None]:
-    """Give errors in this block the name of an option (its name in Python) as their field, and words it may be."""
-    try:
-        yield
-    except ChilopodError as error:
-        error.field, error.nearest = option, error.nearest or nearest_name(str(error.value), words)
-        error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
-        raise
-
-
 def quantity(option: str, text: str, unit: str) -> float:
     """Read the value of an option, in SI units."""
     from chilopod import units
 
-    with reading(option):
+    with concerning(option):
         return units.parse(text, unit)
 
 
@@ -246,10 +235,10 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
     from chilopod import units
     from chilopod.analysis.parameters import check_parameter
 
-    with reading("parameter"):
+    with concerning("parameter"):
         check_parameter(robot, parameter)
     unit = robot.si_unit_of(parameter)
-    with reading(f"between {parameter}"):
+    with concerning(f"between {parameter}"):
         low, high = (units.parse(text, unit) for text in between)
         for text in between:
             robot.override(parameter, text)
@@ -275,14 +264,14 @@ def onset_of(robot: Robot, parameter: str, between: tuple[str, str] | None, at: 
     """Read the number that bends a robot, its interval, and the value at which walks are studied."""
     from chilopod.analysis.parameters import check_parameter
 
-    with reading("parameter"):
+    with concerning("parameter"):
         check_parameter(robot, parameter)
     limits = between and interval(robot, parameter, between)
-    with reading("at"):
+    with concerning("at"):
         studied = None if at is None else robot.override(parameter, at).get(parameter)
     from chilopod.analysis import Onset
 
-    with reading("between"):
+    with concerning("between"):
         return Onset(parameter, limits, studied)
 
 

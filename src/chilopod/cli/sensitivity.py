@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import OnsetOptions, read_robot, reading, with_options
-from chilopod.errors import ParameterError
+from chilopod.cli.options import OnsetOptions, read_robot, with_options
+from chilopod.errors import ParameterError, concerning
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
@@ -115,7 +115,7 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
     others = [path for path in numbers_read(robot) if parameter not in (path, path.partition("[")[0])]
     for text in given:
         path, equals, tolerance = (each.strip() for each in text.partition("="))
-        with reading("uncertain"):
+        with concerning("uncertain"):
             share = _share(tolerance if equals else path)
             if share is not None and not 0.0 < share < 1.0:
                 raise ParameterError("must be a share above 0 % and below 100 %", value=text)

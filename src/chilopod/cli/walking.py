@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from chilopod.cli.options import EngineOption, RobotOptions, deliver, free, print_result, reading
+from chilopod.cli.options import EngineOption, RobotOptions, deliver, free, print_result
 from chilopod.cli.progress import progress_bar
+from chilopod.errors import ChilopodError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod import tasks
@@ -87,9 +88,13 @@ class WalkOptions(RobotOptions):
 
     def spring(self, path: str | None, k1: str, *words: str) -> float:
         """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad; errors name words that it may be."""
-        with reading("k1", *words):
-            path = path or "springs.stiffness"
+        path = path or "springs.stiffness"
+        try:
             return self.described.override(path, k1).get(path)
+        except ChilopodError as error:
+            error.field, error.nearest = "k1", error.nearest or nearest_name(str(error.value), words)
+            error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
+            raise
 
     @contextmanager
     def walking(self, what: str) -> Iterator[Callable[[str], Progress]]:

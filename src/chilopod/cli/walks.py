@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, choices, free, quantity, reading, with_options
+from chilopod.cli.options import OutOption, choices, free, quantity, with_options
 from chilopod.cli.walking import WalkOptions
+from chilopod.errors import concerning
 
 if TYPE_CHECKING:
     from chilopod.progress import Progress
@@ -71,7 +72,7 @@ def walk(
     Example: chilopod walk aoi2022-planar --set "springs.stiffness[0]=8 N*mm/deg" --seed 1 --repeats 4 --out walks.nc
     """
     described, seconds = options.described, quantity("duration", duration, "s")
-    with reading("initial_joints"):
+    with concerning("initial_joints"):
         angles = joint_angles(initial_joints)
     samples = quantity("rate", rate, "Hz")
     free([out] if out else [], options.force, ".nc")
