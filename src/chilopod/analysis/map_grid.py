@@ -59,8 +59,7 @@ class Grid:
             j, i = rows[first : first + _AT_ONCE], columns[first : first + _AT_ONCE]
             robots = self.robots(self.x[i].tolist(), self.y[j].tolist())
             shown = part(progress, first / rows.size, min(1.0, (first + _AT_ONCE) / rows.size))
-            found = growth_rates(robots, j.size, shown)
-            self.values[:, j, i] = found.growth, found.frequency, found.error, found.unstable, found.fate
+            self.values[:, j, i] = growth_rates(robots, j.size, shown)
             self.computed[j, i] = True
             if rows.size > 1:
                 self.keep(self)

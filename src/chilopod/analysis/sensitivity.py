@@ -78,9 +78,6 @@ class Sensitivity(Summary, ReadOnlyArrays):
         known_names([quantity], self.quantities, "quantity", "is not computed")
         return self.quantities.index(quantity)
 
-    def _unit(self, quantity: str) -> str:
-        return unit_of(quantity, self.robot, self.onset)
-
     def as_json(self) -> dict[str, Any]:
         """Values, derivatives and errors as plain numbers, SI, and the changes by 1 % of every number."""
         numbers = dict(zip(self.paths, self.numbers.tolist(), strict=True))
@@ -129,8 +126,9 @@ class Sensitivity(Summary, ReadOnlyArrays):
 
     def _slope_in_words(self, row: int, at: int) -> str:
         name, unit = self.quantities[row], self.robot.unit_of(self.paths[at])
-        slope = units.from_si(self.derivatives[row, at], self._unit(name)) / units.from_si(1.0, unit)
-        return f"{name} changes by {f'{slope:+.4g} {self._unit(name)}'.strip()} for 1 {unit}"
+        own = unit_of(name, self.robot, self.onset)
+        slope = units.from_si(self.derivatives[row, at], own) / units.from_si(1.0, unit)
+        return f"{name} changes by {f'{slope:+.4g} {own}'.strip()} for 1 {unit}"
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the changes of the first quantity by 1 % of each number, largest on top."""
