@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from chilopod.tasks.identify import identify_planar as identify_planar
     from chilopod.tasks.identify import identify_twin as identify_twin
     from chilopod.tasks.radius_law import radius_law as radius_law
+    from chilopod.tasks.sizing import Sizing as Sizing
     from chilopod.tasks.sizing import size as size
-    from chilopod.tasks.sizing.result import Sizing as Sizing
     from chilopod.tasks.turn import Turn as Turn
     from chilopod.tasks.turn import turn as turn
     from chilopod.tasks.walk import Ends as Ends
@@ -30,8 +30,7 @@ else:
             "course": ("Driven", "Driver", "drive", "driver"),
             "identify": ("Identification", "TwinIdentification", "identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
-            "sizing": ("size",),
-            "sizing.result": ("Sizing",),
+            "sizing": ("Sizing", "size"),
             "turn": ("Turn", "turn"),
             "walk": ("Ends", "RunOptions", "Walks", "ends", "walk"),
         },
