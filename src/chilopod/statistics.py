@@ -162,11 +162,9 @@ def grouped_mean(values: ArrayLike) -> Estimate:
 
 
 def share(reached: ArrayLike) -> Interval:
-    """Share of True in independent groups, shape (groups,) or (groups, members).
-
-    The interval is Wilson's (1927), with as many trials as independent ones would scatter as the shares of the groups
-    do: the number of groups at least, that of all members at most. ParameterError for other values than True and False.
-    """
+    """Share of True in independent groups, shape (groups,) or (groups, members). The interval is Wilson's (1927), with
+    as many trials as independent ones would scatter as the shares of the groups do: the number of groups at least, that
+    of all members at most. ParameterError for other values than True and False."""
     table = np.asarray(reached, dtype=np.float64)
     if (wrong := table[(table != 0.0) & (table != 1.0)]).size:
         allowed = "True, False, 1, 0"

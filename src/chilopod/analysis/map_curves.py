@@ -52,19 +52,12 @@ class MapPoint(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False)
 class MapCurve(ReadOnlyArrays):
-    """Bifurcation points of the straight walk, or folds of the curved walks.
+    """Bifurcation points of the straight walk, or folds of the curved walks: ``values`` of both numbers in SI units, and
+    bounds on their errors, shape (points, 2), which follow each other on a ``line``, or each belong to a number of
+    modules; with ``special`` points of codimension two on the curve.
 
-    Attributes
-    ----------
-    kind, special
-        Kind of the bifurcation, and points of codimension two on the curve.
-    values, error_bound
-        Values of both numbers in SI units, and bounds on their errors, shape (points, 2).
-    coefficient
-        Cubic coefficient of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
-        supercritical, shape (points,). NaN where it is not known, and of transcritical points, which have none.
-    line
-        True if the points follow each other on a curve, False if each belongs to a number of modules.
+    ``coefficient`` is the cubic one of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
+    supercritical, shape (points,). NaN where it is not known, and of transcritical points, which have none.
     """
 
     kind: Kind
@@ -92,13 +85,8 @@ class Edge:
 
 @dataclass
 class Search:
-    """Search for the curves of a map.
-
-    Attributes
-    ----------
-    curves, remarks, lost
-        Curves found so far; sentences about those that may be missing; numbers of pitchforks without their folds.
-    """
+    """Search for the curves of a map: those found so far, sentences about those that may be missing, and numbers of
+    pitchforks whose folds are ``lost``."""
 
     plane: Plane
     grid: Grid

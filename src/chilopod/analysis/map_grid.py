@@ -25,17 +25,11 @@ _AT_ONCE = 20_000  # nodes between two savings
 
 
 class Grid:
-    """Nodes of the finest grid, of which those are computed whose cell is not uniform.
+    """Nodes of the finest grid at SI values ``x``, shape (columns,), and ``y``, shape (rows,), of which those are
+    ``computed``, shape (rows, columns), whose cell is not uniform.
 
-    Attributes
-    ----------
-    x, y
-        SI values, shape (columns,) and (rows,).
-    values
-        Growth, frequency, error, unstable and fate as of :class:`chilopod.analysis.growth.Growth`, shape (5, rows,
-        columns); in uniform cells growth and frequency between the corners are interpolated.
-    computed
-        True at computed nodes, shape (rows, columns).
+    ``values`` are growth, frequency, error, unstable and fate as of :class:`chilopod.analysis.growth.Growth`, shape (5,
+    rows, columns); in uniform cells growth and frequency between the corners are interpolated.
     """
 
     def __init__(self, plane: Plane, points: int, keep: Callable[[Grid], None] = lambda grid: None) -> None:

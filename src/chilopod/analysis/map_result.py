@@ -137,16 +137,9 @@ class StabilityMap(Summary, ReadOnlyArrays):
         return above, table if self.special else [], list(self.remarks)
 
     def plot(self, axes: Axes | None = None, show: str = "kind") -> Axes:
-        """Draw the map on axes of matplotlib or on new ones.
-
-        Parameters
-        ----------
-        axes
-            Axes to draw on.
-        show
-            ``kind``: what becomes of a disturbance; ``growth``: growth rate; ``frequency``: frequency of undulations;
-            ``radius``: radius of the curved walks; ``criticality``: coefficient of the normal form along the curves.
-        """
+        """Draw the map on axes of matplotlib or on new ones, and ``show`` in colours the ``kind``, what becomes of a
+        disturbance, its ``growth`` rate, the ``frequency`` of undulations, the ``radius`` of the curved walks, or the
+        ``criticality``, the coefficient of the normal form along the curves."""
         from chilopod.analysis.map_picture import draw, keys
 
         axes = draw(self, axes, show)

@@ -171,15 +171,9 @@ class Measured:
     but onsets are searched in the whole interval if not ``similar``.
 
     Each of :data:`QUANTITIES` is a method of a robot, and raises AnalysisError where the robot has no such quantity.
-
-    Attributes
-    ----------
-    number
-        Number that bends the robots.
-    branches
-        Number of branches of curved walks that were followed so far, which take a second or more each.
-    near
-        State of the curved walk from which the next is corrected, and inverse of the slope of what it lacks.
+    ``number`` is that which bends the robots, ``branches`` counts those that were followed so far, which take a second
+    or more each, and ``near`` is the state of the curved walk from which the next is corrected, and the inverse of the
+    slope of what it lacks.
     """
 
     def __init__(self, number: Onset, similar: bool = True, following: Callable[[], None] = lambda: None) -> None:

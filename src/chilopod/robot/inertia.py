@@ -12,11 +12,9 @@ from chilopod.robot.parts import Body, Legs, Twin
 
 
 def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
-    """Yaw inertia of one whole module with its legs about its centre, kg*m^2.
-
-    The given value, else that of a uniform rod of the module's mass and length. In a very short module legs and body
-    width alone exceed the rod; then it is the least possible value.
-    """
+    """Yaw inertia of one whole module with its legs about its centre, kg*m^2. The given value, else that of a uniform
+    rod of the module's mass and length. In a very short module legs and body width alone exceed the rod; then it is the
+    least possible value."""
     if body.yaw_inertia is not None:
         return body.yaw_inertia
     rod = body.mass / body.modules * (body.length / body.modules) ** 2 / 12.0
@@ -37,10 +35,8 @@ def body_mass(body: Body, twin: Twin) -> float:
 
 def body_inertia(body: Body, legs: Legs, twin: Twin) -> tuple[float, float, float]:
     """Inertia of a module's body without its legs, about its long axis, about its transverse axis and in yaw, kg*m^2.
-
     Across, the body is a uniform box; along, its mass is spread so that body and legs together have the yaw inertia of
-    :func:`module_yaw_inertia`. Such a body exists within :func:`yaw_inertia_range`.
-    """
+    :func:`module_yaw_inertia`. Such a body exists within :func:`yaw_inertia_range`."""
     mass = body_mass(body, twin)
     across, upright = mass * twin.body_width**2 / 12.0, mass * twin.body_height**2 / 12.0
     yaw = module_yaw_inertia(body, legs, twin) - legs_yaw_inertia(legs, twin)

@@ -71,16 +71,11 @@ def arrivals(record: xr.Dataset) -> Array:
 
 
 def evaluate(record: xr.Dataset, time: float) -> Criteria:
-    """Criteria of every walk of a record.
+    """Criteria of every walk of a record of turning tasks at a time: in the paper the earliest at which any robot
+    arrives, 23 s. A model that walks faster has an earlier one.
 
-    Parameters
-    ----------
-    record
-        Record of turning tasks: ``distance`` and ``bearing`` over (time, robot), ``status`` and, if the legs were
-        steered, ``command`` over (event, robot, side).
-    time
-        The evaluation time: in the paper the earliest at which any robot arrives, 23 s. A model that walks faster
-        has an earlier one.
+    The record has ``distance`` and ``bearing`` over (time, robot), ``status`` and, if the legs were steered,
+    ``command`` over (event, robot, side).
     """
     distance = record.distance.transpose("time", "robot").values
     bearing = record.bearing.transpose("time", "robot").values

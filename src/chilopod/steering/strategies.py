@@ -72,17 +72,9 @@ class Strategy:
         spring: float | None = None,
         controller: Controller | None = None,
     ) -> Prepared:
-        """Prepare a robot for a walk; ParameterError if the strategy does not accept spring, law or actuators.
-
-        Parameters
-        ----------
-        robot, law
-            Robot, and its radius law for strategies with ``needs_law``.
-        spring
-            Stiffness for strategies with ``springs``, N*m/rad.
-        controller
-            Controller in place of the strategy's, which then needs no law.
-        """
+        """Prepare a robot for a walk, with its radius law for strategies with ``needs_law``, a spring, N*m/rad, for
+        those with ``springs``, or a controller in place of the strategy's, which then needs no law. ParameterError if
+        the strategy does not accept spring, law or actuators."""
         walker, remarks = self.fitted(robot, spring)
         if controller is not None:
             return Prepared(walker, controller, remarks)

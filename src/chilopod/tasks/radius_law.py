@@ -80,12 +80,10 @@ def bent(robot: Robot, engine: str = "planar", cycles: float = CYCLES) -> Trial:
 
 
 def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:
-    """Part of a radius law whose circles a robot reaches from a straight start.
-
-    A robot bends farther on its way into a circle than on the circle, and feet differ, so that a joint may leave its
-    range although it does not in the settled walk. The softest spring of the result is the first at which no joint does
-    in :data:`HELD` walks with the disturbance of all studies. Raises AnalysisError if no spring remains.
-    """
+    """Part of a radius law whose circles a robot reaches from a straight start. A robot bends farther on its way into a
+    circle than on the circle, and feet differ, so that a joint may leave its range although it does not in the settled
+    walk. The softest spring of the result is the first at which no joint does in :data:`HELD` walks with the
+    disturbance of all studies. Raises AnalysisError if no spring remains."""
     for first, value in enumerate(law.values[:-2].tolist()):
         walker = robot.with_value(K1, value)
         ends = run([Trial(walker, CYCLES * robot.gait.period, seed, rate=1.0, engine=engine) for seed in range(HELD)])

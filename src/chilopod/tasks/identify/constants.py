@@ -152,23 +152,12 @@ def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of free constants.
+    """Estimates of the ``free`` constants of a robot, ``given`` with those that are not.
 
-    Attributes
-    ----------
-    given, free
-        Robot with the constants that are not free, and the free ones with their ranges.
-    values, ends
-        Best value of each constant, shape (constants,), and ends of its 90 % interval, shape (constants, 2), SI, NaN
-        where none is found.
-    spread
-        Covariance of the constants, SI, for half of a 90 % interval in place of a standard deviation, shape (constants,
-        constants); NaN where it is not known.
-    remark
-        Words that the provenance of each constant ends with.
-    cut
-        Mask of the ends that lie where another constant is at the end of its range, shape (constants, 2); by default
-        none.
+    ``values`` are the best, shape (constants,), and ``ends`` those of their 90 % intervals, shape (constants, 2), SI,
+    NaN where none is found. ``spread`` is their covariance, SI, for half of a 90 % interval in place of a standard
+    deviation, shape (constants, constants), NaN where it is not known. Provenances end with the ``remark``. ``cut`` is
+    a mask of the ends that lie where another constant is at the end of its range, shape (constants, 2).
     """
 
     given: Robot

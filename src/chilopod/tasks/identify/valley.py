@@ -43,10 +43,8 @@ class Samples:
 
     def interval(self, values: Array) -> tuple[float, float]:
         """Ends of the central interval that holds one more draw of a number with 90 %, from its values at the samples.
-
         The order statistics r and s of n draws hold one more with probability (s - r)/(n + 1), here with n the
-        effective number (Wilks 1941); below n = 19 the interval ends at the smallest and largest value.
-        """
+        effective number (Wilks 1941); below n = 19 the interval ends at the smallest and largest value."""
         order, n = np.argsort(values), self.effective
         middles = np.cumsum(self.weights[order]) - 0.5 * self.weights[order]
         beyond = 0.5 * (1.0 - CONFIDENCE) * (n + 1.0) / n - 0.5 / n
