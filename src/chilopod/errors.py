@@ -87,12 +87,13 @@ class ClusterError(ChilopodError, RuntimeError):
 
 
 @contextmanager
-def concerning(field: str | None = None, *, source: str | None = None) -> Iterator[None]:
-    """Errors of this block concern this field, or are in this source."""
+def concerning(field: str | None = None, *, within: str = "", source: str | None = None) -> Iterator[None]:
+    """Errors of this block concern this field, or one within something, or are in this source."""
     try:
         yield
     except ChilopodError as error:
         error.field = error.field if field is None else field
+        error.field = f"{within} {error.field or ''}".strip() if within else error.field
         error.source = error.source if source is None else source
         raise
 

@@ -53,12 +53,10 @@ class MapPoint(ReadOnlyArrays):
 @dataclass(frozen=True, eq=False)
 class MapCurve(ReadOnlyArrays):
     """Bifurcation points of the straight walk, or folds of the curved walks: ``values`` of both numbers, SI, and bounds
-    on their errors, shape (points, 2), which follow each other on a ``line``, or each belong to a number of
-    modules; with ``special`` points of codimension two on the curve.
-
-    ``coefficient`` is the cubic one of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
-    supercritical, shape (points,). NaN where it is not known, and of transcritical points, which have none.
-    """
+    on their errors, shape (points, 2), which follow each other on a ``line``, or each belong to a number of modules;
+    with ``special`` points of codimension two on the curve. ``coefficient`` is the cubic one of the normal form for an
+    amplitude of joint angles, 1/rad^2, negative where it is supercritical, shape (points,). NaN where it is not known,
+    and of transcritical points, which have none."""
 
     kind: Kind
     values: Array

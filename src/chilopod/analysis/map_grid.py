@@ -26,11 +26,9 @@ _AT_ONCE = 20_000  # nodes between two savings
 
 class Grid:
     """Nodes of the finest grid at SI values ``x``, shape (columns,), and ``y``, shape (rows,), of which those are
-    ``computed``, shape (rows, columns), whose cell is not uniform.
-
-    ``values`` are growth, frequency, error, unstable and fate as of :class:`chilopod.analysis.growth.Growth`, shape (5,
-    rows, columns); in uniform cells growth and frequency between the corners are interpolated.
-    """
+    ``computed``, shape (rows, columns), whose cell is not uniform. ``values`` are growth, frequency, error, unstable
+    and fate as of :class:`chilopod.analysis.growth.Growth`, shape (5, rows, columns); in uniform cells growth and
+    frequency between the corners are interpolated."""
 
     def __init__(self, plane: Plane, points: int, keep: Callable[[Grid], None] = lambda grid: None) -> None:
         self.plane, self.keep = plane, keep

@@ -25,11 +25,9 @@ def stiffness(value: float) -> float:
 
 
 def spring_scale(robot: Robot) -> float:
-    """Scale of a robot's springs, friction x speed x duty factor x module length, N*m/rad.
-
-    Critical springs of robots of one shape are about the same in this unit, whatever their size, mass, speed and floor.
-    They also depend on mass / (friction x period), but hardly while the feet stop a module within a step.
-    """
+    """Scale of a robot's springs, friction x speed x duty factor x module length, N*m/rad. Critical springs of robots
+    of one shape are about the same in this unit, whatever their size, mass, speed and floor. They also depend on mass /
+    (friction x period), but hardly while the feet stop a module within a step."""
     gait = robot.gait
     return robot.ground.friction * gait.speed * gait.duty * robot.module_length
 

@@ -167,14 +167,11 @@ class Onset:
 
 
 class Measured:
-    """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before,
-    but onsets are searched in the whole interval if not ``similar``.
-
-    Each of :data:`QUANTITIES` is a method of a robot, and raises AnalysisError where the robot has no such quantity.
-    ``number`` is that which bends the robots, ``branches`` counts those that were followed so far, which take a second
-    or more each, and ``near`` is the state of the curved walk from which the next is corrected, and the inverse of the
-    slope of what it lacks.
-    """
+    """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before, but
+    onsets are searched in the whole interval if not ``similar``. Each of :data:`QUANTITIES` is a method of a robot, and
+    raises AnalysisError where the robot has no such quantity. ``number`` is that which bends the robots, ``branches``
+    counts those that were followed so far, which take a second or more each, and ``near`` is the state of the curved
+    walk from which the next is corrected, and the inverse of the slope of what it lacks."""
 
     def __init__(self, number: Onset, similar: bool = True, following: Callable[[], None] = lambda: None) -> None:
         """The number, whether robots are similar, and a function that is called before a branch is followed."""

@@ -54,11 +54,9 @@ class SquareRootFit:
 
 def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
     """Fit the square-root law to trials by least squares in the angle: 1/k of every trial, positive, equal for trials
-    at one spring, and their mean angles, whose sign is ignored, shape (trials,).
-
-    ParameterError if the arrays differ in shape or are not finite; AnalysisError if the trials do not determine the
-    point: fewer than three, at fewer than two springs that bend, or with angles that do not fall towards it.
-    """
+    at one spring, and their mean angles, whose sign is ignored, shape (trials,). ParameterError if the arrays differ in
+    shape or are not finite; AnalysisError if the trials do not determine the point: fewer than three, at fewer than two
+    springs that bend, or with angles that do not fall towards it."""
     x, y = np.asarray(inverse, dtype=np.float64), np.abs(np.asarray(angle, dtype=np.float64))
     if x.ndim != 1 or x.shape != y.shape:
         raise ParameterError("must have one value for each spring", field="angle", value=y.shape, allowed=f"{x.shape}")

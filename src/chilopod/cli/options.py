@@ -56,12 +56,6 @@ ParameterOption = Annotated[
         "springs.stiffness, all springs together.",
     ),
 ]
-BetweenOption = Annotated[
-    tuple[str, str],
-    typer.Option(
-        metavar="LOW HIGH", help='Interval of its values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'
-    ),
-]
 OnsetBetweenOption = Annotated[
     tuple[str, str] | None,
     typer.Option(
@@ -98,11 +92,8 @@ def read_robot(robot: str | Robot, overrides: Sequence[str] | None) -> Robot:
     from chilopod.robot import Robot, load_robot
 
     described = robot if isinstance(robot, Robot) else load_robot(robot)
-    try:
+    with concerning(within="--set"):
         return described.set_from_text(overrides or ())
-    except ChilopodError as error:
-        error.field = f"--set {error.field or ''}".strip()
-        raise
 
 
 @dataclass(frozen=True)

@@ -62,10 +62,8 @@ class Goal:
     @classmethod
     def parse(cls, text: str) -> Goal:
         """Read ``"45 deg, 1.3 m"``: direction and distance from module 1, or ``"1.2 m, 0.5 m"``: x and y on the floor.
-
         A direction is relative to the heading, left positive, -180 to 180 deg. ParameterError or UnitError for any
-        other text, or a position out of range.
-        """
+        other text, or a position out of range."""
         first, comma, second = (part.strip() for part in text.partition(","))
         fits = [unit for unit in ("rad", "m") if _is_quantity(first, unit)]
         if not comma or len(fits) != 1:

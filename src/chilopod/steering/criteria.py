@@ -72,11 +72,8 @@ def arrivals(record: xr.Dataset) -> Array:
 
 def evaluate(record: xr.Dataset, time: float) -> Criteria:
     """Criteria of every walk of a record of turning tasks at a time: in the paper the earliest at which any robot
-    arrives, 23 s. A model that walks faster has an earlier one.
-
-    The record has ``distance`` and ``bearing`` over (time, robot), ``status`` and, if the legs were steered,
-    ``command`` over (event, robot, side).
-    """
+    arrives, 23 s. A model that walks faster has an earlier one. The record has ``distance`` and ``bearing`` over (time,
+    robot), ``status`` and, if the legs were steered, ``command`` over (event, robot, side)."""
     distance = record.distance.transpose("time", "robot").values
     bearing = record.bearing.transpose("time", "robot").values
     walked = np.isfinite(distance).all(0)

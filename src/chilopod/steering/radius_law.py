@@ -41,11 +41,8 @@ class RadiusLaw(ReadOnlyArrays):
     def of_branch(cls, values: ArrayLike, radii: ArrayLike, stable: ArrayLike, unit: str) -> RadiusLaw:
         """Build the law from a branch of curved walks that starts at its pitchfork: parameter in SI units, radius in m
         and stability of the walk along the branch, from the pitchfork (included) on, shape (points,); and unit of the
-        values in messages.
-
-        AnalysisError if the walks beside the pitchfork are not stable or do not tighten as the parameter falls, so that
-        no spring sets the radius of a turn.
-        """
+        values in messages. AnalysisError if the walks beside the pitchfork are not stable or do not tighten as the
+        parameter falls, so that no spring sets the radius of a turn."""
         values, radii, stable = np.asarray(values, float), np.asarray(radii, float), np.asarray(stable, bool)
         curvature = np.where(np.isfinite(radii), 1.0 / radii, 0.0)
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)

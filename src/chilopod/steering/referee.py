@@ -41,11 +41,9 @@ class Verdict(Labelled):
 
 @dataclass(frozen=True)
 class Judged:
-    """Masks of the robots, shape (robots,), whose target ended at a look of :class:`CourseReferee`.
-
-    They have ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or no longer walk,
-    which ends all their targets (``gone``). Others have had no target yet (``begins``).
-    """
+    """Masks of the robots, shape (robots,), whose target ended at a look of :class:`CourseReferee`. They have
+    ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or no longer walk, which ends
+    all their targets (``gone``). Others have had no target yet (``begins``)."""
 
     arrived: NDArray[np.bool_]
     late: NDArray[np.bool_]

@@ -22,11 +22,9 @@ _HAIR = 1e-12
 
 def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) -> Array:
     """Length of the shortest path to within the arrival radius of a position, m, shape (...); 0 within it, NaN for a
-    position that is not finite. ParameterError if one of the radii is negative, not a number, or too large.
-
-    The place is distances ahead and to the left, m, shape (..., 2), the radius that of the tightest circle, m, 0 for a
-    robot that turns on the spot, and the arrival the distance that counts as arrived, m.
-    """
+    position that is not finite. ParameterError if one of the radii is negative, not a number, or too large. The place
+    is distances ahead and to the left, m, shape (..., 2), the radius that of the tightest circle, m, 0 for a robot that
+    turns on the spot, and the arrival the distance that counts as arrived, m."""
     for name, value in (("turning radius", radius), ("arrival radius", arrival)):
         if not 0.0 <= value <= FARTHEST:
             allowed = f"from 0, at most {FARTHEST:g} m"

@@ -74,11 +74,9 @@ class SpringLaw(ReadOnlyArrays):
 
     @classmethod
     def of(cls, robot: Robot, law: RadiusLaw) -> SpringLaw:
-        """Build the law of a robot from its size, its springs, the actuator of the first one, and its radius law.
-
-        The range of the spring goes from that of the tightest walk of the radius law to the stiffest of the axis,
-        within the limits of the actuator. ParameterError if the actuator leaves no range.
-        """
+        """Build the law of a robot from its size, its springs, the actuator of the first one, and its radius law. The
+        range of the spring goes from that of the tightest walk of the radius law to the stiffest of the axis, within
+        the limits of the actuator. ParameterError if the actuator leaves no range."""
         own = robot.springs
         softest = max(float(law.values[0]), own.softest[0] if own.softest else 0.0)
         stiffest = min(max(own.stiffness), own.stiffest[0] if own.stiffest else np.inf)

@@ -152,13 +152,11 @@ def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of the ``free`` constants of a robot, ``given`` with those that are not.
-
-    ``values`` are the best, shape (constants,), and ``ends`` those of their 90 % intervals, shape (constants, 2), SI,
-    NaN where none is found. ``spread`` is their covariance, SI, for half of a 90 % interval in place of a standard
-    deviation, shape (constants, constants), NaN where it is not known. Provenances end with the ``remark``. ``cut`` is
-    a mask of the ends that lie where another constant is at the end of its range, shape (constants, 2).
-    """
+    """Estimates of the ``free`` constants of a robot, ``given`` with those that are not. ``values`` are the best, shape
+    (constants,), and ``ends`` those of their 90 % intervals, shape (constants, 2), SI, NaN where none is found.
+    ``spread`` is their covariance, SI, for half of a 90 % interval in place of a standard deviation, shape (constants,
+    constants), NaN where it is not known. Provenances end with the ``remark``. ``cut`` is a mask of the ends that lie
+    where another constant is at the end of its range, shape (constants, 2)."""
 
     given: Robot
     free: FreeConstants

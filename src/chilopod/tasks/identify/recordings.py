@@ -49,12 +49,9 @@ def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Rec
     data.free.check(robot)
     robots = []
     for at, each in enumerate(data.trajectory):
-        try:
+        with concerning(within=f"trajectory.{at}.settings"):
             robots.append(own := robot.set_from_text(each.settings))
             fixed = {number for text in each.settings for number in own.numbers(text.partition("=")[0].strip())}
-        except ChilopodError as error:
-            error.field = f"trajectory.{at}.settings {error.field or ''}".strip()
-            raise
         for path in data.free.paths:
             if fixed.issuperset(own.numbers(path)):
                 raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
