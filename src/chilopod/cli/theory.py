@@ -11,14 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chilopod.cli import options as shared
-from chilopod.cli.options import (
-    EngineOption,
-    OnsetBetweenOption,
-    OutOption,
-    ParameterOption,
-    RobotOptions,
-    with_options,
-)
+from chilopod.cli.options import EngineOption, OutOption, ParameterOption, RobotOptions, with_options
 from chilopod.cli.progress import progress_bar
 from chilopod.cli.walking import own_code
 from chilopod.errors import ParameterError, concerning, known_names
@@ -109,7 +102,7 @@ def _of_bends(
 def bifurcation(
     options: RobotOptions,
     parameter: ParameterOption,
-    between: OnsetBetweenOption = None,
+    between: shared.OnsetBetweenOption = None,
     seconds: Annotated[
         float, typer.Option(metavar="S", min=0.0, help="Time limit, s; the search ends with what it found.")
     ] = 60.0,
