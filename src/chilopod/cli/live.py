@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli import options as shared
-from chilopod.cli.options import EngineOption, ForceOption, JsonOption, SetOption, choices, with_options
+from chilopod.cli.options import EngineOption, ForceOption, JsonOption, RobotArg, SetOption, choices, with_options
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import OutputError, ParameterError, concerning
+from chilopod.errors import OutputError, ParameterError
 from chilopod.live.ports import check_port
 from chilopod.live.wishes import LARGEST_SEED
 
@@ -27,35 +27,31 @@ StrategyOption = Annotated[
     str,
     typer.Option(help="Strategy at the start; the page can change it.", autocompletion=lambda: choices("ON_THE_WAY")),
 ]
-HostOption = Annotated[
-    str,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Address to listen at, by default for this machine only. At any other address, such as 0.0.0.0 (all), "
-        "a browser needs the token in the printed link.",
-    ),
-]
-TokenOption = Annotated[
-    bool, typer.Option("--token", help="Require the token on this machine too, where others use it as well.")
-]
 
 
 @dataclass(frozen=True)
 class LiveOptions:
     """Argument and options of ``live``, as they were typed."""
 
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
-    ] = "aoi2022-planar"
+    robot: RobotArg = "aoi2022-planar"
     engine: EngineOption = "planar"
     strategy: StrategyOption = "variable"
     seed: Annotated[
         int,
         typer.Option(metavar="N", min=0, max=LARGEST_SEED, help="Seed of the start and of the nudges of the floor."),
     ] = 1
-    host: HostOption = "127.0.0.1"
+    host: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Address to listen at, by default for this machine only. At any other address, such as 0.0.0.0 "
+            "(all), a browser needs the token in the printed link.",
+        ),
+    ] = "127.0.0.1"
     port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any free port.")] = 8080
-    token: TokenOption = False
+    token: Annotated[
+        bool, typer.Option("--token", help="Require the token on this machine too, where others use it as well.")
+    ] = False
     duration: Annotated[
         str | None, typer.Option(metavar="TIME", help='Time after which the page ends by itself, such as "10 min".')
     ] = None
@@ -78,7 +74,10 @@ def live(options: LiveOptions) -> None:
 
     Example: chilopod live aoi2022-planar --set "springs.stiffness[0]=15 N*mm/deg" --open
     """
-    seconds, out = _duration(options.duration), options.out
+    out, time = options.out, options.duration
+    seconds = math.inf if time is None else shared.quantity("duration", time, "s")
+    if not seconds > 0.0:
+        raise ParameterError("must be a time to walk", field="duration", value=seconds, allowed="more than 0 s")
     check_port(options.port)
     if out is not None:
         earlier = out.glob("chilopod-live-*") if out.is_dir() else ()
@@ -95,16 +94,6 @@ def live(options: LiveOptions) -> None:
         page.wait(seconds)
     finally:
         _end(page, options.force)
-
-
-def _duration(typed: str | None) -> float:
-    from chilopod import units
-
-    with concerning("duration"):
-        seconds = math.inf if typed is None else units.parse(typed, "s")
-        if not seconds > 0.0:
-            raise ParameterError("must be a time to walk", value=seconds, allowed="more than 0 s")
-    return seconds
 
 
 def _keep(folder: Path, replace: bool, name: str, record: bytes, page: str) -> None:

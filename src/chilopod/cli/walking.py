@@ -28,30 +28,6 @@ Found = TypeVar("Found", bound="Runs")
 _SLOW = 0.5  # of the time of walks
 _NOTICED = 1.0  # s
 
-SeedOption = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        min=0,
-        help="Seed of small random disturbances of start, feet and sensor; the same seed gives the same walk. Without "
-        "it nothing is disturbed.",
-    ),
-]
-ControllerOption = Annotated[
-    str | None,
-    typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
-]
-TrialsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--trials",
-        metavar="FOLDER",
-        help="Folder that keeps all trials; a trial that is there already is not walked again.",
-    ),
-]
-RepeatsOption = Annotated[
-    int, typer.Option(metavar="N", min=1, max=100_000, help="Number of walks; their seeds count up from --seed.")
-]
 ClusterOption = Annotated[
     str | None,
     typer.Option(
@@ -66,11 +42,31 @@ ClusterOption = Annotated[
 class WalkOptions(RobotOptions):
     """Argument and options that walk, turn and course share, as they were typed."""
 
-    seed: SeedOption = None
-    repeats: RepeatsOption = 1
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Seed of small random disturbances of start, feet and sensor; the same seed gives the same walk. "
+            "Without it nothing is disturbed.",
+        ),
+    ] = None
+    repeats: Annotated[
+        int, typer.Option(metavar="N", min=1, max=100_000, help="Number of walks; their seeds count up from --seed.")
+    ] = 1
     engine: EngineOption = "planar"
-    controller: ControllerOption = None
-    trials: TrialsOption = None
+    controller: Annotated[
+        str | None,
+        typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
+    ] = None
+    trials: Annotated[
+        Path | None,
+        typer.Option(
+            "--trials",
+            metavar="FOLDER",
+            help="Folder that keeps all trials; a trial that is there already is not walked again.",
+        ),
+    ] = None
     cluster: ClusterOption = None
 
     @property
