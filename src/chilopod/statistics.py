@@ -154,8 +154,7 @@ def ratio(of: ArrayLike, to: ArrayLike) -> Estimate:
 
 
 def grouped_mean(values: ArrayLike) -> Estimate:
-    """Mean of the finite numbers in independent groups, shape (groups, members), such as courses of targets: members of
-    a group may depend on each other."""
+    """Mean of the finite numbers in independent groups, shape (groups, members), whose members may be dependent."""
     table = np.asarray(values, dtype=np.float64)
     known = np.isfinite(table)
     return ratio(np.where(known, table, 0.0).sum(axis=1), known.sum(axis=1))
@@ -185,8 +184,7 @@ def share(reached: ArrayLike) -> Interval:
 def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Estimate:
     """Mean of some trials minus that of others, shapes (n,) and (m,), by Welch's test; only finite numbers count.
 
-    Paired trials have equal indices, as those of one seed, and the error of their differences; ParameterError if their
-    numbers differ."""
+    Paired trials have equal indices, and the error is that of their differences; ParameterError for other numbers."""
     if paired:
         if np.shape(one) != np.shape(other):
             raise ParameterError(f"has the wrong shape {np.shape(other)}", field="other", allowed=str(np.shape(one)))

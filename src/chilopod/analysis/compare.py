@@ -40,8 +40,7 @@ _DERIVED = "body.yaw_inertia"
 @dataclass(frozen=True, eq=False)
 class Effects(ReadOnlyArrays):
     """A quantity of two robots, SI, and the part of each differing number in the difference: alone, as the last change,
-    and in the mean over orders, with half its 95 % interval, zero for all orders; shape (numbers,) each. NaN where a
-    robot in between has no such quantity."""
+    and in the mean over orders, with half its 95 % interval, zero for all orders; shape (numbers,), NaN if none."""
 
     first: float
     second: float

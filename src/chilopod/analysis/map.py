@@ -139,8 +139,7 @@ def _failed(grid: Grid) -> list[str]:
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
-    """Say how long a long map will take, from robots in the middles of nine equal parts; refuse one of many hours that
-    is not kept."""
+    """Say how long a long map takes, by robots in the middles of nine parts; refuse many hours that are not kept."""
     y, x = (values[np.array([1, 3, 5]) * values.size // 6] for values in (grid.y, grid.x))
     places = grid.robots(np.tile(x, 3).tolist(), np.repeat(y, 3).tolist())
     robots = [robot for robot in places if isinstance(robot, Robot)]

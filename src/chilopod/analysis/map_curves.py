@@ -42,8 +42,7 @@ _CUT_OFF = {Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS}
 
 @dataclass(frozen=True, eq=False)
 class MapPoint(ReadOnlyArrays):
-    """A point where two conditions hold at once, such as the meeting of two curves: kind, values of both numbers in SI
-    units and bounds on their errors, shape (2,)."""
+    """A point where two conditions hold at once: kind, values of both numbers, SI, and error bounds, shape (2,)."""
 
     kind: CodimensionTwo
     values: Array

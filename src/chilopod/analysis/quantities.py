@@ -98,11 +98,9 @@ def leading_mode(robot: Robot, symmetric: bool = True) -> Mode:
 class Onset:
     """The number at whose critical value the straight walk loses stability, to a bend or an undulation, the interval in
     which that is searched, of springs by default that of :func:`chilopod.analysis.parameters.searched_springs`, and the
-    value at which straight and curved walks are studied, by default that of each robot; SI.
-
-    Most robots bend as a spring falls. Where the straight walk is unstable at the upper end of the interval and stable
-    at the lower one, the robot bends as the number rises.
-    """
+    value at which straight and curved walks are studied, by default that of each robot; SI. Most robots bend as a
+    spring falls. Where the straight walk is unstable at the upper end of the interval and stable at the lower one, the
+    robot bends as the number rises."""
 
     parameter: str = K1
     between: tuple[float, float] | None = None

@@ -12,9 +12,8 @@ from chilopod.robot.parts import Body, Legs, Twin
 
 
 def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
-    """Yaw inertia of one whole module with its legs about its centre, kg*m^2. The given value, else that of a uniform
-    rod of the module's mass and length. In a very short module legs and body width alone exceed the rod; then it is the
-    least possible value."""
+    """Yaw inertia of one whole module with its legs about its centre, kg*m^2: as given, else of a uniform rod of the
+    module's mass and length, or the least possible value where legs and body width of a short module exceed the rod."""
     if body.yaw_inertia is not None:
         return body.yaw_inertia
     rod = body.mass / body.modules * (body.length / body.modules) ** 2 / 12.0

@@ -170,12 +170,10 @@ class Robot(Description):
         return tuple(f"{stem}[{i}]" for i in place.joints(self.body.modules - 1)) if place.quantity.each else (stem,)
 
     def get(self, path: str) -> float:
-        """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``.
-
-        Without an index the springs count as one parameter, as do those of a group such as ``springs.stiffness[1:]``,
-        which has a value if all are alike. ``body.yaw_inertia`` is `module_yaw_inertia` where none is given. Here and
-        below, a path that is not that of a number raises ParameterError.
-        """
+        """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``. Without an index the
+        springs count as one parameter, as do those of a group such as ``springs.stiffness[1:]``, which has a value if
+        all are alike. ``body.yaw_inertia`` is `module_yaw_inertia` where none is given. Here and below, a path that is
+        not that of a number raises ParameterError."""
         place = self._locate(path)
         if path == _DERIVED:
             return self.module_yaw_inertia
@@ -199,12 +197,10 @@ class Robot(Description):
         return self._locate(path).quantity.si
 
     def with_value(self, path: str, value: float) -> Self:
-        """Return this robot with one parameter changed to `value` in SI units; about 20 us, for sweeps.
-
-        `path` is as for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring
-        and damper for new joints, and drops those of removed ones; length and mass of the whole robot stay. The
-        provenance of a changed parameter says that it was overridden. ParameterError if `value` is out of range.
-        """
+        """Return this robot with one parameter changed to `value` in SI units; about 20 us, for sweeps. `path` is as
+        for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring and damper
+        for new joints, and drops those of removed ones; length and mass of the whole robot stay. The provenance of a
+        changed parameter says that it was overridden. ParameterError if `value` is out of range."""
         return self._changed(path, lambda quantity: quantity.check(value))
 
     def override(self, path: str, value: object) -> Self:

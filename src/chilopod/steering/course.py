@@ -86,8 +86,7 @@ class Goal:
         return f"{math.degrees(math.atan2(self.y, self.x)):g} deg, {math.hypot(self.x, self.y):g} m"
 
     def place(self, poses: Array) -> Array:
-        """Position on the floor, m, shape (..., 2), from the poses of module 1 when the goal is set: x, y (m) and
-        heading (rad), shape (..., 3)."""
+        """Position on the floor, m, shape (..., 2), from x, y (m) and heading (rad) when it is set, shape (..., 3)."""
         if not self.relative:
             return np.tile([self.x, self.y], (*poses.shape[:-1], 1))
         x, y, heading = poses.T
@@ -175,12 +174,10 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
 
 
 def course_named(text: str, patience: float) -> Course:
-    """Read a course with a patience for each target, s.
-
-    The text has targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``;
-    or is the path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or
-    ``random:SEED``. Write ``./name`` for a file with the name of a course. ParameterError or UnitError names a fault.
-    """
+    """Read a course with a patience for each target, s; ParameterError or UnitError names a fault. The text has targets
+    as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or is the path of a
+    file (``./name`` for one with the name of a course) with a target a line, ``#`` before comments; or a name of
+    :data:`COURSES`; or ``random:SEED``."""
     if text in COURSES:
         return Course(COURSES[text], patience)
     if text.startswith(_RANDOM):

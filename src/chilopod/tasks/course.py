@@ -70,8 +70,7 @@ class Driver(Short):
 
 @dataclass(frozen=True)
 class Driven(Pathed):
-    """Walks along a course by a driver, with their trials and records, each up to its end, see
-    :func:`chilopod.steering.add_measures`."""
+    """Walks along a course by a driver; records up to the end of each, see :func:`chilopod.steering.add_measures`."""
 
     driver: Driver
     records: tuple[xr.Dataset, ...]

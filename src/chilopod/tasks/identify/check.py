@@ -34,8 +34,7 @@ class SelfTest(Shown):
     intervals: Array
 
     def as_json(self) -> dict[str, Any]:
-        """Number of robots whose constant is covered, and shares that it allows (Clopper and Pearson), by kind and
-        constant."""
+        """Number of robots whose constant is covered, and interval of its share (Clopper, Pearson), by kind and path."""
         found: dict[str, Any] = {"robots": len(self.true), "rounded": {}, "scattered": {}}
         for kind, ends in (("rounded", self.ranges), ("scattered", self.intervals)):
             covered = (ends[..., 0] <= self.true) & (self.true <= ends[..., 1])
@@ -59,11 +58,9 @@ class SelfTest(Shown):
 
 def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progress: Progress = silent) -> SelfTest:
     """Identify the constants of robots that are made up around a robot. Each depends on ``seed`` and its number alone.
-
     Length, mass and springs differ by factors of a third to three, and constants in units of the robot by factors of
     0.8 to 1.25. Each is identified from its critical spring and mode rounded to twice the tolerances of the data, and
-    once more from ones with these as standard errors of normal scatter. AnalysisError if none has a pitchfork.
-    """
+    once more from ones with these as standard errors of normal scatter. AnalysisError if none has a pitchfork."""
     true, ranges, intervals = [], [], []
     for number in range(count):
         rng = np.random.default_rng([seed, number])

@@ -30,8 +30,7 @@ _STEP = 1e-6  # of differences, in parts of ranges
 
 @dataclass(frozen=True)
 class Constant:
-    """Free constant: its path in the robot's description and the ends of its range, SI; with ``per``, the range is
-    that of its ratio to an earlier constant."""
+    """Free constant: its path and the ends of its range, SI, with ``per`` that of its ratio to an earlier constant."""
 
     path: str
     low: float

@@ -88,9 +88,8 @@ class RecordedIdentification(Identified):
 def identify_recorded(
     robot: Robot, data: RecordedWalks, folder: str | Path, progress: Progress = silent
 ) -> RecordedIdentification:
-    """Fit the free constants of a robot to recorded walks from files in a folder, with intervals of linear residuals
-    with the scatter that is left. Directions that the data leave open end near the constants of the robot. Errors are
-    those of :func:`read_recordings`."""
+    """Fit the free constants of a robot to recorded walks from files in a folder, with intervals of linear residuals.
+    Directions that the data leave open end near the robot's constants. Errors are those of :func:`read_recordings`."""
     walks = _Walks(robot, data.free, read_recordings(robot, data, Path(folder)))
     unknown, count = _fit(walks, progress), len(data.free.each)
     measured = [each.angles for each in walks.recordings]

@@ -286,12 +286,9 @@ def identify_twin(
     progress: Progress = silent,
 ) -> TwinIdentification:
     """Identify the constants: a :func:`search` from the known sets, then the best of the good fits that reach the curve
-    from a straight start, like the robot.
-
-    The known sets serve if the free constants have theirs among them; other constants then begin as in the robot.
-    ``evaluations`` and ``samples`` are the numbers of evaluations that train the surrogate and of samples of the
-    valley; for the other arguments see :func:`search`.
-    """
+    from a straight start, like the robot. The known sets serve if the free constants have theirs among them; other
+    constants then begin as in the robot. ``evaluations`` and ``samples`` are the numbers of evaluations that train the
+    surrogate and of samples of the valley; for the other arguments see :func:`search`."""
     engine_named("twin").common(robot)  # refuses a robot without a twin
     free = data.free
     free.check(robot)

@@ -82,8 +82,7 @@ def _series(walk: Walk, robot: Robot) -> Series:
 def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
     """Residuals of a series: computed less the data, one number for each of ``data.names``. These are radii, speeds and
     onset (each over its standard error); bend where the robot is straight beyond 0.1 rad in all (over 0.05 rad); the
-    deficit from 0.3 rad at the stiffest curved spring (over the same); motion between the averages beyond 0.1 rad (over
-    0.1 rad)."""
+    deficit from 0.3 rad at the stiffest curved spring (the same); motion between averages beyond 0.1 rad (over 0.1)."""
     springs = data.springs
     summed = np.abs(found.bends).sum(-1)
     at = dict(zip(springs, summed, strict=True))

@@ -104,8 +104,7 @@ class _Process:
 
 class Surrogate:
     """Gaussian processes of squashed residuals, shape (evaluations, residuals), over parts of the constants' ranges,
-    shape (evaluations, constants). Residuals that are the same in all evaluations are left out. Variances are
-    multiplied by ``excess``."""
+    shape (evaluations, constants), but of none that never changes. Variances are multiplied by ``excess``."""
 
     def __init__(self, parts: Array, residuals: Array, excess: float = 1.0) -> None:
         self._parts, self._excess = parts, excess

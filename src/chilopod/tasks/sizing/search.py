@@ -356,8 +356,7 @@ class Search:
         return min(tried, key=lambda found: float(norm(weights * found[1])))
 
     def _front(self, pair: Sequence[int], ends: Sequence[tuple[Array, Array]], start: Array) -> list[Array]:
-        """Places, from the best and those with a wish of a pair left out, that none surpasses in one and equals in the
-        other."""
+        """Places, from the best to those with a wish of a pair left out, of which none surpasses another in both."""
         found = [start, *(ends[i][0] for i in pair)]
         # Each deviation counts relative to that where its own wish is left out.
         largest = [max(abs(ends[i][1][i]), _MET) for i in pair]
