@@ -121,18 +121,12 @@ def resumed(
     side: int | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Continue a branch from its end; the new points are equal to those of a single run. ParameterError if the branch
-    belongs to another robot, parameter or side, or has left the interval.
+    """Continue a branch of :func:`curved_walks`, :func:`resumed` or :func:`read_walks` from its end; the new points are
+    equal to those of a single run. ParameterError if the branch belongs to another robot, parameter or side, or has
+    left the interval.
 
-    Parameters
-    ----------
-    data
-        Branch from :func:`curved_walks`, :func:`resumed` or :func:`read_walks`.
-    robot, parameter, side
-        Robot, parameter and side of the branch (``side`` None is not compared); the robot's own value of the parameter
-        does not matter.
-    between, points, longest, progress
-        As for :func:`curved_walks`; the interval is by default that of the branch.
+    The robot's own value of the parameter does not matter, and ``side`` None is not compared. The other arguments are
+    those of :func:`curved_walks`; the interval is by default that of the branch.
     """
     saved = Robot(**tomllib.loads(data.attrs["robot_toml"]))
     if data.attrs["varied"] != parameter:

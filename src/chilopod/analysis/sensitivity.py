@@ -34,6 +34,7 @@ DEFAULT = ("onset", "growth", "frequency")
 """Quantities that take little time."""
 
 _RELATIVE = "onset", "radius"  # shown in % per %; the others may be near zero
+_UNEVEN = "gait.side_phase"  # other values of it end the symmetry of half a period
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,11 +223,6 @@ class _Leading:
         return slope, float(np.hypot(errors[0], errors[1]) + abs(exponent) * errors[2]) / mode.duration
 
 
-def _keeps_symmetry(path: str) -> bool:
-    """True if a gait with another value keeps the symmetry of half a period."""
-    return path != "gait.side_phase"
-
-
 def _by_each(
     what: str, paths: Sequence[str], show: Progress, slope: Callable[[str], tuple[Any, Any]]
 ) -> tuple[list[Any], list[Any]]:
@@ -245,7 +241,7 @@ def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> 
     def slope(path: str) -> tuple[float, float]:
         if onset.parameter in (path, path.partition("[")[0]):
             return 0.0, 0.0  # it is replaced
-        symmetric = _keeps_symmetry(path)
+        symmetric = path != _UNEVEN
         (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, symmetric), of.slope(path, symmetric)
         found = -by_path.real / by_onset.real
         return found, (off + abs(found) * uncertain) / abs(by_onset.real)
@@ -256,7 +252,7 @@ def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> 
 def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
     of = _Leading(robot)
     mode: Mode = of.mode(True)
-    slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, _keeps_symmetry(path)))
+    slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, path != _UNEVEN))
     turns = mode.frequency > 0.0
     turning = [turns * slope.imag for slope in slopes], [turns * error for error in errors]
     growth = mode.growth, [slope.real for slope in slopes], errors

@@ -305,8 +305,7 @@ def joint_components(mode: ComplexArray, modules: int) -> ComplexArray:
     norm = np.linalg.norm(part)
     if norm == 0.0:
         return part
-    unit: ComplexArray = part / norm * (np.abs(peak) / peak)
-    return unit
+    return np.asarray(part / norm * (np.abs(peak) / peak))
 
 
 def _joints(modules: int) -> slice:

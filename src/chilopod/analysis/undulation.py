@@ -167,5 +167,4 @@ def _average(values: NDArray[np.inexact]) -> NDArray[np.inexact]:
     it converges faster than any power of the number of values (Das et al., Nonlinearity 30, 2017)."""
     t = (np.arange(len(values)) + 1.0) / (len(values) + 1.0)
     weight = np.exp(-1.0 / (t * (1.0 - t)))
-    mean: NDArray[np.inexact] = np.tensordot(weight / weight.sum(), values, axes=1)
-    return mean
+    return np.asarray(np.tensordot(weight / weight.sum(), values, axes=1))

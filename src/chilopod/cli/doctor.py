@@ -68,10 +68,8 @@ def doctor(as_json: JsonOption = False) -> None:
 def _versions() -> list[Finding]:
     import chilopod
 
-    found = [
-        Finding("chilopod", chilopod.__version__),
-        Finding("python", f"{platform.python_version()} ({platform.system()} {platform.machine()})"),
-    ]
+    python = f"{platform.python_version()} ({platform.system()} {platform.machine()})"
+    found = [Finding("chilopod", chilopod.__version__), Finding("python", python)]
     for module, package in _PACKAGES.items():
         # What uses a package here may be able to import it where it cannot be imported alone, or the other way round.
         fault = _fault({"mujoco": "chilopod.twin", "numba": "chilopod.integrate"}.get(module, module))

@@ -157,15 +157,13 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     arguments = signature(command, eval_str=True).parameters.values()
     first, *own = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in arguments)
     hints = get_type_hints(first.annotation, include_extras=True)
-    robot, *shared = (
-        each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name])
-        for each in signature(first.annotation).parameters.values()
-    )
+    given = signature(first.annotation).parameters.values()
+    robot, *shared = (each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name]) for each in given)
     common = {each.name for each in fields(RobotOptions)}
 
-    def run(**given: Any) -> None:
-        options = {each.name: given.pop(each.name) for each in (robot, *shared)}
-        command(first.annotation(**options), **given)
+    def run(**typed: Any) -> None:
+        options = {each.name: typed.pop(each.name) for each in (robot, *shared)}
+        command(first.annotation(**options), **typed)
 
     # What all commands have comes last.
     seen = [robot, *own, *sorted(shared, key=lambda each: each.name in common)]

@@ -141,5 +141,4 @@ class SpringLaw(ReadOnlyArrays):
         """True if the tightest circle leads around the target and never to it."""
         radius = self.tightest
         ahead, aside = seen.distance * np.cos(seen.bearing), np.abs(seen.distance * np.sin(seen.bearing))
-        inside: NDArray[np.bool_] = np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS
-        return inside
+        return np.asarray(np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS)

@@ -28,16 +28,9 @@ _MOST = 12  # walks that are drawn in a notebook
 
 
 class RunOptions(TypedDict, total=False):
-    """Options of every task with walks: seeds, repeats, folder and progress.
-
-    Attributes
-    ----------
-    seed, repeats
-        Seed of the first walk's disturbances, from which the others count up, None (default) for no disturbance; and
-        number of walks, by default 1.
-    folder, progress
-        Folder that keeps all trials, if any; function of the fraction done (0 to 1) and a few words.
-    """
+    """Options of every task with walks: ``seed`` of the first walk's disturbances, from which the others count up, None
+    (default) for no disturbance; ``repeats``, the number of walks, by default 1; ``folder`` that keeps all trials, if
+    any; and ``progress``, a function of the fraction done (0 to 1) and a few words."""
 
     seed: int | None
     repeats: int

@@ -34,7 +34,7 @@ class SelfTest(Shown):
     intervals: Array
 
     def as_json(self) -> dict[str, Any]:
-        """Number of robots whose constant is covered, and interval of its share (Clopper, Pearson), by kind and path."""
+        """Count of robots whose constant is covered, and interval of that share (Clopper, Pearson), by kind, path."""
         found: dict[str, Any] = {"robots": len(self.true), "rounded": {}, "scattered": {}}
         for kind, ends in (("rounded", self.ranges), ("scattered", self.intervals)):
             covered = (ends[..., 0] <= self.true) & (self.true <= ends[..., 1])

@@ -186,8 +186,7 @@ class BaseSeries(Description):
             point = 1.0 / self.onset[0]
             law = joints * robot.module_length / radius / np.sqrt(1.0 / spring - point), point
         bend = law[0] * np.sqrt(np.maximum(1.0 / np.array(springs) - law[1], 0.0))
-        angles: Array = np.maximum(bend, _LEAST_BEND)[:, None] * shape
-        return angles
+        return np.asarray(np.maximum(bend, _LEAST_BEND)[:, None] * shape)
 
 
 def load_data(path: str | Path, *kinds: type[Description]) -> Any:

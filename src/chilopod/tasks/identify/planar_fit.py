@@ -108,8 +108,7 @@ def _maps(robots: list[Robot]) -> Array:
     symmetry, period = models[0].symmetry, models[0].period
     if symmetry is None:
         return PlanarModel.flow_many(models, 0.0, period)[0]
-    maps: Array = symmetry @ PlanarModel.flow_many(models, 0.0, 0.5 * period)[0]
-    return maps
+    return np.asarray(symmetry @ PlanarModel.flow_many(models, 0.0, 0.5 * period)[0])
 
 
 class _LostError(Exception):
