@@ -249,7 +249,7 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     numbers = data.parameter_si.values.tolist(), data.orbit.values, multipliers, data.tangent.values
     scale = np.append(sizes, float(data.attrs["scale"]))
     rows = zip(*numbers, data.special.values, strict=True)
-    points = tuple(BranchPoint(*own, scale, kinds.get(str(special))) for *own, special in rows)
+    points = tuple(BranchPoint(x, orbit, nu, along, scale, kinds.get(str(kind))) for x, orbit, nu, along, kind in rows)
     (ending,) = (each for each in Ending if each.label == data.attrs["ending"])
     return Branch(points, ending, float(data.attrs["step"]))
 
